@@ -1,0 +1,401 @@
+"""Equations of motion of a planar tree, written once.
+
+Every kernel here works on plain arrays, allocates nothing and never branches on a value of ``q``
+or ``v``. Compiled by Numba it runs at machine speed; uncompiled, over arrays of CasADi symbols, it
+yields the exact expression graph (see :mod:`heelstrike.dynamics.symbolic`).
+
+All spatial vectors are expressed in world axes at one common point, the pivot, so that motions and
+inertias of different links add without any transformation. This is Featherstone's algorithm
+family (*Rigid Body Dynamics Algorithms*, 2008, chapters 5 and 6) in the algebra of the plane:
+
+- motion ``(w, vx, vz)``: rotation about +y and velocity of the body point at the pivot;
+- a point at ``r = (x, z)`` from the pivot moves with ``(vx + w z, vz - w x)``;
+- inertia ``(m, hx, hz, I)`` about the pivot: momentum ``p = (m vx + w hz, m vz - w hx)`` and
+  moment of momentum ``L = I w + hz vx - hx vz``, positive about +y.
+
+Call order for a state: :func:`forward_kinematics`, then :func:`link_velocities`, then the rest.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+from heelstrike.compilation import kernel
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Model
+
+
+@kernel
+def forward_kinematics(model: Model, q: Floats, work: Workspace) -> None:
+    """Poses of all links, their joint motions and inertias about the pivot (paper eq. 6)."""
+    count = model.parent.shape[0]
+    for i in range(count):
+        parent = model.parent[i]
+        displacement = q[i] - model.reference[i]
+        x = model.offset[i, 0] + model.axis[i, 1] * displacement
+        z = model.offset[i, 1] + model.axis[i, 2] * displacement
+        if parent < 0:
+            work.angle[i] = model.axis[i, 0] * displacement
+            work.origin[i, 0] = x
+            work.origin[i, 1] = z
+            work.motion[i, 1] = model.axis[i, 1]
+            work.motion[i, 2] = model.axis[i, 2]
+        else:
+            c = work.cosine[parent]
+            s = work.sine[parent]
+            work.angle[i] = work.angle[parent] + model.axis[i, 0] * displacement
+            work.origin[i, 0] = work.origin[parent, 0] + c * x + s * z
+            work.origin[i, 1] = work.origin[parent, 1] - s * x + c * z
+            work.motion[i, 1] = c * model.axis[i, 1] + s * model.axis[i, 2]
+            work.motion[i, 2] = c * model.axis[i, 2] - s * model.axis[i, 1]
+        if model.axis[i, 0] == 0.0 and parent >= 0:
+            work.cosine[i] = work.cosine[parent]
+            work.sine[i] = work.sine[parent]
+        else:
+            work.cosine[i] = cos(work.angle[i])
+            work.sine[i] = sin(work.angle[i])
+    work.pivot[0] = work.origin[model.pivot, 0]
+    work.pivot[1] = work.origin[model.pivot, 1]
+    for i in range(count):
+        x = work.origin[i, 0] - work.pivot[0]
+        z = work.origin[i, 1] - work.pivot[1]
+        work.motion[i, 0] = model.axis[i, 0]
+        work.motion[i, 1] -= model.axis[i, 0] * z
+        work.motion[i, 2] += model.axis[i, 0] * x
+        c = work.cosine[i]
+        s = work.sine[i]
+        x += c * model.center_of_mass[i, 0] + s * model.center_of_mass[i, 1]
+        z += c * model.center_of_mass[i, 1] - s * model.center_of_mass[i, 0]
+        mass = model.mass[i]
+        work.inertia[i, 0] = mass
+        work.inertia[i, 1] = mass * x
+        work.inertia[i, 2] = mass * z
+        work.inertia[i, 3] = model.inertia[i] + mass * (x * x + z * z)
+
+
+@kernel
+def link_velocities(model: Model, v: Floats, work: Workspace) -> None:
+    """Spatial velocities of all links and the accelerations they cause by themselves.
+
+    A joint's motion is carried along by its parent, so that it changes at the rate
+    ``velocity x motion``; the sum of these along the chain is J̇v.
+    """
+    for i in range(model.parent.shape[0]):
+        parent = model.parent[i]
+        m0 = work.motion[i, 0]
+        m1 = work.motion[i, 1]
+        m2 = work.motion[i, 2]
+        if parent < 0:
+            work.velocity[i, 0] = m0 * v[i]
+            work.velocity[i, 1] = m1 * v[i]
+            work.velocity[i, 2] = m2 * v[i]
+            work.bias_acceleration[i, 0] = 0.0
+            work.bias_acceleration[i, 1] = 0.0
+            work.bias_acceleration[i, 2] = 0.0
+        else:
+            w = work.velocity[parent, 0]
+            vx = work.velocity[parent, 1]
+            vz = work.velocity[parent, 2]
+            work.velocity[i, 0] = w + m0 * v[i]
+            work.velocity[i, 1] = vx + m1 * v[i]
+            work.velocity[i, 2] = vz + m2 * v[i]
+            work.bias_acceleration[i, 0] = work.bias_acceleration[parent, 0]
+            work.bias_acceleration[i, 1] = (
+                work.bias_acceleration[parent, 1] + (w * m2 - m0 * vz) * v[i]
+            )
+            work.bias_acceleration[i, 2] = (
+                work.bias_acceleration[parent, 2] + (m0 * vx - w * m1) * v[i]
+            )
+
+
+@kernel
+def inverse_dynamics(model: Model, acceleration: Floats, work: Workspace, force: Floats) -> None:
+    """Generalised force A(q) a + H(q, v) of the given joint acceleration (recursive Newton-Euler).
+
+    Gravity enters as an upward acceleration of the world. Passive joint forces (damping, springs)
+    are not part of H; see :func:`passive_force`.
+    """
+    count = model.parent.shape[0]
+    for i in range(count):
+        parent = model.parent[i]
+        if parent < 0:
+            a0 = 0.0
+            a1 = -model.gravity[0]
+            a2 = -model.gravity[1]
+        else:
+            a0 = work.acceleration[parent, 0]
+            a1 = work.acceleration[parent, 1]
+            a2 = work.acceleration[parent, 2]
+        a0 = a0 + work.motion[i, 0] * acceleration[i]
+        a1 = a1 + work.motion[i, 1] * acceleration[i]
+        a2 = a2 + work.motion[i, 2] * acceleration[i]
+        work.acceleration[i, 0] = a0
+        work.acceleration[i, 1] = a1
+        work.acceleration[i, 2] = a2
+        # The recursion above carries the part of the joints; the velocity part is ready.
+        a0 = a0 + work.bias_acceleration[i, 0]
+        a1 = a1 + work.bias_acceleration[i, 1]
+        a2 = a2 + work.bias_acceleration[i, 2]
+        mass = work.inertia[i, 0]
+        hx = work.inertia[i, 1]
+        hz = work.inertia[i, 2]
+        w = work.velocity[i, 0]
+        vx = work.velocity[i, 1]
+        vz = work.velocity[i, 2]
+        px = mass * vx + w * hz
+        pz = mass * vz - w * hx
+        work.force[i, 0] = work.inertia[i, 3] * a0 + hz * a1 - hx * a2 + vz * px - vx * pz
+        work.force[i, 1] = mass * a1 + a0 * hz + w * pz
+        work.force[i, 2] = mass * a2 - a0 * hx - w * px
+    for i in range(count - 1, -1, -1):
+        force[i] = (
+            work.motion[i, 0] * work.force[i, 0]
+            + work.motion[i, 1] * work.force[i, 1]
+            + work.motion[i, 2] * work.force[i, 2]
+            + model.armature[i] * acceleration[i]
+        )
+        parent = model.parent[i]
+        if parent >= 0:
+            work.force[parent, 0] += work.force[i, 0]
+            work.force[parent, 1] += work.force[i, 1]
+            work.force[parent, 2] += work.force[i, 2]
+
+
+@kernel
+def bias_force(model: Model, work: Workspace, force: Floats) -> None:
+    """Centrifugal, Coriolis and gravitational forces, the paper's H(q, v) (eq. 1)."""
+    inverse_dynamics(model, work.zero, work, force)
+
+
+@kernel
+def passive_force(model: Model, q: Floats, v: Floats, force: Floats) -> None:
+    """Generalised force of joint dampers and springs on the robot."""
+    for i in range(model.parent.shape[0]):
+        force[i] = -model.damping[i] * v[i] - model.stiffness[i] * (q[i] - model.rest[i])
+
+
+@kernel
+def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
+    """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
+    count = model.parent.shape[0]
+    for i in range(count):
+        for k in range(4):
+            work.composite[i, k] = work.inertia[i, k]
+        for j in range(count):
+            matrix[i, j] = 0.0
+    for i in range(count - 1, -1, -1):
+        mass = work.composite[i, 0]
+        hx = work.composite[i, 1]
+        hz = work.composite[i, 2]
+        m0 = work.motion[i, 0]
+        m1 = work.motion[i, 1]
+        m2 = work.motion[i, 2]
+        moment = work.composite[i, 3] * m0 + hz * m1 - hx * m2
+        px = mass * m1 + m0 * hz
+        pz = mass * m2 - m0 * hx
+        matrix[i, i] = m0 * moment + m1 * px + m2 * pz + model.armature[i]
+        parent = model.parent[i]
+        if parent >= 0:
+            for k in range(4):
+                work.composite[parent, k] += work.composite[i, k]
+        j = parent
+        while j >= 0:
+            entry = work.motion[j, 0] * moment + work.motion[j, 1] * px + work.motion[j, 2] * pz
+            matrix[i, j] = entry
+            matrix[j, i] = entry
+            j = model.parent[j]
+
+
+@kernel
+def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
+    """Factorise A = Lᵀ D L along the tree, without fill-in (Featherstone 2008, section 6.5).
+
+    `factor` receives D on its diagonal and the strictly lower part of the unit matrix L, nonzero
+    only where the column is an ancestor of the row.
+    """
+    count = model.parent.shape[0]
+    for i in range(count):
+        factor[i, i] = matrix[i, i]
+        j = model.parent[i]
+        while j >= 0:
+            factor[i, j] = matrix[i, j]
+            j = model.parent[j]
+    for k in range(count - 1, -1, -1):
+        i = model.parent[k]
+        while i >= 0:
+            ratio = factor[k, i] / factor[k, k]
+            j = i
+            while j >= 0:
+                factor[i, j] -= ratio * factor[k, j]
+                j = model.parent[j]
+            factor[k, i] = ratio
+            i = model.parent[i]
+
+
+@kernel
+def solve_upper(model: Model, factor: Floats, x: Floats) -> None:
+    """Replace x by L⁻ᵀ x."""
+    for i in range(model.parent.shape[0] - 1, -1, -1):
+        j = model.parent[i]
+        while j >= 0:
+            x[j] -= factor[i, j] * x[i]
+            j = model.parent[j]
+
+
+@kernel
+def solve_lower(model: Model, factor: Floats, x: Floats) -> None:
+    """Replace x by L⁻¹ x."""
+    for i in range(model.parent.shape[0]):
+        j = model.parent[i]
+        while j >= 0:
+            x[i] -= factor[i, j] * x[j]
+            j = model.parent[j]
+
+
+@kernel
+def solve_factorized(model: Model, factor: Floats, x: Floats) -> None:
+    """Replace x by A⁻¹ x."""
+    solve_upper(model, factor, x)
+    for i in range(model.parent.shape[0]):
+        x[i] /= factor[i, i]
+    solve_lower(model, factor, x)
+
+
+@kernel
+def point_position(work: Workspace, link: int, local: Floats, position: Floats) -> None:
+    """World position of a point fixed to a link."""
+    c = work.cosine[link]
+    s = work.sine[link]
+    position[0] = work.origin[link, 0] + c * local[0] + s * local[1]
+    position[1] = work.origin[link, 1] - s * local[0] + c * local[1]
+
+
+@kernel
+def point_jacobian(
+    model: Model, work: Workspace, link: int, position: Floats, jacobian: Floats
+) -> None:
+    """Jacobian of a body point and of its link's rotation.
+
+    Parameters
+    ----------
+    link : int
+        Link that carries the point.
+    position : (2,) float
+        World position of the point.
+    jacobian : (3, nv) float
+        Receives the rows (x, z, rotation about +y): the paper's J_r, J_l (eq. 4, 5).
+    """
+    x = position[0] - work.pivot[0]
+    z = position[1] - work.pivot[1]
+    for j in range(model.parent.shape[0]):
+        jacobian[0, j] = 0.0
+        jacobian[1, j] = 0.0
+        jacobian[2, j] = 0.0
+    j = link
+    while j >= 0:
+        jacobian[0, j] = work.motion[j, 1] + work.motion[j, 0] * z
+        jacobian[1, j] = work.motion[j, 2] - work.motion[j, 0] * x
+        jacobian[2, j] = work.motion[j, 0]
+        j = model.parent[j]
+
+
+@kernel
+def point_bias_acceleration(
+    work: Workspace, link: int, position: Floats, acceleration: Floats
+) -> None:
+    """J̇ v of :func:`point_jacobian`: acceleration of the point and link at zero v̇."""
+    x = position[0] - work.pivot[0]
+    z = position[1] - work.pivot[1]
+    w = work.velocity[link, 0]
+    vx = work.velocity[link, 1] + w * z
+    vz = work.velocity[link, 2] - w * x
+    rotation = work.bias_acceleration[link, 0]
+    acceleration[0] = work.bias_acceleration[link, 1] + rotation * z + w * vz
+    acceleration[1] = work.bias_acceleration[link, 2] - rotation * x - w * vx
+    acceleration[2] = rotation
+
+
+@kernel
+def forward_dynamics(
+    model: Model, matrix: Floats, factor: Floats, force: Floats, work: Workspace, v_dot: Floats
+) -> None:
+    """Acceleration under a generalised force: A⁻¹ (force − H), with `matrix` and `factor` filled.
+
+    `force` holds all generalised forces but H: actuators, passive joint forces and Jᵀλ.
+    """
+    mass_matrix(model, work, matrix)
+    factorize(model, matrix, factor)
+    bias_force(model, work, v_dot)
+    for i in range(model.parent.shape[0]):
+        v_dot[i] = force[i] - v_dot[i]
+    solve_factorized(model, factor, v_dot)
+
+
+@kernel
+def kinetic_energy(model: Model, v: Floats, work: Workspace, energy: Floats) -> None:
+    """Kinetic energy of the links and of the rotors (armature), summed link by link."""
+    energy[0] = 0.0
+    for i in range(model.parent.shape[0]):
+        w = work.velocity[i, 0]
+        vx = work.velocity[i, 1]
+        vz = work.velocity[i, 2]
+        energy[0] += 0.5 * (
+            work.inertia[i, 3] * w * w
+            + work.inertia[i, 0] * (vx * vx + vz * vz)
+            + 2.0 * w * (work.inertia[i, 2] * vx - work.inertia[i, 1] * vz)
+            + model.armature[i] * v[i] * v[i]
+        )
+
+
+@kernel
+def potential_energy(model: Model, q: Floats, work: Workspace, energy: Floats) -> None:
+    """Energy of the links in the gravity field and of the joint springs; zero at the origin."""
+    energy[0] = 0.0
+    for i in range(model.parent.shape[0]):
+        mass = work.inertia[i, 0]
+        stretch = q[i] - model.rest[i]
+        energy[0] += (
+            -model.gravity[0] * (work.inertia[i, 1] + mass * work.pivot[0])
+            - model.gravity[1] * (work.inertia[i, 2] + mass * work.pivot[1])
+            + 0.5 * model.stiffness[i] * stretch * stretch
+        )
+
+
+@kernel
+def center_of_mass(model: Model, work: Workspace, position: Floats) -> None:
+    """World position of the robot's centre of mass."""
+    mass = 0.0
+    x = 0.0
+    z = 0.0
+    for i in range(model.parent.shape[0]):
+        mass = mass + work.inertia[i, 0]
+        x = x + work.inertia[i, 1]
+        z = z + work.inertia[i, 2]
+    position[0] = work.pivot[0] + x / mass
+    position[1] = work.pivot[1] + z / mass
+
+
+@kernel
+def momentum(model: Model, work: Workspace, result: Floats) -> None:
+    """Linear momentum (x, z) and moment of momentum about the robot's centre of mass (+y)."""
+    mass = 0.0
+    hx = 0.0
+    hz = 0.0
+    px = 0.0
+    pz = 0.0
+    moment = 0.0
+    for i in range(model.parent.shape[0]):
+        w = work.velocity[i, 0]
+        vx = work.velocity[i, 1]
+        vz = work.velocity[i, 2]
+        mass = mass + work.inertia[i, 0]
+        hx = hx + work.inertia[i, 1]
+        hz = hz + work.inertia[i, 2]
+        px = px + work.inertia[i, 0] * vx + w * work.inertia[i, 2]
+        pz = pz + work.inertia[i, 0] * vz - w * work.inertia[i, 1]
+        moment = moment + (
+            work.inertia[i, 3] * w + work.inertia[i, 2] * vx - work.inertia[i, 1] * vz
+        )
+    result[0] = px
+    result[1] = pz
+    result[2] = moment - (hz * px - hx * pz) / mass

@@ -1,0 +1,35 @@
+"""Errors a user can meet, each worded for a person: what was wrong, where, and what to do."""
+
+from __future__ import annotations
+
+
+class HeelstrikeError(Exception):
+    """Base of every error that heelstrike raises on purpose."""
+
+
+class RobotError(HeelstrikeError, ValueError):
+    """A robot is unknown, its file cannot be read, or it is not a robot we can simulate."""
+
+
+class GaitError(HeelstrikeError, ValueError):
+    """A gait request or a gait file is not usable."""
+
+
+class InfeasibleGaitError(GaitError):
+    """No gait satisfies the request; the message names the constraints in conflict."""
+
+
+class ControllerError(HeelstrikeError, ValueError):
+    """A controller was set up wrongly or returned torques of the wrong shape."""
+
+
+class ContactProblemError(HeelstrikeError, ValueError):
+    """The data of a contact problem are malformed."""
+
+
+class SimulationError(HeelstrikeError, ValueError):
+    """The arguments of a simulation are not usable (before anything is simulated)."""
+
+
+class RunFileError(HeelstrikeError, ValueError):
+    """A saved run cannot be read."""

@@ -1,0 +1,78 @@
+"""The robot as the kernels see it: a planar tree of links, as plain arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Model(NamedTuple):
+    """A planar kinematic tree with inertia, contact points and actuators.
+
+    Every link hangs on its parent by one joint of one degree of freedom, so that link ``i`` and
+    coordinate ``i`` belong together; a body with several joints becomes a chain of links of which
+    all but the last are massless. All link frames are parallel to the world frame when ``q``
+    equals `reference`; vectors are (x, z) pairs in link axes, lengths in metres.
+
+    Attributes
+    ----------
+    parent : (nv,) int
+        Index of the parent link, smaller than the link's own; -1 for the world.
+    axis : (nv, 3) float
+        Motion of the joint per unit of its coordinate, in the parent's axes: rotation about +y
+        (rad), translation along x and z (m). ``(±1, 0, 0)`` is a hinge, ``(0, x, z)`` a slide.
+    offset : (nv, 2) float
+        Origin of the link frame in the parent's frame when ``q`` equals `reference`.
+    reference : (nq,) float
+        Coordinates at which all link frames are parallel to the world frame.
+    mass, inertia : (nv,) float
+        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²).
+    center_of_mass : (nv, 2) float
+        Centre of mass in the link frame.
+    armature, damping, stiffness, rest : (nv,) float
+        Rotor inertia (kg m²), viscous damping (N m s), spring (N m) and its rest coordinate.
+    lower, upper : (nv,) float
+        Range of the coordinate; infinite where there is no stop.
+    gravity : (2,) float
+        Acceleration of free fall, (0, -9.81) on earth.
+    contact_link : (nc,) int
+        Link that carries each contact point.
+    contact_position : (nc, 2) float
+        Centre of each contact disc in the link frame.
+    contact_radius : (nc,) float
+        Radius of each contact disc; zero for a point.
+    actuator_joint : (nu,) int
+        Coordinate that each actuator drives.
+    torque_lower, torque_upper : (nu,) float
+        Torque (N m) or force (N) limits at the joint; infinite where there is none.
+    pivot : int
+        Link whose origin serves as the reference point of spatial vectors, so that a robot far
+        from the world origin loses no digits.
+    """
+
+    parent: Integers
+    axis: Floats
+    offset: Floats
+    reference: Floats
+    mass: Floats
+    center_of_mass: Floats
+    inertia: Floats
+    armature: Floats
+    damping: Floats
+    stiffness: Floats
+    rest: Floats
+    lower: Floats
+    upper: Floats
+    gravity: Floats
+    contact_link: Integers
+    contact_position: Floats
+    contact_radius: Floats
+    actuator_joint: Integers
+    torque_lower: Floats
+    torque_upper: Floats
+    pivot: int

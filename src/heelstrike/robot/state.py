@@ -1,0 +1,28 @@
+"""Where a robot is and how fast it moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class State:
+    """Position and velocity of a robot at one instant.
+
+    Attributes
+    ----------
+    q : (nq,) float
+        Generalised positions (m, rad).
+    v : (nv,) float
+        Generalised velocities (m/s, rad/s).
+    """
+
+    q: NDArray[np.float64]
+    v: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "q", np.array(self.q, dtype=np.float64))
+        object.__setattr__(self, "v", np.array(self.v, dtype=np.float64))
