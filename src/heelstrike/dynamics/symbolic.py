@@ -30,9 +30,12 @@ def symbols(vector: casadi.SX) -> NDArray[np.object_]:
 
 def expression(array: NDArray[np.object_]) -> casadi.SX:
     """Collect an object array of scalar symbols into a CasADi vector or matrix."""
-    if array.ndim == 1:
-        return casadi.vertcat(*array)
-    return casadi.vertcat(*(casadi.horzcat(*row) for row in array))
+    collected: Any = (
+        casadi.vertcat(*array)
+        if array.ndim == 1
+        else casadi.vertcat(*(casadi.horzcat(*row) for row in array))
+    )
+    return collected
 
 
 class TracedDynamics:
@@ -104,3 +107,15 @@ class TracedDynamics:
         traced(kernels.kinetic_energy)(self.model, self.v, self.work, kinetic)
         traced(kernels.potential_energy)(self.model, self.q, self.work, potential)
         return kinetic[0], potential[0]
+
+    def center_of_mass(self) -> NDArray[np.object_]:
+        """World position of the robot's centre of mass, (2,)."""
+        position = np.zeros(2, dtype=object)
+        traced(kernels.center_of_mass)(self.model, self.work, position)
+        return position
+
+    def momentum(self) -> NDArray[np.object_]:
+        """Linear momentum and moment of momentum about the centre of mass, (3,)."""
+        result = np.zeros(3, dtype=object)
+        traced(kernels.momentum)(self.model, self.work, result)
+        return result

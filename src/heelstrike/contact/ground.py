@@ -1,0 +1,265 @@
+"""The ground: a rigid polyline with friction and restitution on every segment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.compilation import inner_kernel
+from heelstrike.errors import SimulationError
+
+Floats = NDArray[np.float64]
+
+# Features further from a disc's centre than this (m) are not looked for: a robot that far from
+# every one of them is in free flight, and the distance to the ground below it will do.
+REACH = 0.25
+
+
+class GroundModel(NamedTuple):
+    """The ground as the kernels see it.
+
+    Attributes
+    ----------
+    vertices : (ns + 1, 2) float
+        Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
+        ever.
+    friction, restitution : (ns,) float
+        Coefficients of each segment.
+    """
+
+    vertices: Floats
+    friction: Floats
+    restitution: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Rigid ground.
+
+    Parameters
+    ----------
+    friction : float or (ns,) array
+        Coulomb friction coefficient μ ≥ 0, one for all or one a segment.
+    restitution : float or (ns,) array
+        Newton's coefficient of restitution, 0 (plastic, the paper's choice) to 1.
+    slope : float
+        Inclination in rad of ground without a profile; positive climbs along +x.
+    profile : (ns + 1, 2) array, optional
+        Corners (x, z) of the ground in metres, from left to right; two corners with the same x
+        make a vertical step. The first and last segments go on for ever. See also
+        :meth:`stairs` and :meth:`rough`.
+
+    Raises
+    ------
+    SimulationError
+        If a coefficient is out of range or the profile is no polyline from left to right.
+
+    Examples
+    --------
+    >>> Ground(friction=0.6, slope=0.1).height(2.0).round(4)
+    np.float64(0.2007)
+    """
+
+    friction: ArrayLike = 0.75
+    restitution: ArrayLike = 0.0
+    slope: float = 0.0
+    profile: ArrayLike | None = None
+    _model: GroundModel = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        if not abs(self.slope) < 0.5 * np.pi:
+            raise SimulationError(f"the slope must lie within ±π/2 rad, got {self.slope}")
+        if self.profile is None:
+            vertices = np.array([[0.0, 0.0], [1.0, np.tan(self.slope)]])
+        elif self.slope != 0.0:
+            raise SimulationError("give the ground either a slope or a profile, not both")
+        else:
+            vertices = _polyline(self.profile)
+        segments = len(vertices) - 1
+        friction = _coefficients("friction coefficient", self.friction, segments, np.inf)
+        restitution = _coefficients("restitution", self.restitution, segments, 1.0)
+        object.__setattr__(self, "_model", GroundModel(vertices, friction, restitution))
+
+    @classmethod
+    def stairs(
+        cls,
+        *,
+        rise: float,
+        tread: float,
+        count: int,
+        start: float = 0.0,
+        friction: ArrayLike = 0.75,
+        restitution: ArrayLike = 0.0,
+    ) -> Ground:
+        """Flat ground with `count` steps from x = `start` on; a negative `rise` leads down."""
+        if count < 1 or not tread > 0.0 or not np.isfinite(rise):
+            raise SimulationError(
+                f"stairs need count ≥ 1, tread > 0 and a finite rise; "
+                f"got count={count}, tread={tread}, rise={rise}"
+            )
+        corners = [(start - 1.0, 0.0)]
+        for step in range(count):
+            x = start + step * tread
+            corners += [(x, step * rise), (x, (step + 1) * rise)]
+        corners.append((start + count * tread, count * rise))
+        return cls(friction=friction, restitution=restitution, profile=np.array(corners))
+
+    @classmethod
+    def rough(
+        cls,
+        *,
+        amplitude: float,
+        spacing: float,
+        length: float,
+        seed: int,
+        start: float = 0.5,
+        friction: ArrayLike = 0.75,
+        restitution: ArrayLike = 0.0,
+    ) -> Ground:
+        """Flat ground with corners at random heights within ±`amplitude` from `start` on."""
+        if not (amplitude >= 0.0 and spacing > 0.0 and length > 0.0):
+            raise SimulationError("rough ground needs amplitude ≥ 0, spacing > 0 and length > 0")
+        x = np.arange(start, start + length, spacing)
+        z = np.random.default_rng(seed).uniform(-amplitude, amplitude, len(x))
+        z[0] = z[-1] = 0.0
+        ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
+        return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
+
+    def model(self) -> GroundModel:
+        """Return the arrays that the kernels use."""
+        return self._model
+
+    def height(self, x: ArrayLike) -> Floats:
+        """Height of the ground at x, in metres; on a vertical step, that of its right side."""
+        x = np.asarray(x, dtype=np.float64)
+        vertices = self._model.vertices
+        segment = np.clip(
+            np.searchsorted(vertices[:, 0], x, side="right") - 1, 0, len(vertices) - 2
+        )
+        left, right = vertices[segment], vertices[segment + 1]
+        run = right[..., 0] - left[..., 0]
+        slope = (right[..., 1] - left[..., 1]) / np.where(run > 0.0, run, np.inf)
+        height: Floats = left[..., 1] + slope * (x - left[..., 0])
+        return height
+
+
+def _polyline(profile: ArrayLike) -> Floats:
+    vertices = np.array(profile, dtype=np.float64)
+    if vertices.ndim != 2 or vertices.shape[1] != 2 or len(vertices) < 2:
+        raise SimulationError(
+            f"a ground profile is an array of at least two corners (x, z), got shape "
+            f"{vertices.shape}"
+        )
+    if not np.all(np.isfinite(vertices)):
+        raise SimulationError("a ground profile must be finite everywhere")
+    steps = np.diff(vertices, axis=0)
+    if np.any(steps[:, 0] < 0.0) or np.any(np.all(steps == 0.0, axis=1)):
+        corner = int(np.flatnonzero((steps[:, 0] < 0.0) | np.all(steps == 0.0, axis=1))[0])
+        raise SimulationError(
+            f"a ground profile runs from left to right without repeating a corner; "
+            f"corner {corner + 1} at {vertices[corner + 1].tolist()} does not"
+        )
+    if steps[0, 0] == 0.0 or steps[-1, 0] == 0.0:
+        raise SimulationError("the first and last segment of a ground profile cannot be vertical")
+    return vertices
+
+
+def _coefficients(name: str, value: ArrayLike, segments: int, highest: float) -> Floats:
+    coefficients = np.asarray(value, dtype=np.float64)
+    if coefficients.ndim > 1 or coefficients.size not in (1, segments):
+        raise SimulationError(
+            f"the {name} must be one number or one for each of the {segments} segments of the "
+            f"ground, got shape {coefficients.shape}"
+        )
+    if not np.all((coefficients >= 0.0) & (coefficients <= highest) & np.isfinite(coefficients)):
+        limits = "≥ 0" if highest == np.inf else f"in [0, {highest:g}]"
+        raise SimulationError(f"the {name} of the ground must be {limits}, got {value!r}")
+    return np.broadcast_to(coefficients, (segments,)).copy()
+
+
+@inner_kernel
+def segment_below(ground: GroundModel, x: float) -> int:
+    """Index of the segment under x; the right one at a corner."""
+    low = 0
+    high = ground.friction.shape[0]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if ground.vertices[middle, 0] <= x:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@inner_kernel
+def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: Floats) -> float:
+    """Signed distance to the line through a segment; writes its upward normal."""
+    run = ground.vertices[segment + 1, 0] - ground.vertices[segment, 0]
+    rise = ground.vertices[segment + 1, 1] - ground.vertices[segment, 1]
+    length = np.sqrt(run * run + rise * rise)
+    normal[0] = -rise / length
+    normal[1] = run / length
+    return (x - ground.vertices[segment, 0]) * normal[0] + (
+        z - ground.vertices[segment, 1]
+    ) * normal[1]
+
+
+@inner_kernel
+def ground_contact(
+    ground: GroundModel, x: float, z: float, radius: float, normal: Floats
+) -> tuple[float, float, float]:
+    """Gap, friction and restitution between a disc and the nearest feature of the ground.
+
+    Parameters
+    ----------
+    x, z : float
+        World position of the disc's centre.
+    radius : float
+        Radius of the disc.
+    normal : (2,) float
+        Receives the ground's outward normal; the tangent is (normal z, −normal x).
+    """
+    below = segment_below(ground, x)
+    distance = line_contact(ground, below, x, z, normal)
+    segments = ground.friction.shape[0]
+    if segments == 1:
+        return distance - radius, ground.friction[0], ground.restitution[0]
+
+    # Nothing nearer than the ground straight below or above can lie further away in x.
+    inside = distance < 0.0
+    reach = min(abs(distance) / max(normal[1], 1e-3), REACH + radius)
+    first = below
+    while first > 0 and ground.vertices[first, 0] >= x - reach:
+        first -= 1
+    nearest = np.inf
+    owner = below
+    for segment in range(first, segments):
+        ax = ground.vertices[segment, 0]
+        az = ground.vertices[segment, 1]
+        if segment > below and ax > x + reach:
+            break
+        run = ground.vertices[segment + 1, 0] - ax
+        rise = ground.vertices[segment + 1, 1] - az
+        along = ((x - ax) * run + (z - az) * rise) / (run * run + rise * rise)
+        on_corner = (along < 0.0 and segment > 0) or (along > 1.0 and segment < segments - 1)
+        if on_corner:
+            along = min(max(along, 0.0), 1.0)
+        dx = x - ax - along * run
+        dz = z - az - along * rise
+        squared = dx * dx + dz * dz
+        if squared < nearest:
+            nearest = squared
+            owner = segment
+            separation = np.sqrt(squared)
+            if on_corner and separation > 1e-12:
+                sign = -1.0 if inside else 1.0
+                normal[0] = sign * dx / separation
+                normal[1] = sign * dz / separation
+            else:
+                line_contact(ground, segment, x, z, normal)
+    separation = np.sqrt(nearest)
+    gap = (-separation if inside else separation) - radius
+    return gap, ground.friction[owner], ground.restitution[owner]
