@@ -53,13 +53,14 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     address : bool
         Whether its address is needed, to pass it as an argument to other kernels.
     """
-    compiled: Function = njit(signature, no_cfunc_wrapper=not address, **_OPTIONS)(function)
+    options = _OPTIONS | {"no_cfunc_wrapper": not address}
+    compiled: Function = njit(signature, **options)(function)
     return compiled
 
 
 def type_of(value: Any) -> Any:
     """Return the Numba type of an example value."""
-    return numba.typeof(value)
+    return numba.typeof(value)  # type: ignore[no-untyped-call]
 
 
 def uncompiled(function: Function, replace: Mapping[str, Any] | None = None) -> Function:

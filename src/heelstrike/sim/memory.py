@@ -1,0 +1,218 @@
+"""Everything the compiled loop writes to, allocated before it starts."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
+from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller import Contacts
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Places in ``Memory.tally``: counts over the whole run.
+SATURATIONS = 0
+STEPS = 1
+BAD_TORQUE = 2
+TALLIES = 3
+
+# Places in ``Memory.extreme``: worst values over every step, recorded or not.
+PENETRATION = 0
+COMPLEMENTARITY = 1
+CONE = 2
+NON_PENETRATION = 3
+EXTREMES = 4
+
+
+class Memory(NamedTuple):
+    """State of a simulation and the scratch of its step.
+
+    Attributes
+    ----------
+    q, v : (nv,) float
+        Position and velocity now.
+    next_v : (nv,) float
+        Velocity at the end of the step.
+    torque : (nu,) float
+        Joint torques of this step, within their limits.
+    force, rate : (nv,) float
+        Generalised force without contact; scratch.
+    stiffness, damping : (nv,) float
+        Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
+        the step (N m, N m s).
+    mass_matrix, factor : (nv, nv) float
+        Mass matrix and its factor.
+    tree, scratch : Workspace
+        Kinematics of the state now; a second one for controllers.
+    contacts : Contacts
+        Contact points now; their forces are those of the last solve.
+    friction, restitution : (nc,) float
+        Coefficients of the ground under each contact point.
+    slip : (nc,) float
+        Tangential velocity of each contact point at the end of the step.
+    mode : (nc,) int
+        Contact mode found by the last solve, the guess of the next.
+    closed, slipping : (nc,) int
+        Whether each contact point is on the ground, and whether it slips.
+    candidate : (nc,) int
+        Contact points in the contact problem of this step.
+    jacobian, half : (2 nc, nv) float
+        Contact Jacobian of the candidates and L⁻ᵀ Jᵀ.
+    delassus : (2 nc, 2 nc) float
+    free, impulse, velocity : (2 nc,) float
+        The contact problem and its solution.
+    problem_friction : (nc,) float
+    problem_mode : (nc,) int
+    residual : (3,) float
+        Residuals of the certificate of the last solve.
+    solver : ContactWorkspace
+        Memory of the contact solvers.
+    tally : (3,) int
+    extreme : (4,) float
+        Counts and worst values of the run; their places are module constants.
+    """
+
+    q: Floats
+    v: Floats
+    next_v: Floats
+    torque: Floats
+    force: Floats
+    rate: Floats
+    stiffness: Floats
+    damping: Floats
+    mass_matrix: Floats
+    factor: Floats
+    tree: Workspace
+    scratch: Workspace
+    contacts: Contacts
+    friction: Floats
+    restitution: Floats
+    slip: Floats
+    mode: Integers
+    closed: Integers
+    slipping: Integers
+    candidate: Integers
+    jacobian: Floats
+    half: Floats
+    delassus: Floats
+    free: Floats
+    impulse: Floats
+    velocity: Floats
+    problem_friction: Floats
+    problem_mode: Integers
+    residual: Floats
+    solver: ContactWorkspace
+    tally: Integers
+    extreme: Floats
+
+
+def allocate_memory(robot: Robot) -> Memory:
+    """Allocate the memory of a simulation of `robot`."""
+    nv, nu, nc = robot.nv, robot.nu, robot.nc
+    return Memory(
+        q=np.zeros(nv),
+        v=np.zeros(nv),
+        next_v=np.zeros(nv),
+        torque=np.zeros(nu),
+        force=np.zeros(nv),
+        rate=np.zeros(nv),
+        stiffness=np.zeros(nv),
+        damping=np.zeros(nv),
+        mass_matrix=np.zeros((nv, nv)),
+        factor=np.zeros((nv, nv)),
+        tree=workspace(nv),
+        scratch=workspace(nv),
+        contacts=Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2))),
+        friction=np.zeros(nc),
+        restitution=np.zeros(nc),
+        slip=np.zeros(nc),
+        mode=np.zeros(nc, dtype=np.int64),
+        closed=np.zeros(nc, dtype=np.int64),
+        slipping=np.zeros(nc, dtype=np.int64),
+        candidate=np.zeros(nc, dtype=np.int64),
+        jacobian=np.zeros((2 * nc, nv)),
+        half=np.zeros((2 * nc, nv)),
+        delassus=np.zeros((2 * nc, 2 * nc)),
+        free=np.zeros(2 * nc),
+        impulse=np.zeros(2 * nc),
+        velocity=np.zeros(2 * nc),
+        problem_friction=np.zeros(nc),
+        problem_mode=np.zeros(nc, dtype=np.int64),
+        residual=np.zeros(3),
+        solver=contact_workspace(max(nc, 1)),
+        tally=np.zeros(TALLIES, dtype=np.int64),
+        extreme=np.zeros(EXTREMES),
+    )
+
+
+class Record(NamedTuple):
+    """Rows of a run, filled by the compiled loop, one row an instant.
+
+    Forces and torques of a row are those decided at its instant and acting over the step that
+    follows. `row_count` and `event_count` are the numbers of rows used.
+    """
+
+    row_count: Integers
+    time: Floats
+    q: Floats
+    v: Floats
+    torque: Floats
+    point: Floats
+    normal: Floats
+    gap: Floats
+    force: Floats
+    slip: Floats
+    residual: Floats
+    event_count: Integers
+    event_time: Floats
+    event_kind: Integers
+    event_contact: Integers
+    event_impulse: Floats
+
+
+def allocate_record(robot: Robot, rows: int, events: int) -> Record:
+    """Allocate a record of `rows` instants and `events` events."""
+    nv, nu, nc = robot.nv, robot.nu, robot.nc
+    return Record(
+        row_count=np.zeros(1, dtype=np.int64),
+        time=np.zeros(rows),
+        q=np.zeros((rows, nv)),
+        v=np.zeros((rows, nv)),
+        torque=np.zeros((rows, nu)),
+        point=np.zeros((rows, nc, 2)),
+        normal=np.zeros((rows, nc, 2)),
+        gap=np.zeros((rows, nc)),
+        force=np.zeros((rows, nc, 2)),
+        slip=np.zeros((rows, nc)),
+        residual=np.zeros((rows, 3)),
+        event_count=np.zeros(1, dtype=np.int64),
+        event_time=np.zeros(events),
+        event_kind=np.zeros(events, dtype=np.int64),
+        event_contact=np.zeros(events, dtype=np.int64),
+        event_impulse=np.zeros((events, 2)),
+    )
+
+
+def joined(records: list[Record]) -> Record:
+    """Concatenate the used rows of consecutive records."""
+    rows = [int(part.row_count[0]) for part in records]
+    events = [int(part.event_count[0]) for part in records]
+
+    def join(name: str) -> Any:
+        used = events if name.startswith("event_") else rows
+        return np.concatenate(
+            [getattr(part, name)[:n] for part, n in zip(records, used, strict=True)]
+        )
+
+    counts = {
+        "row_count": np.array([sum(rows)]),
+        "event_count": np.array([sum(events)]),
+    }
+    return Record(
+        **{name: counts[name] if name in counts else join(name) for name in Record._fields}
+    )

@@ -1,0 +1,184 @@
+"""A robot as a dataset: its numbers and names, enough to be the same robot again."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from heelstrike.robot.model import Model
+from heelstrike.robot.robot import Foot, Mirror, Robot
+
+if TYPE_CHECKING:
+    import xarray
+
+# Field of Model -> dimensions. `pivot`, a number, is kept among the attributes.
+_MODEL = {
+    "parent": ("coordinate",),
+    "axis": ("coordinate", "motion"),
+    "offset": ("coordinate", "xz"),
+    "reference": ("coordinate",),
+    "mass": ("coordinate",),
+    "center_of_mass": ("coordinate", "xz"),
+    "inertia": ("coordinate",),
+    "armature": ("coordinate",),
+    "damping": ("coordinate",),
+    "stiffness": ("coordinate",),
+    "rest": ("coordinate",),
+    "lower": ("coordinate",),
+    "upper": ("coordinate",),
+    "gravity": ("xz",),
+    "contact_link": ("contact",),
+    "contact_position": ("contact", "xz"),
+    "contact_radius": ("contact",),
+    "actuator_joint": ("actuator",),
+    "torque_lower": ("actuator",),
+    "torque_upper": ("actuator",),
+}
+_INDICES = ("parent", "contact_link", "actuator_joint")
+_MAY_BE_INFINITE = ("lower", "upper", "torque_lower", "torque_upper")
+_NAMES = {
+    "joint_names": "coordinate",
+    "link_names": "coordinate",
+    "actuator_names": "actuator",
+    "contact_names": "contact",
+}
+_MIRROR = {"joint": "coordinate", "sign": "coordinate", "contact": "contact", "foot": "foot"}
+
+
+def robot_to_dataset(robot: Robot) -> xarray.Dataset:
+    """Return the numbers and names of a robot as a dataset."""
+    import xarray
+
+    variables: dict[str, Any] = {
+        name: (dims, getattr(robot.model, name)) for name, dims in _MODEL.items()
+    }
+    for name, dim in _NAMES.items():
+        variables[name] = ((dim,), np.array(getattr(robot, name), dtype=object))
+    variables["foot_name"] = (("foot",), np.array([f.name for f in robot.feet], dtype=object))
+    variables["foot_link"] = (("foot",), np.array([f.link for f in robot.feet], dtype=np.int64))
+    foot_of = np.full(robot.nc, -1)
+    for index, foot in enumerate(robot.feet):
+        foot_of[list(foot.contacts)] = index
+    variables["contact_foot"] = (("contact",), foot_of)
+    if robot.mirror is not None:
+        for name, dim in _MIRROR.items():
+            variables[f"mirror_{name}"] = ((dim,), getattr(robot.mirror, name))
+    # NetCDF has no lists of no text: names of nothing are left out.
+    variables = {
+        name: value
+        for name, value in variables.items()
+        if value[1].dtype.kind != "O" or len(value[1])
+    }
+    attributes = {
+        "name": robot.name,
+        "source": robot.source,
+        "floating": int(robot.floating),
+        "symmetric": int(robot.mirror is not None),
+        "pivot": int(robot.model.pivot),
+    }
+    return xarray.Dataset(variables, attrs=attributes)
+
+
+def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
+    """Build the robot that :func:`robot_to_dataset` described.
+
+    Raises
+    ------
+    ValueError, KeyError
+        If anything is missing, of the wrong shape, or points outside the robot.
+    """
+    sizes = {
+        "coordinate": dataset["parent"].size,
+        "contact": dataset["contact_link"].size,
+        "actuator": dataset["actuator_joint"].size,
+        "foot": dataset["foot_link"].size,
+        "motion": 3,
+        "xz": 2,
+    }
+
+    def numbers(name: str, dims: tuple[str, ...], kind: type) -> Any:
+        values = dataset[name].values
+        shape = tuple(sizes[dim] for dim in dims)
+        if values.shape != shape or values.dtype.kind not in "fiu":
+            raise ValueError(f"{name} is not an array of numbers of shape {shape}")
+        return np.ascontiguousarray(values, dtype=kind)
+
+    def text(name: str, dim: str) -> tuple[str, ...]:
+        if not sizes[dim]:
+            return ()
+        values = dataset[name].values
+        if values.shape != (sizes[dim],):
+            raise ValueError(f"{name} does not have {sizes[dim]} entries")
+        return tuple(_decoded(value) for value in values)
+
+    model = Model(
+        **{
+            name: numbers(name, dims, np.int64 if name in _INDICES else np.float64)
+            for name, dims in _MODEL.items()
+        },
+        pivot=int(dataset.attrs["pivot"]),
+    )
+    foot_link = numbers("foot_link", ("foot",), np.int64)
+    contact_foot = numbers("contact_foot", ("contact",), np.int64)
+    feet = tuple(
+        Foot(name, int(link), tuple(int(i) for i in np.flatnonzero(contact_foot == index)))
+        for index, (name, link) in enumerate(zip(text("foot_name", "foot"), foot_link, strict=True))
+    )
+    mirror = None
+    if int(dataset.attrs["symmetric"]):
+        mirror = Mirror(
+            **{
+                name: numbers(f"mirror_{name}", (dim,), np.float64 if name == "sign" else np.int64)
+                for name, dim in _MIRROR.items()
+            }
+        )
+    robot = Robot(
+        name=_decoded(dataset.attrs["name"]),
+        model=model,
+        **{name: text(name, dim) for name, dim in _NAMES.items()},
+        feet=feet,
+        mirror=mirror,
+        floating=bool(int(dataset.attrs["floating"])),
+        source=_decoded(dataset.attrs["source"]),
+    )
+    _check(robot)
+    return robot
+
+
+def _decoded(value: Any) -> str:
+    if isinstance(value, bytes):
+        return value.decode("utf-8")
+    if not isinstance(value, str):
+        raise ValueError(f"expected text, found {type(value).__name__}")
+    return value
+
+
+def _check(robot: Robot) -> None:
+    """Refuse numbers that would send the compiled kernels outside their arrays, or astray."""
+    model = robot.model
+    count = robot.nv
+    for name, values, low, high in (
+        ("parent", model.parent - np.arange(count), -count - 1, 0),
+        ("parent", model.parent, -1, count),
+        ("contact_link", model.contact_link, 0, count),
+        ("actuator_joint", model.actuator_joint, 0, count),
+        ("foot_link", np.array([foot.link for foot in robot.feet]), 0, count),
+        ("pivot", np.array([model.pivot]), 0, count),
+    ):
+        if np.any(values < low) or np.any(values >= high):
+            raise ValueError(f"{name} points outside the robot")
+    for name in _MODEL:
+        values = getattr(model, name)
+        bad = np.isnan(values) if name in _MAY_BE_INFINITE else ~np.isfinite(values)
+        if np.any(bad):
+            raise ValueError(f"{name} is not finite")
+    if any(not foot.contacts for foot in robot.feet):
+        raise ValueError("a foot has no contact points")
+    if not math.isfinite(robot.total_mass) or np.any(model.mass < 0.0):
+        raise ValueError("masses must be finite and not negative")
+    if robot.mirror is not None:
+        for name, size in (("joint", count), ("contact", robot.nc), ("foot", len(robot.feet))):
+            if sorted(getattr(robot.mirror, name)) != list(range(size)):
+                raise ValueError(f"mirror_{name} is not an exchange of left and right")

@@ -1,0 +1,214 @@
+"""What a simulation leaves behind, whatever its end."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.contact.ground import Ground
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.engine import Method
+from heelstrike.sim.status import EventKind, RunStatus
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.figure import Figure
+
+    from heelstrike.analysis.summary import Summary
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at a contact point.
+
+    Attributes
+    ----------
+    time : float
+        When, in seconds.
+    kind : EventKind
+        Touchdown, lift-off, beginning of slip or of stick.
+    contact : int
+        Index of the contact point.
+    impulse : tuple of float
+        Impulse (normal, tangent) on the robot over the step in which it happened, in N s.
+    """
+
+    time: float
+    kind: EventKind
+    contact: int
+    impulse: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Certificates:
+    """Worst values over every step of a run, recorded or not.
+
+    Attributes
+    ----------
+    penetration : float
+        Deepest penetration of a contact point, in metres.
+    complementarity, cone, non_penetration : float
+        Largest residuals of the contact problems, relative to the size of their data.
+    """
+
+    penetration: float
+    complementarity: float
+    cone: float
+    non_penetration: float
+
+
+@dataclass(frozen=True)
+class SolverCount:
+    """How the contact problems of a run were solved.
+
+    Attributes
+    ----------
+    name : str
+        Solver tried first.
+    solves, shortcuts, fallbacks, failures : int
+        Contact problems; those answered by the modes of the step before, verified; those that
+        needed another solver; those that none could certify.
+    """
+
+    name: str
+    solves: int
+    shortcuts: int
+    fallbacks: int
+    failures: int
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Seconds spent compiling (or loading compiled code) and simulating."""
+
+    compile_s: float
+    wall_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Record of a simulation.
+
+    A row holds everything about one instant: the state, the torques decided in it, and the
+    contact forces of the step that follows. Forces act on the robot.
+
+    Attributes
+    ----------
+    robot : Robot
+    ground : Ground
+    method : Method
+    status : RunStatus
+        How the run ended.
+    message : str
+        The same in a person's words.
+    time : (nt,) float
+        Seconds.
+    position : (nt, nq) float
+        Generalised positions (m, rad).
+    velocity : (nt, nv) float
+        Generalised velocities (m/s, rad/s).
+    torque : (nt, nu) float
+        Joint torques within their limits (N m).
+    contact_point : (nt, nc, 2) float
+        World position (x, z) of the contact points (m).
+    contact_normal : (nt, nc, 2) float
+        Ground normal (x, z) under the contact points; the tangent is (normal z, −normal x).
+    gap : (nt, nc) float
+        Distance of the contact points to the ground (m).
+    contact_force : (nt, nc, 2) float
+        Force (normal, tangent) on the robot at each contact point (N): the mean over the step, so
+        that an impact shows as a large force over one step.
+    slip_velocity : (nt, nc) float
+        Tangential velocity (m/s) at the end of the step of the points in the contact problem;
+        zero for the others.
+    residual : (nt, 3) float
+        Relative residuals of the contact problem: complementarity, cone, non-penetration.
+    events : tuple of Event
+    certificates : Certificates
+    solver : SolverCount
+    steps : int
+        Steps taken.
+    saturations : int
+        Times a torque was clipped to its limit.
+    timing : Timing
+    error : Exception or None
+        What the controller raised, if that ended the run.
+    """
+
+    robot: Robot
+    ground: Ground
+    method: Method
+    status: RunStatus
+    message: str
+    time: Floats
+    position: Floats
+    velocity: Floats
+    torque: Floats
+    contact_point: Floats
+    contact_normal: Floats
+    gap: Floats
+    contact_force: Floats
+    slip_velocity: Floats
+    residual: Floats
+    events: tuple[Event, ...]
+    certificates: Certificates
+    solver: SolverCount
+    steps: int
+    saturations: int
+    timing: Timing
+    error: Exception | None = field(default=None, repr=False)
+
+    @property
+    def completed(self) -> bool:
+        """Whether the run lasted as long as it was asked to."""
+        return self.status is RunStatus.COMPLETED
+
+    @property
+    def final_state(self) -> State:
+        """State of the last row."""
+        return State(self.position[-1], self.velocity[-1])
+
+    @property
+    def world_force(self) -> Floats:
+        """Force (x, z) on the robot at each contact point in world axes, (nt, nc, 2), in N."""
+        normal, tangent = self.contact_force[..., 0], self.contact_force[..., 1]
+        nx, nz = self.contact_normal[..., 0], self.contact_normal[..., 1]
+        return np.stack((normal * nx + tangent * nz, normal * nz - tangent * nx), axis=-1)
+
+    def summary(self, **options: Any) -> Summary:
+        """Summarise the run; see :func:`heelstrike.analysis.summary.summarize`."""
+        from heelstrike.analysis.summary import summarize
+
+        return summarize(self, **options)
+
+    def plot(self, what: str, **options: Any) -> Figure:
+        """Draw a figure of the run; see :func:`heelstrike.view.figures.plot`."""
+        from heelstrike.view.figures import plot
+
+        return plot(self, what, **options)
+
+    def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`."""
+        from heelstrike.view.animation import animate
+
+        return animate(self, path, **options)
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Return the run as a labelled dataset with units."""
+        from heelstrike.sim.dataset import to_dataset
+
+        return to_dataset(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`."""
+        from heelstrike.sim.dataset import save
+
+        return save(self, path)

@@ -1,0 +1,347 @@
+"""simulate(): from a robot, a controller and a state to a run."""
+
+from __future__ import annotations
+
+import time as clock_time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
+from heelstrike.dynamics.queries import center_of_mass
+from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.contact_geometry import observe
+from heelstrike.sim.controller import CompiledController, Controller, hold_torque
+from heelstrike.sim.engine import (
+    DIVERGED,
+    DONE,
+    FELL,
+    PAUSED,
+    RECORD_FULL,
+    SOLVER_FAILED,
+    Engine,
+    Method,
+    Setting,
+)
+from heelstrike.sim.memory import (
+    BAD_TORQUE,
+    COMPLEMENTARITY,
+    CONE,
+    NON_PENETRATION,
+    PENETRATION,
+    SATURATIONS,
+    STEPS,
+    Memory,
+    Record,
+    allocate_memory,
+    allocate_record,
+    joined,
+)
+from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
+from heelstrike.sim.status import EventKind, RunStatus
+from heelstrike.sim.time_stepping import TimeStepping
+
+# Rows of one chunk of the record, and steps between two looks at Ctrl-C and the progress bar.
+CHUNK = 4096
+
+# A walking robot has fallen when its centre of mass is below this fraction of its first height.
+FALL_FRACTION = 0.5
+
+
+def simulate(
+    robot: Robot,
+    controller: Controller | CompiledController | None = None,
+    *,
+    state: State,
+    duration: float,
+    method: Method | None = None,
+    ground: Ground | None = None,
+    control_period: float | None = None,
+    record_every: int = 1,
+    stop_when_fallen: bool | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Simulate a robot on the ground under a controller.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    controller : object with ``torque(t, state, contacts)``, or None
+        Decides the joint torques (nu,) in N m. Stock controllers run compiled; None applies no
+        torque.
+    state : State
+        Where the robot starts.
+    duration : float
+        Time to simulate in seconds; time stepping rounds it to a whole number of steps.
+    method : Method
+        Way through time; ``TimeStepping()`` by default.
+    ground : Ground
+        The ground; flat with μ = 0.75 and no restitution by default.
+    control_period : float, optional
+        Time between two calls of the controller, a whole number of steps; every step by default.
+        Torques are held in between.
+    record_every : int
+        Steps between two rows of the record.
+    stop_when_fallen : bool, optional
+        End the run when the centre of mass drops below half its first height. By default true for
+        floating robots with feet.
+    progress : callable, optional
+        Called now and then with the simulated time.
+
+    Returns
+    -------
+    Run
+        Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``.
+
+    Raises
+    ------
+    SimulationError, ControllerError
+        If the arguments are not usable; raised before anything is simulated, except for a torque
+        of the wrong shape, which ends the run with status ``controller_failed``.
+    """
+    method = TimeStepping() if method is None else method
+    ground = Ground() if ground is None else ground
+    if not isinstance(method, Method):
+        raise SimulationError(
+            f"method must be a way through time such as TimeStepping(), got {type(method).__name__}"
+        )
+    if not isinstance(ground, Ground):
+        raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
+    _check_state(robot, state)
+    if not (np.isfinite(duration) and duration >= 0.0):
+        raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
+    if control_period is not None and not 0.0 < control_period < np.inf:
+        raise SimulationError(f"control_period must be a positive number, got {control_period}")
+    if record_every < 1:
+        raise SimulationError(f"record_every must be at least 1, got {record_every}")
+    if stop_when_fallen is None:
+        stop_when_fallen = robot.floating and bool(robot.feet)
+    height = float(center_of_mass(robot, state.q)[1]) - float(ground.height(state.q[0]))
+    loop = _Loop(
+        robot=robot,
+        ground=ground,
+        method=method,
+        state=state,
+        duration=duration,
+        control_period=control_period,
+        record_every=record_every,
+        fallen_height=FALL_FRACTION * height if stop_when_fallen else -np.inf,
+        progress=progress,
+    )
+    return loop.run(controller)
+
+
+def _check_state(robot: Robot, state: State) -> None:
+    for name, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
+        if vector.shape != (size,):
+            raise SimulationError(
+                f"state.{name} must have {size} entries for robot {robot.name!r}, "
+                f"got shape {vector.shape}"
+            )
+        if not np.all(np.isfinite(vector)):
+            joint = robot.joint_names[int(np.flatnonzero(~np.isfinite(vector))[0])]
+            raise SimulationError(f"state.{name} of joint {joint!r} is not finite")
+
+
+@dataclass
+class _Loop:
+    """One simulation in progress."""
+
+    robot: Robot
+    ground: Ground
+    method: Method
+    state: State
+    duration: float
+    control_period: float | None
+    record_every: int
+    fallen_height: float
+    progress: Callable[[float], None] | None
+
+    def run(self, controller: Controller | CompiledController | None) -> Run:
+        self.memory: Memory = allocate_memory(self.robot)
+        self.memory.q[:] = self.state.q
+        self.memory.v[:] = self.state.v
+        self.memory.stiffness[:] = self.robot.model.stiffness
+        self.memory.damping[:] = self.robot.model.damping
+        self.ground_model = self.ground.model()
+        self.engine: Engine = self.method.engine(
+            Setting(
+                robot=self.robot,
+                ground=self.ground_model,
+                memory=self.memory,
+                duration=self.duration,
+                control_period=self.control_period,
+                record_every=self.record_every,
+                fallen_height=self.fallen_height,
+            )
+        )
+        self.records: list[Record] = []
+        self._new_record()
+        begin = clock_time.perf_counter()
+        self.error: Exception | None = None
+        try:
+            status, message = self._walk(controller)
+        except KeyboardInterrupt:
+            status = RunStatus.INTERRUPTED
+            message = f"interrupted at t = {self.engine.time:.6g} s"
+        wall_s = clock_time.perf_counter() - begin
+        return self._result(status, message, Timing(self.engine.compile_s, wall_s))
+
+    def _new_record(self) -> None:
+        rows = min(CHUNK, self.engine.rows_left + 2)
+        self.records.append(allocate_record(self.robot, rows, max(256, 8 * self.robot.nc)))
+
+    def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
+        if controller is None:
+            zero = np.zeros(self.robot.nu)
+            return self._run_compiled(CompiledController(hold_torque, zero, np.zeros(0)))
+        compiled = controller
+        if not isinstance(controller, CompiledController):
+            make = getattr(controller, "compiled", None)
+            compiled = make() if callable(make) else controller
+        if isinstance(compiled, CompiledController):
+            return self._run_compiled(compiled)
+        if not callable(getattr(controller, "torque", None)):
+            raise ControllerError(
+                f"a controller needs a method torque(t, state, contacts), "
+                f"{type(controller).__name__} has none"
+            )
+        return self._run_python(controller)  # type: ignore[arg-type]
+
+    def _run_compiled(self, controller: CompiledController) -> tuple[RunStatus, str]:
+        parameters = np.ascontiguousarray(controller.parameters, dtype=np.float64)
+        controller_memory = np.array(controller.memory, dtype=np.float64)
+        driven = self.robot.model.actuator_joint
+        if controller.stiffness is not None:
+            self.memory.stiffness[driven] += controller.stiffness
+        if controller.damping is not None:
+            self.memory.damping[driven] += controller.damping
+        while True:
+            code = self._run(CHUNK, controller.kernel, parameters, controller_memory)
+            if self.progress is not None:
+                self.progress(self.engine.time)
+            if code != PAUSED:
+                return self._ending(code)
+
+    def _run(
+        self,
+        steps: int | None,
+        kernel: Callable[..., None],
+        parameters: NDArray[np.float64],
+        controller_memory: NDArray[np.float64],
+    ) -> int:
+        """Advance by a number of steps, or by one control period; return how it came back."""
+        self.engine.pause_after(steps)
+        while True:
+            code = self.engine.advance(kernel, parameters, controller_memory, self.records[-1])
+            if code != RECORD_FULL:
+                return code
+            self._new_record()
+
+    def _run_python(self, controller: Controller) -> tuple[RunStatus, str]:
+        empty = np.zeros(0)
+        calls = 0
+        while True:
+            observe(self.robot.model, self.ground_model, self.memory)
+            try:
+                torque = np.asarray(
+                    controller.torque(
+                        self.engine.time, State(self.memory.q, self.memory.v), self.memory.contacts
+                    ),
+                    dtype=np.float64,
+                )
+            except Exception as error:
+                self.error = error
+                return RunStatus.CONTROLLER_FAILED, (
+                    f"{type(controller).__name__}.torque raised {type(error).__name__} at "
+                    f"t = {self.engine.time:.6g} s: {error} (the exception is in run.error)"
+                )
+            if torque.shape != (self.robot.nu,):
+                return RunStatus.CONTROLLER_FAILED, (
+                    f"{type(controller).__name__}.torque returned shape {torque.shape} at "
+                    f"t = {self.engine.time:.6g} s; robot {self.robot.name!r} needs "
+                    f"({self.robot.nu},): "
+                    f"{', '.join(self.robot.actuator_names)}"
+                )
+            code = self._run(None, hold_torque, np.ascontiguousarray(torque), empty)
+            calls += 1
+            if self.progress is not None and calls % 256 == 0:
+                self.progress(self.engine.time)
+            if code != PAUSED:
+                return self._ending(code)
+
+    def _ending(self, code: int) -> tuple[RunStatus, str]:
+        now = f"t = {self.engine.time:.6g} s"
+        if code == DONE:
+            return RunStatus.COMPLETED, f"completed at {now}"
+        if code == FELL:
+            return RunStatus.FELL, (
+                f"the robot fell at {now}: its centre of mass is below half its first height"
+            )
+        if code == DIVERGED:
+            return RunStatus.DIVERGED, (
+                f"the state stopped being finite at {now}; try a smaller step or softer gains"
+            )
+        if code == SOLVER_FAILED:
+            return RunStatus.SOLVER_FAILED, (
+                f"no contact solver could certify a solution at {now}; residuals "
+                f"{self.memory.residual.tolist()}"
+            )
+        actuator = self.robot.actuator_names[int(self.memory.tally[BAD_TORQUE])]
+        return RunStatus.CONTROLLER_FAILED, (
+            f"the controller asked for a torque that is not finite at {now}, actuator {actuator!r}"
+        )
+
+    def _result(self, status: RunStatus, message: str, timing: Timing) -> Run:
+        rows = joined(self.records)
+        counters = self.memory.solver.counters
+        extreme = self.memory.extreme
+        return Run(
+            robot=self.robot,
+            ground=self.ground,
+            method=self.method,
+            status=status,
+            message=message,
+            time=rows.time,
+            position=rows.q,
+            velocity=rows.v,
+            torque=rows.torque,
+            contact_point=rows.point,
+            contact_normal=rows.normal,
+            gap=rows.gap,
+            contact_force=rows.force,
+            slip_velocity=rows.slip,
+            residual=rows.residual,
+            events=tuple(
+                Event(
+                    time=float(rows.event_time[i]),
+                    kind=EventKind(int(rows.event_kind[i])),
+                    contact=int(rows.event_contact[i]),
+                    impulse=(float(rows.event_impulse[i, 0]), float(rows.event_impulse[i, 1])),
+                )
+                for i in range(len(rows.event_time))
+            ),
+            certificates=Certificates(
+                penetration=float(extreme[PENETRATION]),
+                complementarity=float(extreme[COMPLEMENTARITY]),
+                cone=float(extreme[CONE]),
+                non_penetration=float(extreme[NON_PENETRATION]),
+            ),
+            solver=SolverCount(
+                name=self.engine.solver,
+                solves=int(counters[SOLVES]),
+                shortcuts=int(counters[SHORTCUTS]),
+                fallbacks=int(counters[FALLBACKS]),
+                failures=int(counters[FAILURES]),
+            ),
+            steps=int(self.memory.tally[STEPS]),
+            saturations=int(self.memory.tally[SATURATIONS]),
+            timing=timing,
+            error=self.error,
+        )

@@ -1,0 +1,53 @@
+"""The closed sets of a simulation: how it ends, what can happen, how time is stepped."""
+
+from __future__ import annotations
+
+import enum
+
+
+class RunStatus(enum.Enum):
+    """How a run ended."""
+
+    COMPLETED = "completed"
+    FELL = "fell"
+    DIVERGED = "diverged"
+    INTERRUPTED = "interrupted"
+    SOLVER_FAILED = "solver_failed"
+    CONTROLLER_FAILED = "controller_failed"
+
+
+class EventKind(enum.IntEnum):
+    """What happened at a contact point."""
+
+    TOUCHDOWN = 0
+    LIFTOFF = 1
+    SLIP = 2
+    STICK = 3
+
+
+class Scheme(enum.IntEnum):
+    """How :class:`~heelstrike.sim.time_stepping.TimeStepping` discretises time.
+
+    ``GAP_LINEARISED``
+        Semi-implicit Euler; the gap at the end of the step, linearised, may not be negative
+        (Stewart and Trinkle 1996; Anitescu and Potra 1997).
+    ``PAPER_EXPLICIT``
+        The paper's eq. 23-26 as printed: positions move with the old velocity, forces are those
+        at the old position, vertices are active when their gap is not positive.
+    ``PAPER_SYMPLECTIC``
+        The paper's text below eq. 23: positions move with the old velocity, then the new velocity
+        is computed at the new position, where the vertices whose gap is not positive are active.
+    ``MOREAU_JEAN``
+        Moreau's scheme with Newton's restitution: points whose gap is foreseen to close within
+        half a step get ``v_n⁺ + e v_n ≥ 0``; positions move with the mean velocity (Moreau 1988;
+        Jean 1999, with Siconos' θ = γ = 1/2).
+    ``LINEARLY_IMPLICIT``
+        ``GAP_LINEARISED`` with joint springs, dampers and controller gains at the end of the step,
+        to first order (Anitescu and Potra 2002, the paper's [17]).
+    """
+
+    GAP_LINEARISED = 0
+    PAPER_EXPLICIT = 1
+    PAPER_SYMPLECTIC = 2
+    MOREAU_JEAN = 3
+    LINEARLY_IMPLICIT = 4

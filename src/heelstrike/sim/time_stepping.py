@@ -1,0 +1,535 @@
+"""Time stepping: contact impulses decide the velocity at the end of each step (paper section 3).
+
+One step of length h from (q, v), with λ the contact impulses of the step::
+
+    v_free = v + h A⁻¹ (B Γ + passive − H)          motion without contact
+    w      = G λ + b,   G = J A⁻¹ Jᵀ                contact velocities at the end of the step
+    v⁺     = v_free + A⁻¹ Jᵀ λ
+
+The gap-linearised scheme asks ``gap + h J_n v⁺ ≥ 0``, that is b_n = J_n v_free + gap / h, for
+every contact point that could close within the step, and moves on with the new velocity. The
+paper's own ordering (eq. 23-26) asks ``J_n v⁺ ≥ 0`` of the points whose gap is not positive; as
+printed it moves the positions with the old velocity. Its text has the old velocity move the
+positions first and the new velocity computed there, which is the same sequence of states as moving
+them with the new velocity at the end of each step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from heelstrike.compilation import compiled_for, inner_kernel, type_of
+from heelstrike.contact.ground import Ground, GroundModel
+from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.dynamics.kernels import (
+    bias_force,
+    factorize,
+    mass_matrix,
+    passive_force,
+    solve_factorized,
+)
+from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.contact_geometry import (
+    assemble_delassus,
+    contact_rows,
+    observe,
+    row_product,
+)
+from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
+from heelstrike.sim.engine import (
+    BAD_CONTROLLER,
+    DIVERGED,
+    DONE,
+    FELL,
+    PAUSED,
+    RECORD_FULL,
+    SOLVER_FAILED,
+    Engine,
+    Setting,
+    solver_order,
+    whole_steps,
+)
+from heelstrike.sim.memory import (
+    BAD_TORQUE,
+    COMPLEMENTARITY,
+    CONE,
+    NON_PENETRATION,
+    PENETRATION,
+    SATURATIONS,
+    STEPS,
+    Memory,
+    Record,
+    allocate_memory,
+    allocate_record,
+)
+from heelstrike.sim.status import EventKind, Scheme
+
+GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
+PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
+PAPER_SYMPLECTIC = int(Scheme.PAPER_SYMPLECTIC)
+MOREAU_JEAN = int(Scheme.MOREAU_JEAN)
+LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
+TOUCHDOWN = int(EventKind.TOUCHDOWN)
+LIFTOFF = int(EventKind.LIFTOFF)
+SLIP = int(EventKind.SLIP)
+STICK = int(EventKind.STICK)
+
+# A contact point enters the problem when it could close within a step at this speed (m/s) or at
+# twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
+# costs time but never changes the answer.
+CLOSING_SPEED = 5.0
+FAR_STEPS = 20.0
+# A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
+LIFTOFF_GAP = 1e-7
+SLIP_SPEED = 1e-6
+INFINITY = float("inf")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeStepping:
+    """Fixed steps whose contact impulses decide the velocity at the end of the step.
+
+    Parameters
+    ----------
+    step : float
+        Length of the step h in seconds.
+    scheme : Scheme
+        Discretisation; see :class:`~heelstrike.sim.status.Scheme`.
+    solver : str
+        Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``;
+        the others follow as fallbacks, each use counted in the run.
+
+    Raises
+    ------
+    SimulationError
+        If the step is not a positive finite number.
+
+    Notes
+    -----
+    First order in the step, whatever the scheme.
+    """
+
+    step: float = 1e-3
+    scheme: Scheme = Scheme.GAP_LINEARISED
+    solver: str = "lemke"
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.step < float("inf"):
+            raise SimulationError(f"the time step must be a positive number, got {self.step}")
+        try:
+            object.__setattr__(self, "scheme", Scheme(self.scheme))
+        except ValueError:
+            names = ", ".join(str(scheme) for scheme in Scheme)
+            raise SimulationError(
+                f"unknown scheme {self.scheme!r}; choose one of {names}"
+            ) from None
+        solver_order(self.solver)
+
+    def engine(self, setting: Setting) -> Engine:
+        """Return this way through time, compiled and ready to run.
+
+        Raises
+        ------
+        SimulationError
+            If the ground has restitution and the scheme knows plastic impacts only.
+        """
+        return _TimeSteppingEngine(self, setting)
+
+
+@inner_kernel
+def limit_torque(model: Model, memory: Memory) -> bool:
+    """Clip the torques to their limits; return whether all were finite."""
+    for i in range(model.actuator_joint.shape[0]):
+        wanted = memory.torque[i]
+        if not abs(wanted) < INFINITY:
+            memory.tally[BAD_TORQUE] = i
+            return False
+        if wanted > model.torque_upper[i]:
+            memory.torque[i] = model.torque_upper[i]
+            memory.tally[SATURATIONS] += 1
+        elif wanted < model.torque_lower[i]:
+            memory.torque[i] = model.torque_lower[i]
+            memory.tally[SATURATIONS] += 1
+    return True
+
+
+@inner_kernel
+def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
+    """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
+
+    The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
+    order that adds h D + h² K to the mass matrix and −h K v to the force; both leave the tree's
+    sparsity alone, since K and D are diagonal.
+    """
+    mass_matrix(model, memory.tree, memory.mass_matrix)
+    if scheme == LINEARLY_IMPLICIT:
+        for i in range(model.parent.shape[0]):
+            memory.mass_matrix[i, i] += step * (memory.damping[i] + step * memory.stiffness[i])
+    factorize(model, memory.mass_matrix, memory.factor)
+    bias_force(model, memory.tree, memory.rate)
+    passive_force(model, memory.q, memory.v, memory.force)
+    for i in range(model.actuator_joint.shape[0]):
+        memory.force[model.actuator_joint[i]] += memory.torque[i]
+    nv = model.parent.shape[0]
+    if scheme == LINEARLY_IMPLICIT:
+        for i in range(nv):
+            memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
+    for i in range(nv):
+        memory.rate[i] = step * (memory.force[i] - memory.rate[i])
+    solve_factorized(model, memory.factor, memory.rate)
+    for i in range(nv):
+        memory.next_v[i] = memory.v[i] + memory.rate[i]
+
+
+@inner_kernel
+def select_candidates(model: Model, step: float, scheme: int, memory: Memory) -> int:
+    """Write Jacobian rows and free terms of the contact points that could act in this step."""
+    count = 0
+    linearised = scheme == GAP_LINEARISED or scheme == LINEARLY_IMPLICIT
+    for contact in range(model.contact_link.shape[0]):
+        gap = memory.contacts.gap[contact]
+        if gap > FAR_STEPS * CLOSING_SPEED * step or (
+            gap > 0.0 and (scheme == PAPER_EXPLICIT or scheme == PAPER_SYMPLECTIC)
+        ):
+            continue
+        contact_rows(model, memory, contact, count)
+        normal = row_product(memory, 2 * count, memory.next_v)
+        if linearised:
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+                continue
+            normal += gap / step
+        elif scheme == MOREAU_JEAN:
+            before = row_product(memory, 2 * count, memory.v)
+            if gap + 0.5 * step * before > 0.0:
+                continue
+            normal += memory.restitution[contact] * before
+        memory.free[2 * count] = normal
+        memory.free[2 * count + 1] = row_product(memory, 2 * count + 1, memory.next_v)
+        memory.problem_friction[count] = memory.friction[contact]
+        memory.problem_mode[count] = memory.mode[contact]
+        memory.candidate[count] = contact
+        count += 1
+    return count
+
+
+@inner_kernel
+def solve_contacts(model: Model, step: float, scheme: int, order: Integers, memory: Memory) -> bool:
+    """Turn the free velocity into the velocity at the end of the step; return success."""
+    count = select_candidates(model, step, scheme, memory)
+    nv = model.parent.shape[0]
+    contacts = memory.contacts
+    for contact in range(model.contact_link.shape[0]):
+        contacts.force[contact, 0] = 0.0
+        contacts.force[contact, 1] = 0.0
+        memory.slip[contact] = 0.0
+        memory.mode[contact] = 0
+    for i in range(3):
+        memory.residual[i] = 0.0
+    if count == 0:
+        return True
+    assemble_delassus(model, memory, count)
+    status = solve_contact_kernel(
+        count,
+        memory.delassus,
+        memory.free,
+        memory.problem_friction,
+        order,
+        memory.problem_mode,
+        memory.impulse,
+        memory.velocity,
+        memory.residual,
+        memory.solver,
+    )
+    for j in range(nv):
+        total = 0.0
+        for row in range(2 * count):
+            total += memory.jacobian[row, j] * memory.impulse[row]
+        memory.rate[j] = total
+    solve_factorized(model, memory.factor, memory.rate)
+    for j in range(nv):
+        memory.next_v[j] += memory.rate[j]
+    for place in range(count):
+        contact = memory.candidate[place]
+        contacts.force[contact, 0] = memory.impulse[2 * place] / step
+        contacts.force[contact, 1] = memory.impulse[2 * place + 1] / step
+        memory.slip[contact] = memory.velocity[2 * place + 1]
+        memory.mode[contact] = memory.problem_mode[place]
+    return status == SOLVED
+
+
+@inner_kernel
+def note_extremes(model: Model, memory: Memory) -> None:
+    """Keep the worst penetration and residuals of the run."""
+    extreme = memory.extreme
+    for contact in range(model.contact_link.shape[0]):
+        extreme[PENETRATION] = max(extreme[PENETRATION], -memory.contacts.gap[contact])
+    extreme[COMPLEMENTARITY] = max(extreme[COMPLEMENTARITY], memory.residual[0])
+    extreme[CONE] = max(extreme[CONE], memory.residual[1])
+    extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], memory.residual[2])
+
+
+@inner_kernel
+def note_event(record: Record, time: float, kind: int, contact: int, memory: Memory) -> None:
+    """Append an event; its impulse is that of the step it happened in."""
+    place = record.event_count[0]
+    record.event_time[place] = time
+    record.event_kind[place] = kind
+    record.event_contact[place] = contact
+    record.event_impulse[place, 0] = memory.contacts.force[contact, 0]
+    record.event_impulse[place, 1] = memory.contacts.force[contact, 1]
+    record.event_count[0] = place + 1
+
+
+@inner_kernel
+def note_events(model: Model, record: Record, time: float, step: float, memory: Memory) -> None:
+    """Find touchdowns, lift-offs and changes between stick and slip of this step.
+
+    An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
+    """
+    for contact in range(model.contact_link.shape[0]):
+        pushed = memory.contacts.force[contact, 0] > 0.0
+        first = record.event_count[0]
+        if memory.closed[contact] == 0 and pushed:
+            memory.closed[contact] = 1
+            memory.slipping[contact] = 0
+            note_event(record, time + step, TOUCHDOWN, contact, memory)
+        elif (
+            memory.closed[contact] == 1
+            and not pushed
+            and memory.contacts.gap[contact] > LIFTOFF_GAP
+        ):
+            memory.closed[contact] = 0
+            memory.slipping[contact] = 0
+            note_event(record, time, LIFTOFF, contact, memory)
+        if memory.closed[contact] == 1 and pushed:
+            slips = abs(memory.slip[contact]) > SLIP_SPEED
+            if slips and memory.slipping[contact] == 0:
+                memory.slipping[contact] = 1
+                note_event(record, time, SLIP, contact, memory)
+            elif not slips and memory.slipping[contact] == 1:
+                memory.slipping[contact] = 0
+                note_event(record, time, STICK, contact, memory)
+        for place in range(first, record.event_count[0]):
+            record.event_impulse[place, 0] *= step
+            record.event_impulse[place, 1] *= step
+
+
+@inner_kernel
+def note_row(record: Record, time: float, memory: Memory) -> None:
+    """Append the state now and what acts on it to the record."""
+    row = record.row_count[0]
+    record.time[row] = time
+    for i in range(memory.v.shape[0]):
+        record.q[row, i] = memory.q[i]
+        record.v[row, i] = memory.v[i]
+    for i in range(memory.torque.shape[0]):
+        record.torque[row, i] = memory.torque[i]
+    contacts = memory.contacts
+    for i in range(memory.slip.shape[0]):
+        for k in range(2):
+            record.point[row, i, k] = contacts.position[i, k]
+            record.normal[row, i, k] = contacts.normal[i, k]
+            record.force[row, i, k] = contacts.force[i, k]
+        record.gap[row, i] = contacts.gap[i]
+        record.slip[row, i] = memory.slip[i]
+    for k in range(3):
+        record.residual[row, k] = memory.residual[k]
+    record.row_count[0] = row + 1
+
+
+@inner_kernel
+def center_height(model: Model, memory: Memory) -> float:
+    """World height of the centre of mass."""
+    mass = 0.0
+    moment = 0.0
+    for i in range(model.parent.shape[0]):
+        mass += memory.tree.inertia[i, 0]
+        moment += memory.tree.inertia[i, 2]
+    return memory.tree.pivot[1] + moment / mass
+
+
+@inner_kernel
+def sound(memory: Memory) -> bool:
+    """Whether the state is finite and not absurd."""
+    for i in range(memory.v.shape[0]):
+        if not (abs(memory.q[i]) < 1e9 and abs(memory.v[i]) < 1e6):
+            return False
+    return True
+
+
+def _advance(
+    controller: Any,
+    model: Model,
+    ground: GroundModel,
+    parameters: Floats,
+    controller_memory: Floats,
+    memory: Memory,
+    record: Record,
+    clock: Floats,
+    span: Integers,
+    order: Integers,
+) -> int:
+    """Advance a simulation by time stepping until its span ends or something stops it.
+
+    Parameters
+    ----------
+    clock : (3,) float
+        Time of step 0, step length, and height of the centre of mass below which it fell.
+    span : (6,) int
+        Step now, last step, step to pause before, steps between controller calls, steps between
+        rows, scheme. At the last step everything is decided and recorded, but time does not move
+        on.
+    """
+    start = clock[0]
+    step = clock[1]
+    fallen = clock[2]
+    last = span[1]
+    control_every = span[3]
+    record_every = span[4]
+    scheme = span[5]
+    nv = model.parent.shape[0]
+    while True:
+        if (
+            record.row_count[0] >= record.time.shape[0]
+            or record.event_count[0] + 2 * model.contact_link.shape[0] > record.event_time.shape[0]
+        ):
+            return RECORD_FULL
+        k = span[0]
+        if k == span[2]:
+            return PAUSED
+        time = start + k * step
+        if not sound(memory):
+            return DIVERGED
+        observe(model, ground, memory)
+        if k % control_every == 0:
+            controller(
+                time,
+                memory.q,
+                memory.v,
+                memory.contacts,
+                model,
+                memory.tree,
+                memory.scratch,
+                parameters,
+                controller_memory,
+                memory.torque,
+            )
+            if not limit_torque(model, memory):
+                return BAD_CONTROLLER
+        free_velocity(model, step, scheme, memory)
+        solved = solve_contacts(model, step, scheme, order, memory)
+        note_extremes(model, memory)
+        note_events(model, record, time, step, memory)
+        if k % record_every == 0 or k == last:
+            note_row(record, time, memory)
+        if not solved:
+            return SOLVER_FAILED
+        if center_height(model, memory) < fallen:
+            return FELL
+        if k == last:
+            return DONE
+        memory.tally[STEPS] += 1
+        for i in range(nv):
+            if scheme == PAPER_EXPLICIT:
+                memory.q[i] += step * memory.v[i]
+            elif scheme == MOREAU_JEAN:
+                memory.q[i] += 0.5 * step * (memory.v[i] + memory.next_v[i])
+            else:
+                memory.q[i] += step * memory.next_v[i]
+            memory.v[i] = memory.next_v[i]
+        span[0] = k + 1
+
+
+@lru_cache(maxsize=1)
+def compiled_advance() -> tuple[Any, float]:
+    """Compile the loop or load it from the cache; return it with the seconds that took."""
+    begin = perf_counter()
+    robot = Robot("", example_model(), (), (), (), (), (), None, False)
+    vector = types.float64[::1]
+    integers = types.int64[::1]
+    signature = types.int64(
+        CONTROLLER_TYPE,
+        MODEL_TYPE,
+        type_of(Ground().model()),
+        vector,
+        vector,
+        type_of(allocate_memory(robot)),
+        type_of(allocate_record(robot, 1, 1)),
+        vector,
+        integers,
+        integers,
+    )
+    compiled = compiled_for(signature, _advance)
+    return compiled, perf_counter() - begin
+
+
+class _TimeSteppingEngine:
+    """Time stepping of one simulation."""
+
+    def __init__(self, method: TimeStepping, setting: Setting) -> None:
+        self._advance, self.compile_s = compiled_advance()
+        if method.scheme is not Scheme.MOREAU_JEAN and np.any(setting.ground.restitution > 0.0):
+            raise SimulationError(
+                f"{method.scheme.name} knows plastic impacts only, and this ground has restitution; "
+                f"use Scheme.MOREAU_JEAN"
+            )
+        self._setting = setting
+        self.solver = method.solver
+        self._order = solver_order(method.solver)
+        self._control_every = 1
+        if setting.control_period is not None:
+            self._control_every = whole_steps("control_period", setting.control_period, method.step)
+        self._clock = np.array([0.0, method.step, setting.fallen_height])
+        self._span = np.array(
+            [
+                0,
+                round(setting.duration / method.step),
+                0,
+                self._control_every,
+                setting.record_every,
+                int(method.scheme),
+            ]
+        )
+
+    @property
+    def time(self) -> float:
+        return float(self._clock[0] + self._span[0] * self._clock[1])
+
+    @property
+    def rows_left(self) -> int:
+        return int(self._span[1] - self._span[0]) // self._setting.record_every + 1
+
+    def pause_after(self, steps: int | None) -> None:
+        self._span[2] = self._span[0] + (self._control_every if steps is None else steps)
+
+    def advance(
+        self,
+        controller: Any,
+        parameters: Floats,
+        controller_memory: Floats,
+        record: Record,
+    ) -> int:
+        setting = self._setting
+        return int(
+            self._advance(
+                controller,
+                setting.robot.model,
+                setting.ground,
+                parameters,
+                controller_memory,
+                setting.memory,
+                record,
+                self._clock,
+                self._span,
+                self._order,
+            )
+        )
