@@ -54,6 +54,26 @@ class Mirror:
     contact: NDArray[np.int64]
     foot: NDArray[np.int64]
 
+    def position(
+        self, q: NDArray[np.float64], reference: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return positions with left and right exchanged.
+
+        Parameters
+        ----------
+        q : (..., nq) float
+            Positions.
+        reference : (nq,) float
+            The robot's `Model.reference`.
+        """
+        mirrored: NDArray[np.float64] = self.sign * (q - reference)[..., self.joint] + reference
+        return mirrored
+
+    def velocity(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return velocities or accelerations, of shape (..., nv), left and right exchanged."""
+        mirrored: NDArray[np.float64] = self.sign * v[..., self.joint]
+        return mirrored
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:

@@ -325,7 +325,7 @@ class _Loop:
                     contact=int(rows.event_contact[i]),
                     impulse=(float(rows.event_impulse[i, 0]), float(rows.event_impulse[i, 1])),
                 )
-                for i in range(len(rows.event_time))
+                for i in np.argsort(rows.event_time, kind="stable")
             ),
             certificates=Certificates(
                 penetration=float(extreme[PENETRATION]),

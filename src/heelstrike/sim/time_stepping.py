@@ -107,11 +107,16 @@ class TimeStepping:
     solver : str
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``;
         the others follow as fallbacks, each use counted in the run.
+    activation : float
+        Gap in metres up to which a contact point takes part, for the schemes that decide by the
+        gap alone (the paper's two and Moreau-Jean). With the literal zero, a foot at rest loses
+        and regains the ground through round-off.
 
     Raises
     ------
     SimulationError
-        If the step is not a positive finite number.
+        If the step is not a positive finite number, the activation is negative, or scheme or
+        solver are unknown.
 
     Notes
     -----
@@ -121,10 +126,13 @@ class TimeStepping:
     step: float = 1e-3
     scheme: Scheme = Scheme.GAP_LINEARISED
     solver: str = "lemke"
+    activation: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.step < float("inf"):
             raise SimulationError(f"the time step must be a positive number, got {self.step}")
+        if not 0.0 <= self.activation < float("inf"):
+            raise SimulationError(f"the activation gap must be ≥ 0, got {self.activation}")
         try:
             object.__setattr__(self, "scheme", Scheme(self.scheme))
         except ValueError:
@@ -191,14 +199,16 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
 
 
 @inner_kernel
-def select_candidates(model: Model, step: float, scheme: int, memory: Memory) -> int:
+def select_candidates(
+    model: Model, step: float, scheme: int, activation: float, memory: Memory
+) -> int:
     """Write Jacobian rows and free terms of the contact points that could act in this step."""
     count = 0
-    linearised = scheme == GAP_LINEARISED or scheme == LINEARLY_IMPLICIT
+    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
     for contact in range(model.contact_link.shape[0]):
         gap = memory.contacts.gap[contact]
         if gap > FAR_STEPS * CLOSING_SPEED * step or (
-            gap > 0.0 and (scheme == PAPER_EXPLICIT or scheme == PAPER_SYMPLECTIC)
+            gap > activation and scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC)
         ):
             continue
         contact_rows(model, memory, contact, count)
@@ -209,7 +219,7 @@ def select_candidates(model: Model, step: float, scheme: int, memory: Memory) ->
             normal += gap / step
         elif scheme == MOREAU_JEAN:
             before = row_product(memory, 2 * count, memory.v)
-            if gap + 0.5 * step * before > 0.0:
+            if gap + 0.5 * step * before > activation:
                 continue
             normal += memory.restitution[contact] * before
         memory.free[2 * count] = normal
@@ -222,9 +232,11 @@ def select_candidates(model: Model, step: float, scheme: int, memory: Memory) ->
 
 
 @inner_kernel
-def solve_contacts(model: Model, step: float, scheme: int, order: Integers, memory: Memory) -> bool:
+def solve_contacts(
+    model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
+) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
-    count = select_candidates(model, step, scheme, memory)
+    count = select_candidates(model, step, scheme, activation, memory)
     nv = model.parent.shape[0]
     contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
@@ -294,6 +306,7 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
     An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
+    Points that already stand on the ground when the run begins do not touch down.
     """
     for contact in range(model.contact_link.shape[0]):
         pushed = memory.contacts.force[contact, 0] > 0.0
@@ -301,7 +314,9 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
         if memory.closed[contact] == 0 and pushed:
             memory.closed[contact] = 1
             memory.slipping[contact] = 0
-            note_event(record, time + step, TOUCHDOWN, contact, memory)
+            stood = memory.tally[STEPS] == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
+            if not stood:
+                note_event(record, time + step, TOUCHDOWN, contact, memory)
         elif (
             memory.closed[contact] == 1
             and not pushed
@@ -314,10 +329,10 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             slips = abs(memory.slip[contact]) > SLIP_SPEED
             if slips and memory.slipping[contact] == 0:
                 memory.slipping[contact] = 1
-                note_event(record, time, SLIP, contact, memory)
+                note_event(record, time + step, SLIP, contact, memory)
             elif not slips and memory.slipping[contact] == 1:
                 memory.slipping[contact] = 0
-                note_event(record, time, STICK, contact, memory)
+                note_event(record, time + step, STICK, contact, memory)
         for place in range(first, record.event_count[0]):
             record.event_impulse[place, 0] *= step
             record.event_impulse[place, 1] *= step
@@ -382,8 +397,9 @@ def _advance(
 
     Parameters
     ----------
-    clock : (3,) float
-        Time of step 0, step length, and height of the centre of mass below which it fell.
+    clock : (4,) float
+        Time of step 0, step length, height of the centre of mass below which it fell, and the
+        activation gap.
     span : (6,) int
         Step now, last step, step to pause before, steps between controller calls, steps between
         rows, scheme. At the last step everything is decided and recorded, but time does not move
@@ -426,7 +442,7 @@ def _advance(
             if not limit_torque(model, memory):
                 return BAD_CONTROLLER
         free_velocity(model, step, scheme, memory)
-        solved = solve_contacts(model, step, scheme, order, memory)
+        solved = solve_contacts(model, step, scheme, clock[3], order, memory)
         note_extremes(model, memory)
         note_events(model, record, time, step, memory)
         if k % record_every == 0 or k == last:
@@ -479,8 +495,8 @@ class _TimeSteppingEngine:
         self._advance, self.compile_s = compiled_advance()
         if method.scheme is not Scheme.MOREAU_JEAN and np.any(setting.ground.restitution > 0.0):
             raise SimulationError(
-                f"{method.scheme.name} knows plastic impacts only, and this ground has restitution; "
-                f"use Scheme.MOREAU_JEAN"
+                f"{method.scheme.name} knows plastic impacts only, and this ground has "
+                f"restitution; use Scheme.MOREAU_JEAN"
             )
         self._setting = setting
         self.solver = method.solver
@@ -488,7 +504,7 @@ class _TimeSteppingEngine:
         self._control_every = 1
         if setting.control_period is not None:
             self._control_every = whole_steps("control_period", setting.control_period, method.step)
-        self._clock = np.array([0.0, method.step, setting.fallen_height])
+        self._clock = np.array([0.0, method.step, setting.fallen_height, method.activation])
         self._span = np.array(
             [
                 0,

@@ -1,0 +1,207 @@
+"""From the collision geoms of a file to the points and discs that meet the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.robot.links import Links
+from heelstrike.robot.mujoco_file import MujocoFile
+from heelstrike.robot.warning import warn
+
+SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
+ALIGNED = 1e-6  # sine of the angle within which a direction counts as that of y
+
+PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)  # MuJoCo's mjtGeom
+
+
+@dataclass(frozen=True)
+class ContactPoint:
+    """A disc (or a point, of radius zero) fixed to a link.
+
+    Attributes
+    ----------
+    link : int
+        Link that carries it.
+    x, z : float
+        Its centre in the link frame (m).
+    radius : float
+        Radius (m).
+    friction : float
+        Sliding friction that the file gives its geom. The simulation takes friction from the
+        ground; this number only serves to compare left and right.
+    """
+
+    link: int
+    x: float
+    z: float
+    radius: float
+    friction: float
+
+
+def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
+    """Turn the geoms that can touch the ground into contact points, link by link, heel to toe.
+
+    A sphere, or a cylinder across the plane (a wheel), becomes a disc; a capsule becomes the discs
+    of its two ends; a box or a cylinder in the plane becomes the two ends of its sole, the
+    lowest edge in the reference configuration. Its upper corners are left out: they meet flat
+    ground only when the robot has fallen, and every contact point costs time in every step. Whoever
+    needs them adds spheres of radius 1e-6 there.
+
+    Parameters
+    ----------
+    file : MujocoFile
+        The parsed file.
+    links : Links
+        Its links.
+
+    Returns
+    -------
+    list of ContactPoint
+        Ordered by link and, on a link, from back to front. Coinciding points are merged.
+    """
+    points: list[ContactPoint] = []
+    skipped: list[str] = []
+    model, pose = file.model, file.pose
+    for geom in _geoms_that_touch(file, links):
+        link = int(links.of_body[model.geom_bodyid[geom]])
+        shape = _outline(
+            int(model.geom_type[geom]),
+            model.geom_size[geom],
+            pose.geom_xpos[geom],
+            pose.geom_xmat[geom].reshape(3, 3),
+        )
+        if shape is None:
+            skipped.append(file.name("geom", geom))
+            continue
+        centers, radius = shape
+        friction = float(model.geom_friction[geom, 0])
+        for x, z in centers - links.origin[link]:
+            points.append(ContactPoint(link, float(x), float(z), radius, friction))
+    if skipped:
+        warn(
+            f"{file.source}: these geoms cannot touch the ground here, because their shape (mesh, "
+            f"ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
+            "spheres, capsules or boxes where the robot meets the ground."
+        )
+    return _in_order(_merged(points))
+
+
+def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:
+    """Geoms of moving links that the file lets collide with the ground.
+
+    A file with a ground of its own says which geoms touch it (contype, conaffinity, explicit
+    pairs, excluded bodies); without one, every geom that can collide at all counts.
+    """
+    model = file.model
+    if file.disabled("contact"):
+        warn(f"{file.source}: contact is switched off by the file, so there are no contact points.")
+        return []
+    moving = links.of_body[model.geom_bodyid] >= 0
+    pairs = {
+        frozenset((int(a), int(b))) for a, b in zip(model.pair_geom1, model.pair_geom2, strict=True)
+    }
+    paired = set().union(*pairs) if pairs else set()
+    excluded = {(int(s) >> 16, int(s) & 0xFFFF) for s in model.exclude_signature}
+    collides = (model.geom_contype | model.geom_conaffinity) != 0
+    able = [g for g in range(model.ngeom) if collides[g] or g in paired]
+    ground = [g for g in able if not moving[g]]
+    _mention_terrain(file, ground)
+
+    def touches(geom: int, other: int) -> bool:
+        if frozenset((geom, other)) in pairs:
+            return True
+        bodies = sorted(int(model.geom_bodyid[g]) for g in (geom, other))
+        return (bodies[0], bodies[1]) not in excluded and bool(
+            model.geom_contype[geom] & model.geom_conaffinity[other]
+            or model.geom_contype[other] & model.geom_conaffinity[geom]
+        )
+
+    candidates = [g for g in able if moving[g]]
+    if not ground:
+        return candidates
+    return [g for g in candidates if any(touches(g, other) for other in ground)]
+
+
+def _mention_terrain(file: MujocoFile, ground: Iterable[int]) -> None:
+    """Warn of ground in the file that is more than the plane z = 0."""
+    model, pose = file.model, file.pose
+    terrain = [
+        file.name("geom", g)
+        for g in ground
+        if model.geom_type[g] != PLANE
+        or abs(pose.geom_xpos[g, 2]) > SAME_PLACE
+        or np.hypot(pose.geom_xmat[g, 2], pose.geom_xmat[g, 5]) > ALIGNED
+    ]
+    if terrain:
+        warn(
+            f"{file.source}: fixed geoms of the file are not part of the robot and are left out: "
+            f"{', '.join(terrain)}. Describe the ground by a Ground object."
+        )
+
+
+def _outline(
+    kind: int, size: NDArray[np.float64], center: NDArray[np.float64], turn: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float] | None:
+    """Centres (world x, z) and radius of the discs that stand for a geom; None if it has none."""
+    middle = center[::2]
+    along = turn[::2, 2]  # the geom's own axis (third column), seen in the plane
+    across = np.hypot(*along) < ALIGNED
+    in_plane = abs(turn[1, 2]) < ALIGNED
+    if kind == SPHERE or (kind == CYLINDER and across):
+        return middle[None], float(size[0])
+    if kind == CAPSULE:
+        ends = np.array([middle - size[1] * along, middle + size[1] * along])
+        return ends, float(size[0])
+    if kind == CYLINDER and in_plane:
+        sideways = np.array([along[1], -along[0]])
+        half = np.stack([size[0] * sideways, size[1] * along])
+        return _sole(_corners(middle, half)), 0.0
+    if kind == BOX:
+        return _sole(_corners(middle, (turn[::2] * size[:3]).T)), 0.0
+    return None
+
+
+def _corners(middle: NDArray[np.float64], half: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Corners of the box with centre `middle` and half edges `half`, seen in the plane."""
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * len(half))).reshape(len(half), -1).T
+    return middle + signs @ half
+
+
+def _sole(corners: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Two corners between which a flat ground would carry the shape, back to front.
+
+    They are the ends of the edge of the convex hull that leaves the lowest corner least steeply.
+    """
+    height = corners[:, 1] - corners[:, 1].min()
+    lowest = corners[np.lexsort((corners[:, 0], np.round(height, 9)))[0]]
+    reach = np.abs(corners[:, 0] - lowest[0])
+    reach[reach < SAME_PLACE] = 0.0
+    rise = corners[:, 1] - lowest[1]
+    slope = np.divide(rise, reach, out=np.full_like(reach, np.inf), where=reach > 0.0)
+    other = corners[np.lexsort((-reach, np.round(slope, 9)))[0]]
+    ends = np.array([lowest, other])
+    return ends[np.argsort(ends[:, 0])]
+
+
+def _merged(points: Iterable[ContactPoint]) -> list[ContactPoint]:
+    """Points without repetition; of two that coincide the first stays, the rougher friction too."""
+    kept: dict[int, list[ContactPoint]] = {}
+    for point in points:
+        there = kept.setdefault(point.link, [])
+        for i, other in enumerate(there):
+            apart = np.hypot(point.x - other.x, point.z - other.z)
+            if max(apart, abs(point.radius - other.radius)) < SAME_PLACE:
+                there[i] = replace(other, friction=max(other.friction, point.friction))
+                break
+        else:
+            there.append(point)
+    return [point for there in kept.values() for point in there]
+
+
+def _in_order(points: Iterable[ContactPoint]) -> list[ContactPoint]:
+    """Sort by link, then from back to front, then upwards."""
+    return sorted(points, key=lambda p: (p.link, round(p.x, 9), round(p.z, 9)))

@@ -1,0 +1,87 @@
+"""The built-in robots, and how a robot is found by its name or file."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import reprlib
+from pathlib import Path
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.mjcf import read_mjcf
+from heelstrike.robot.robot import Robot
+
+_HERE = Path(__file__).parent
+_FILE_TYPES = (".xml", ".mjcf", ".urdf")
+
+
+def builtin_robots() -> tuple[str, ...]:
+    """Return the names of the built-in robots.
+
+    Examples
+    --------
+    >>> from heelstrike.robot import builtin_robots
+    >>> "bravo7" in builtin_robots()
+    True
+    """
+    return tuple(sorted(path.stem for path in _HERE.glob("*.xml")))
+
+
+def load_robot(name_or_path: str | os.PathLike[str]) -> Robot:
+    """Load a built-in robot by its name, or a planar robot from an MJCF or URDF file.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        A name of `builtin_robots`, or the path of an ``.xml`` (MJCF) or ``.urdf`` file.
+
+    Raises
+    ------
+    RobotError
+        If there is no such robot or file, the file cannot be read, or the robot does not move in
+        the x–z plane.
+
+    Warns
+    -----
+    RobotWarning
+        If the file says something that is not simulated, or its left and right differ.
+
+    Examples
+    --------
+    >>> from heelstrike.robot import load_robot
+    >>> robot = load_robot("bravo7")
+    >>> robot
+    Robot('bravo7': 9 coordinates, 6 actuators, 4 contact points, 75 kg)
+    >>> robot.joint_names[3:6]
+    ('right_hip', 'right_knee', 'right_ankle')
+    """
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise RobotError(
+            f"a robot is loaded by its name or path, not by a {type(name_or_path).__name__}."
+        )
+    name = os.fspath(name_or_path)
+    if isinstance(name_or_path, str) and name in builtin_robots():
+        return read_mjcf(_HERE / f"{name}.xml", name=name)
+    path = Path(name)
+    if path.suffix.lower() in _FILE_TYPES:
+        return read_mjcf(path)
+    if name and _exists(path):
+        raise RobotError(f"{path}: expected an MJCF file (.xml) or a URDF file (.urdf).")
+    raise RobotError(_unknown(name))
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # no possible name of a file
+        return False
+
+
+def _unknown(name: str) -> str:
+    known = builtin_robots()
+    near = difflib.get_close_matches(name.lower(), known, n=1)
+    guess = f" Did you mean {near[0]!r}?" if near else ""
+    return (
+        f"there is no robot called {reprlib.repr(name)}.{guess} Built in are {', '.join(known)}; "
+        "any other robot is loaded by the path of its .xml (MJCF) or .urdf file."
+    )

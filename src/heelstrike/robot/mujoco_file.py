@@ -1,0 +1,120 @@
+"""A robot file as MuJoCo's own parser understands it, posed in its reference configuration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.screening import screen
+from heelstrike.robot.warning import warn
+
+
+@dataclass(frozen=True)
+class MujocoFile:
+    """A parsed MJCF or URDF file.
+
+    Attributes
+    ----------
+    model : mujoco.MjModel
+        The compiled file.
+    pose : mujoco.MjData
+        World poses of joints, bodies and geoms in the reference configuration (``qpos0``).
+    xml : Element or None
+        The file as it is written.
+    source : str
+        What to call the file in messages.
+    """
+
+    model: Any
+    pose: Any
+    xml: Element | None
+    source: str
+
+    @property
+    def is_urdf(self) -> bool:
+        """Whether the file is URDF and not MJCF."""
+        return self.xml is not None and self.xml.tag == "robot"
+
+    def given_name(self, kind: str, index: int) -> str:
+        """Name that the file gives a body, joint, geom, actuator …, or the empty string."""
+        import mujoco
+
+        object_type = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return mujoco.mj_id2name(self.model, object_type, index) or ""
+
+    def name(self, kind: str, index: int) -> str:
+        """Name of a body, joint, geom, actuator …, or its kind and number if it has none."""
+        return self.given_name(kind, index) or f"{kind} {index}"
+
+    def error(self, message: str) -> RobotError:
+        """Return an error that names the file."""
+        return RobotError(f"{self.source}: {message}")
+
+    def disabled(self, flag: str) -> bool:
+        """Whether the file switches off the part of the physics called `flag`."""
+        import mujoco
+
+        bit = getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)
+        return bool(self.model.opt.disableflags & int(bit))
+
+    def field(self, name: str) -> NDArray[np.float64]:
+        """Return an array of the model, empty where this version of MuJoCo does not have it."""
+        return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
+
+
+def parse(source: Path | str) -> MujocoFile:
+    """Parse an MJCF or URDF file, or a string that holds one.
+
+    Parameters
+    ----------
+    source : Path or str
+        Path of a file, or the XML text itself.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read or MuJoCo's parser refuses it; the message is the parser's.
+    """
+    label = str(source) if isinstance(source, Path) else "XML string"
+    xml = screen(source, label)
+    import mujoco
+
+    remarks: list[str] = []
+    try:
+        with _warnings_into(remarks):
+            if isinstance(source, Path):
+                model = mujoco.MjModel.from_xml_path(str(source))
+            else:
+                model = mujoco.MjModel.from_xml_string(source)
+            pose = mujoco.MjData(model)
+            mujoco.mj_kinematics(model, pose)
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}") from error
+    for remark in remarks:
+        warn(f"{label}: {remark}")
+    return MujocoFile(model, pose, xml, label)
+
+
+@contextmanager
+def _warnings_into(remarks: list[str]) -> Iterator[None]:
+    """Collect MuJoCo's warnings, which it would print and append to a file in the work directory.
+
+    MuJoCo has one handler a process; the one that was set is put back.
+    """
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(remarks.append)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

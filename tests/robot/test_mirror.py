@@ -1,0 +1,175 @@
+"""Left and right: found by name, verified on the numbers."""
+
+from __future__ import annotations
+
+import warnings
+
+import mujoco
+import numpy as np
+import pytest
+
+from heelstrike.robot import Robot, RobotWarning, builtin_robots, load_robot, read_mjcf
+
+LEG = """<body name="{hip}_link" pos="0 0 0">
+  <joint name="{hip}" axis="0 {sense} 0" range="{low} {high}" damping="0.1"/>
+  <geom name="{hip}_shape" type="capsule" size="0.05" fromto="0 0 0 0 0 -0.4" mass="{mass}"
+    contype="0" conaffinity="0"/>
+  <body name="{foot}_link" pos="0 0 -0.4">
+    <joint name="{foot}" axis="0 {sense} 0" stiffness="5" springref="{rest}"/>
+    <geom type="box" size="{size} 0.04 0.01" pos="0.02 0 -0.05" mass="1" friction="{friction}"/>
+  </body>
+</body>"""
+
+
+def biped_text(
+    right: tuple[str, str] = ("right_hip", "right_ankle"),
+    left: tuple[str, str] = ("left_hip", "left_ankle"),
+    *,
+    opposite: bool = False,
+    motors: str = "",
+    **changes: object,
+) -> str:
+    """Two legs on a floating trunk; `opposite` turns the joints of the left, `changes` spoil it."""
+    plain: dict[str, object] = {"sense": 1, "low": -30, "high": 60, "mass": 3, "rest": 20}
+    plain |= {"size": 0.1, "friction": 0.8, "hip": right[0], "foot": right[1]}
+    other = plain | {"hip": left[0], "foot": left[1]} | changes
+    if opposite:
+        other |= {"sense": -1, "low": -60, "high": 30, "rest": -20}
+    return f"""<mujoco model="two"><worldbody><body name="trunk" pos="0 0 1">
+        <joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+        <joint name="pitch" axis="0 1 0"/>
+        <geom size="0.1" contype="0" conaffinity="0"/>
+        {LEG.format(**plain)}{LEG.format(**other)}
+        </body></worldbody><actuator>{motors}</actuator></mujoco>"""
+
+
+def biped(*names: tuple[str, str], **changes: object) -> Robot:
+    return read_mjcf(biped_text(*names, **changes))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", builtin_robots())
+def test_built_in_robots_have_a_mirror(name: str) -> None:
+    robot = load_robot(name)
+    assert robot.mirror is not None
+    for i, j in enumerate(robot.mirror.joint):
+        swapped = robot.joint_names[i].replace("left", "R").replace("right", "left")
+        assert robot.joint_names[j] == swapped.replace("R", "right")
+    for i, j in enumerate(robot.mirror.contact):
+        swapped = robot.contact_names[i].replace("left", "R").replace("right", "left")
+        assert robot.contact_names[j] == swapped.replace("R", "right")
+    np.testing.assert_array_equal(robot.mirror.foot, [1, 0])
+    np.testing.assert_array_equal(robot.mirror.sign, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("right", "left"),
+    [
+        (("right_hip", "right_ankle"), ("left_hip", "left_ankle")),
+        (("HipRight", "AnkleRight"), ("HipLeft", "AnkleLeft")),
+        (("r_hip", "r_ankle"), ("l_hip", "l_ankle")),
+        (("hip.R", "ankle.R"), ("hip.L", "ankle.L")),
+        (("RHip", "RAnkle"), ("LHip", "LAnkle")),
+        (("rhip", "rankle"), ("lhip", "lankle")),
+        (("righthip", "rightankle"), ("lefthip", "leftankle")),
+        (("hip", "ankle"), ("hip_left", "ankle_left")),
+        (("hip_right", "ankle_right"), ("hip", "ankle")),
+    ],
+)
+def test_words_for_left_and_right(right: tuple[str, str], left: tuple[str, str]) -> None:
+    mirror = biped(right, left).mirror
+    assert mirror is not None
+    np.testing.assert_array_equal(mirror.joint, [0, 1, 2, 5, 6, 3, 4])
+
+
+def test_names_that_say_nothing_give_no_mirror_silently() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert biped(("hip1", "ankle1"), ("hip2", "ankle2")).mirror is None
+
+
+def test_names_of_links_serve_where_joints_have_none() -> None:
+    text = """<mujoco><worldbody><body><joint axis="0 1 0"/><geom size="0.1"/>
+      <body name="left"><joint axis="0 1 0"/><geom size="0.1"/></body>
+      <body name="right"><joint axis="0 1 0"/><geom size="0.1"/></body>
+      </body></worldbody></mujoco>"""
+    mirror = read_mjcf(text).mirror
+    assert mirror is not None
+    np.testing.assert_array_equal(mirror.joint, [0, 2, 1])
+
+
+def test_opposite_joints_have_sign_minus_one() -> None:
+    mirror = biped(opposite=True).mirror
+    assert mirror is not None
+    np.testing.assert_array_equal(mirror.sign, [1, 1, 1, -1, -1, -1, -1])
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"mass": 3.1}, "mass of right_hip and left_hip (3, 3.1)"),
+        ({"friction": 1.9}, "friction of the contact points of right_ankle_link and"),
+        ({"high": 61}, "range of right_hip and left_hip"),
+        ({"rest": 21}, "rest of the spring of right_ankle and left_ankle"),
+        ({"size": 0.11}, "contact points of right_ankle_link and left_ankle_link"),
+        ({"sense": -1}, "range of right_hip and left_hip"),
+        ({"motors": '<motor joint="left_hip"/>'}, "left_hip has an actuator, right_hip has none"),
+        (
+            {
+                "motors": '<motor joint="left_hip" ctrlrange="-2 2"/>'
+                '<motor joint="right_hip" ctrlrange="-2 3"/>'
+            },
+            "torque limits of right_hip and left_hip",
+        ),
+    ],
+)
+def test_a_difference_is_told_with_its_numbers(changes: dict[str, object], words: str) -> None:
+    with pytest.warns(RobotWarning, match="left and right differ") as caught:
+        assert biped(**changes).mirror is None
+    assert words in str(caught[0].message)
+
+
+def test_a_joint_without_counterpart_is_told() -> None:
+    with pytest.warns(RobotWarning, match="right_ankle has no counterpart"):
+        assert biped(("right_hip", "right_ankle"), ("left_hip", "ankle_port")).mirror is None
+
+
+def test_a_difference_of_two_points_of_a_foot_is_told_once() -> None:
+    with pytest.warns(RobotWarning) as caught:
+        biped(friction=1.9)
+    assert str(caught[0].message).count("(0.8, 1.9)") == 1
+
+
+def test_rounding_is_no_difference() -> None:
+    assert biped(mass=3.0 * (1.0 + 1e-8)).mirror is not None
+
+
+def test_the_warning_points_at_the_caller() -> None:
+    with pytest.warns(RobotWarning) as caught:
+        biped(mass=4)
+    assert caught[0].filename == __file__
+
+
+@pytest.mark.parametrize("opposite", [False, True])
+def test_a_mirrored_state_has_the_energy_of_the_state(opposite: bool) -> None:
+    """Energies by MuJoCo of a random state and its mirror image, which is its own mirror's image.
+
+    Mirroring renames the legs, so both energies are the same sums in another order: 1e-13.
+    """
+    text = biped_text(opposite=opposite)
+    robot = read_mjcf(text)
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    mirror = robot.mirror
+    assert mirror is not None
+    draw = np.random.default_rng(0)
+    q, v = draw.normal(size=robot.nq), draw.normal(size=robot.nv)
+    mirrored = mirror.position(q, robot.model.reference), mirror.velocity(v)
+    energies = []
+    for position, velocity in ((q, v), mirrored):
+        data.qpos[:], data.qvel[:] = position, velocity
+        mujoco.mj_forward(model, data)
+        energies.append(data.energy.copy())
+    np.testing.assert_allclose(energies[0], energies[1], rtol=1e-13)
+    np.testing.assert_allclose(mirror.position(mirrored[0], robot.model.reference), q)
+    np.testing.assert_allclose(mirror.velocity(mirrored[1]), v)
