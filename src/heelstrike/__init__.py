@@ -1,0 +1,92 @@
+"""Planar biped robots that walk on exact hard contact.
+
+Load a robot, design a gait, simulate it under a controller, look at what the feet did::
+
+    import heelstrike as hs
+
+    robot = hs.load_robot("bravo7")
+    gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, friction=0.75)
+    run = hs.simulate(
+        robot,
+        hs.ComputedTorque(robot, gait),
+        state=gait.initial_state,
+        duration=7.0,
+        method=hs.TimeStepping(step=1e-3),
+        ground=hs.Ground(friction=0.75),
+    )
+    print(run.summary())
+
+Each public name is listed once, here, and imported when it is first used: ``import heelstrike``
+itself is quick and loads neither the compiler nor the plotting and optimisation libraries.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from heelstrike.contact import Ground as Ground
+    from heelstrike.contact import solve_contact as solve_contact
+    from heelstrike.contact import solve_lcp as solve_lcp
+    from heelstrike.control import ComputedTorque as ComputedTorque
+    from heelstrike.errors import ContactProblemError as ContactProblemError
+    from heelstrike.errors import ControllerError as ControllerError
+    from heelstrike.errors import GaitError as GaitError
+    from heelstrike.errors import HeelstrikeError as HeelstrikeError
+    from heelstrike.errors import InfeasibleGaitError as InfeasibleGaitError
+    from heelstrike.errors import RobotError as RobotError
+    from heelstrike.errors import RunFileError as RunFileError
+    from heelstrike.errors import SimulationError as SimulationError
+    from heelstrike.gait import Gait as Gait
+    from heelstrike.gait import load_gait as load_gait
+    from heelstrike.gait import optimize_gait as optimize_gait
+    from heelstrike.robot import Robot as Robot
+    from heelstrike.robot import State as State
+    from heelstrike.robot import load_robot as load_robot
+    from heelstrike.sim import Run as Run
+    from heelstrike.sim import TimeStepping as TimeStepping
+    from heelstrike.sim import load_run as load_run
+    from heelstrike.sim import simulate as simulate
+
+__version__ = "0.1.0"
+
+# Public name -> the package that defines it. The imports above repeat this for type checkers,
+# which cannot follow `__getattr__`; a test keeps the two alike.
+_HOME = {
+    "ComputedTorque": "heelstrike.control",
+    "ContactProblemError": "heelstrike.errors",
+    "ControllerError": "heelstrike.errors",
+    "Gait": "heelstrike.gait",
+    "GaitError": "heelstrike.errors",
+    "Ground": "heelstrike.contact",
+    "HeelstrikeError": "heelstrike.errors",
+    "InfeasibleGaitError": "heelstrike.errors",
+    "Robot": "heelstrike.robot",
+    "RobotError": "heelstrike.errors",
+    "Run": "heelstrike.sim",
+    "RunFileError": "heelstrike.errors",
+    "SimulationError": "heelstrike.errors",
+    "State": "heelstrike.robot",
+    "TimeStepping": "heelstrike.sim",
+    "load_gait": "heelstrike.gait",
+    "load_robot": "heelstrike.robot",
+    "load_run": "heelstrike.sim",
+    "optimize_gait": "heelstrike.gait",
+    "simulate": "heelstrike.sim",
+    "solve_contact": "heelstrike.contact",
+    "solve_lcp": "heelstrike.contact",
+}
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOME.get(name)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module(home), name)
+    globals()[name] = value  # the next look-up does not come here
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(_HOME))

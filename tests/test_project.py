@@ -1,0 +1,114 @@
+"""The project as a whole: its public names, what importing it costs, how its packages depend."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import pkgutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import heelstrike
+from heelstrike import errors
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "src" / "heelstrike"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+# Absent on at least one of Linux, macOS and Windows.
+PLATFORM_MODULES = {
+    "_winapi",
+    "crypt",
+    "fcntl",
+    "grp",
+    "msvcrt",
+    "nis",
+    "posix",
+    "pty",
+    "pwd",
+    "resource",
+    "spwd",
+    "syslog",
+    "termios",
+    "tty",
+    "winreg",
+    "winsound",
+}
+HEAVY = {
+    "casadi",
+    "h5netcdf",
+    "matplotlib",
+    "mujoco",
+    "numba",
+    "pandas",
+    "scipy",
+    "viser",
+    "xarray",
+}
+
+
+@pytest.mark.parametrize("name", sorted(heelstrike._HOME))
+def test_public_name_resolves_and_is_documented(name: str) -> None:
+    value = getattr(heelstrike, name)
+    assert value is getattr(importlib.import_module(heelstrike._HOME[name]), name)
+    assert inspect.getdoc(value)
+    assert name in dir(heelstrike)
+
+
+def test_type_checkers_see_the_same_names_in_the_same_homes() -> None:
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    seen = {
+        alias.asname: node.module
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname
+    }
+    assert seen == heelstrike._HOME
+
+
+def test_every_error_is_public() -> None:
+    raised = {
+        name
+        for name, value in inspect.getmembers(errors, inspect.isclass)
+        if issubclass(value, errors.HeelstrikeError)
+    }
+    assert raised == {name for name, home in heelstrike._HOME.items() if home == errors.__name__}
+
+
+def test_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'load_robots'"):
+        heelstrike.load_robots  # noqa: B018
+
+
+def test_importing_heelstrike_loads_nothing_heavy() -> None:
+    # A fresh interpreter: this one has loaded everything already.
+    script = "import heelstrike, sys; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    loaded = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert "heelstrike" in loaded
+    assert HEAVY.isdisjoint(loaded)
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_no_module_needs_one_operating_system(source: Path) -> None:
+    imported: set[str] = set()
+    for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            imported.add(node.module.split(".")[0])
+    assert imported.isdisjoint(PLATFORM_MODULES)
+
+
+def test_every_package_has_its_layer() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    (contract,) = project["tool"]["importlinter"]["contracts"]
+    layers = {name.strip() for layer in contract["layers"] for name in layer.split("|")}
+    assert layers == {module.name for module in pkgutil.iter_modules([str(PACKAGE)])}
