@@ -1,0 +1,165 @@
+"""Computed torque: the law is eq. 37, the phase restarts, and encoders are as good as exact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import walking
+
+import heelstrike as hs
+from heelstrike import dynamics
+from heelstrike.control import Encoder
+from heelstrike.sim import Contacts
+
+
+def nothing_touches() -> Contacts:
+    return Contacts(np.zeros((4, 2)), np.tile([0.0, 1.0], (4, 1)), np.ones(4), np.zeros((4, 2)))
+
+
+def as_the_paper_writes_it(
+    robot: hs.Robot, link: int, q: np.ndarray, v: np.ndarray, wanted: np.ndarray
+) -> np.ndarray:
+    """Γ = MᵀA M q̈ᵈ + MᵀA N + MᵀH (eq. 34-39), with dense matrices."""
+    jacobian = dynamics.point_jacobian(robot, q, link, np.zeros(2))
+    bias = dynamics.point_bias_acceleration(robot, q, v, link, np.zeros(2))
+    driven = robot.model.actuator_joint
+    free = np.setdiff1d(np.arange(robot.nv), driven)
+    projection = np.zeros((robot.nv, robot.nu))
+    projection[driven] = np.eye(robot.nu)
+    projection[free] = -np.linalg.solve(jacobian[:, free], jacobian[:, driven])
+    remainder = np.zeros(robot.nv)
+    remainder[free] = -np.linalg.solve(jacobian[:, free], bias)
+    mass = dynamics.mass_matrix(robot, q)
+    force = dynamics.bias_force(robot, q, v) - dynamics.passive_force(robot, q, v)
+    return projection.T @ (mass @ (projection @ wanted + remainder) + force)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_law_is_the_papers(seed: int) -> None:
+    robot, gait = walking.bravo7(), walking.gait()
+    draw = np.random.default_rng(seed)
+    controller = hs.ComputedTorque(robot, gait, kp=300.0, kd=30.0)
+    t = float(draw.uniform(0.0, 0.3))
+    q = gait.initial_state.q + 0.3 * draw.normal(size=robot.nq)
+    v = gait.initial_state.v + draw.normal(size=robot.nv)
+    driven = robot.model.actuator_joint
+    wanted = (
+        gait.acceleration(t)
+        + 30.0 * (gait.velocity(t) - v[driven])
+        + 300.0 * (gait.position(t) - q[driven])
+    )
+    link = robot.feet[gait.stance_foot].link
+    expected = as_the_paper_writes_it(robot, link, q, v, wanted)
+    torque = controller.torque(t, hs.State(q, v), nothing_touches())
+    np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_touchdown_exchanges_the_feet_and_restarts_the_phase() -> None:
+    robot, gait = walking.bravo7(), walking.gait()
+    controller = hs.ComputedTorque(robot, gait)
+    state = gait.initial_state
+    swing = robot.feet[1 - gait.stance_foot]
+    touching = nothing_touches()
+    touching.force[swing.contacts[0], 0] = 100.0
+    driven = robot.model.actuator_joint
+
+    def wanted(phase: float, mirrored: bool) -> np.ndarray:
+        a = gait.mirrored_coefficients(robot) if mirrored else gait.coefficients
+        position = a[0] + phase * (a[1] + phase * (a[2] + phase * a[3]))
+        velocity = a[1] + phase * (2 * a[2] + 3 * phase * a[3])
+        return (
+            2 * a[2]
+            + 6 * a[3] * phase
+            + 40.0 * (velocity - state.v[driven])
+            + 400.0 * (position - state.q[driven])
+        )
+
+    def expected(foot: int, phase: float, mirrored: bool) -> np.ndarray:
+        link = robot.feet[foot].link
+        return as_the_paper_writes_it(robot, link, state.q, state.v, wanted(phase, mirrored))
+
+    # In the first half of the step a touch of the swing foot counts for nothing (it has just left).
+    torque = controller.torque(0.2, state, touching)
+    np.testing.assert_allclose(torque, expected(gait.stance_foot, 0.2, False), atol=1e-8)
+    # Later it is a touchdown: left and right change places and the phase starts at zero.
+    torque = controller.torque(0.6, state, touching)
+    np.testing.assert_allclose(torque, expected(1 - gait.stance_foot, 0.0, True), atol=1e-8)
+    torque = controller.torque(0.65, state, nothing_touches())
+    np.testing.assert_allclose(torque, expected(1 - gait.stance_foot, 0.05, True), atol=1e-8)
+
+
+def test_a_late_step_goes_on_for_a_tenth_and_then_rests() -> None:
+    """Eq. 41 says zero after T, which would throw the joints to the straight posture."""
+    robot, gait = walking.bravo7(), walking.gait()
+    link = robot.feet[gait.stance_foot].link
+    driven = robot.model.actuator_joint
+    state = hs.State(gait.initial_state.q, 0.0 * gait.initial_state.v)
+    a, end = gait.coefficients, 1.1 * gait.step_duration
+    position = a[0] + end * (a[1] + end * (a[2] + end * a[3]))
+    wanted = 400.0 * (position - state.q[driven])
+    torque = hs.ComputedTorque(robot, gait).torque(5.0, state, nothing_touches())
+    expected = as_the_paper_writes_it(robot, link, state.q, state.v, wanted)
+    np.testing.assert_allclose(torque, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("encoder", "tracking"),
+    [(Encoder(period=1e-3, resolution=0.0), 2e-3), (Encoder(), 4e-3)],
+    ids=["sampled", "sampled and rounded"],
+)
+def test_walks_on_encoders(encoder: Encoder, tracking: float) -> None:
+    """Ten steps on velocities estimated by cubics through four samples (section 5)."""
+    robot, gait = walking.bravo7(), walking.gait()
+    run = hs.simulate(
+        robot,
+        hs.ComputedTorque(robot, gait, encoder=encoder),
+        state=gait.initial_state,
+        duration=7.0,
+    )
+    summary = run.summary(gait=gait)
+    assert run.completed, run.message
+    assert summary.steps == 10
+    assert summary.tracking_rms_rad <= tracking
+    assert -0.1 < summary.zmp_min_m < summary.zmp_max_m < 0.1
+
+
+def test_the_estimate_is_exact_for_cubics() -> None:
+    from heelstrike.compilation import uncompiled
+    from heelstrike.control.computed_torque import estimated_velocity
+
+    period, t = 0.01, 0.3
+    instants = t - period * np.arange(4)
+    samples = (2.0 - instants + 3.0 * instants**2 - 4.0 * instants**3)[:, None]
+    slope = uncompiled(estimated_velocity)(samples, 4, period, 0)
+    assert slope == pytest.approx(-1.0 + 6.0 * t - 12.0 * t**2, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"kp": -1.0}, "kp"),
+        ({"kd": np.nan}, "kd"),
+        ({"kp": [1.0, 2.0]}, "kp must be one number or 6"),
+    ],
+)
+def test_gains_are_checked(options: dict[str, object], words: str) -> None:
+    with pytest.raises(hs.ControllerError, match=words):
+        hs.ComputedTorque(walking.bravo7(), walking.gait(), **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("period", "resolution"), [(0.0, 0.0), (-1.0, 0.0), (1e-3, -1.0)])
+def test_encoders_are_checked(period: float, resolution: float) -> None:
+    with pytest.raises(hs.ControllerError, match="encoder"):
+        Encoder(period=period, resolution=resolution)
+
+
+def test_a_robot_that_computed_torque_cannot_hold() -> None:
+    from robot_cases import RANDOM
+
+    with pytest.raises(hs.ControllerError, match="two mirrored feet"):
+        hs.ComputedTorque(RANDOM[0].robot(), walking.gait())
+
+
+def test_unknown_keyword_raises() -> None:
+    with pytest.raises(TypeError):
+        hs.ComputedTorque(walking.bravo7(), walking.gait(), gain=3.0)  # type: ignore[call-arg]
