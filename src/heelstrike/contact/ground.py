@@ -195,6 +195,15 @@ def segment_below(ground: GroundModel, x: float) -> int:
 
 
 @inner_kernel
+def ground_height(ground: GroundModel, x: float) -> float:
+    """Height of the ground at x."""
+    segment = segment_below(ground, x)
+    run = ground.vertices[segment + 1, 0] - ground.vertices[segment, 0]
+    rise = ground.vertices[segment + 1, 1] - ground.vertices[segment, 1]
+    return ground.vertices[segment, 1] + rise / run * (x - ground.vertices[segment, 0])
+
+
+@inner_kernel
 def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: Floats) -> float:
     """Signed distance to the line through a segment; writes its upward normal."""
     run = ground.vertices[segment + 1, 0] - ground.vertices[segment, 0]

@@ -42,7 +42,7 @@ class Setting:
     record_every : int
         Steps between two rows of the record.
     fallen_height : float
-        Height of the centre of mass (m) below which the robot has fallen.
+        Height of the centre of mass above the ground (m) below which the robot has fallen.
     """
 
     robot: Robot

@@ -59,15 +59,20 @@ class Memory(NamedTuple):
         Contact mode found by the last solve, the guess of the next.
     closed, slipping : (nc,) int
         Whether each contact point is on the ground, and whether it slips.
-    candidate : (nc,) int
-        Contact points in the contact problem of this step.
-    jacobian, half : (2 nc, nv) float
+    stop_torque : (nv,) float
+        Generalised force of the joint stops in the last solve.
+    stopped : (nv,) int
+        Whether each joint pressed against a stop.
+    candidate : (capacity,) int
+        Contact points in the contact problem of this step; after them the joint stops, numbered
+        on from nc: twice the joint, plus one for its upper end. The capacity has room for all.
+    jacobian, half : (2 capacity, nv) float
         Contact Jacobian of the candidates and L⁻ᵀ Jᵀ.
-    delassus : (2 nc, 2 nc) float
-    free, impulse, velocity : (2 nc,) float
+    delassus : (2 capacity, 2 capacity) float
+    free, impulse, velocity : (2 capacity,) float
         The contact problem and its solution.
-    problem_friction : (nc,) float
-    problem_mode : (nc,) int
+    problem_friction : (capacity,) float
+    problem_mode : (capacity,) int
     residual : (3,) float
         Residuals of the certificate of the last solve.
     solver : ContactWorkspace
@@ -96,6 +101,8 @@ class Memory(NamedTuple):
     mode: Integers
     closed: Integers
     slipping: Integers
+    stop_torque: Floats
+    stopped: Integers
     candidate: Integers
     jacobian: Floats
     half: Floats
@@ -114,6 +121,8 @@ class Memory(NamedTuple):
 def allocate_memory(robot: Robot) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nv, nu, nc = robot.nv, robot.nu, robot.nc
+    stops = np.isfinite(robot.model.lower).sum() + np.isfinite(robot.model.upper).sum()
+    capacity = nc + int(stops)
     return Memory(
         q=np.zeros(nv),
         v=np.zeros(nv),
@@ -134,17 +143,19 @@ def allocate_memory(robot: Robot) -> Memory:
         mode=np.zeros(nc, dtype=np.int64),
         closed=np.zeros(nc, dtype=np.int64),
         slipping=np.zeros(nc, dtype=np.int64),
-        candidate=np.zeros(nc, dtype=np.int64),
-        jacobian=np.zeros((2 * nc, nv)),
-        half=np.zeros((2 * nc, nv)),
-        delassus=np.zeros((2 * nc, 2 * nc)),
-        free=np.zeros(2 * nc),
-        impulse=np.zeros(2 * nc),
-        velocity=np.zeros(2 * nc),
-        problem_friction=np.zeros(nc),
-        problem_mode=np.zeros(nc, dtype=np.int64),
+        stop_torque=np.zeros(nv),
+        stopped=np.zeros(nv, dtype=np.int64),
+        candidate=np.zeros(capacity, dtype=np.int64),
+        jacobian=np.zeros((2 * capacity, nv)),
+        half=np.zeros((2 * capacity, nv)),
+        delassus=np.zeros((2 * capacity, 2 * capacity)),
+        free=np.zeros(2 * capacity),
+        impulse=np.zeros(2 * capacity),
+        velocity=np.zeros(2 * capacity),
+        problem_friction=np.zeros(capacity),
+        problem_mode=np.zeros(capacity, dtype=np.int64),
         residual=np.zeros(3),
-        solver=contact_workspace(max(nc, 1)),
+        solver=contact_workspace(max(capacity, 1)),
         tally=np.zeros(TALLIES, dtype=np.int64),
         extreme=np.zeros(EXTREMES),
     )
@@ -162,6 +173,7 @@ class Record(NamedTuple):
     q: Floats
     v: Floats
     torque: Floats
+    stop_torque: Floats
     point: Floats
     normal: Floats
     gap: Floats
@@ -184,6 +196,7 @@ def allocate_record(robot: Robot, rows: int, events: int) -> Record:
         q=np.zeros((rows, nv)),
         v=np.zeros((rows, nv)),
         torque=np.zeros((rows, nu)),
+        stop_torque=np.zeros((rows, nv)),
         point=np.zeros((rows, nc, 2)),
         normal=np.zeros((rows, nc, 2)),
         gap=np.zeros((rows, nc)),

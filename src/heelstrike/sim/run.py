@@ -36,7 +36,7 @@ class Event:
     kind : EventKind
         Touchdown, lift-off, beginning of slip or of stick.
     contact : int
-        Index of the contact point.
+        Index of the contact point, or of the joint when it reached its stop.
     impulse : tuple of float
         Impulse (normal, tangent) on the robot over the step in which it happened, in N s.
     """
@@ -117,6 +117,8 @@ class Run:
         Generalised velocities (m/s, rad/s).
     torque : (nt, nu) float
         Joint torques within their limits (N m).
+    stop_torque : (nt, nv) float
+        Generalised force of the joint stops on the robot (N m, or N for a slide).
     contact_point : (nt, nc, 2) float
         World position (x, z) of the contact points (m).
     contact_normal : (nt, nc, 2) float
@@ -152,6 +154,7 @@ class Run:
     position: Floats
     velocity: Floats
     torque: Floats
+    stop_torque: Floats
     contact_point: Floats
     contact_normal: Floats
     gap: Floats

@@ -89,8 +89,8 @@ def simulate(
     record_every : int
         Steps between two rows of the record.
     stop_when_fallen : bool, optional
-        End the run when the centre of mass drops below half its first height. By default true for
-        floating robots with feet.
+        End the run when the height of the centre of mass above the ground drops below half of what
+        it was at first. By default true for floating robots with several feet.
     progress : callable, optional
         Called now and then with the simulated time.
 
@@ -121,8 +121,9 @@ def simulate(
     if record_every < 1:
         raise SimulationError(f"record_every must be at least 1, got {record_every}")
     if stop_when_fallen is None:
-        stop_when_fallen = robot.floating and bool(robot.feet)
-    height = float(center_of_mass(robot, state.q)[1]) - float(ground.height(state.q[0]))
+        stop_when_fallen = robot.floating and len(robot.feet) > 1
+    x, z = center_of_mass(robot, state.q)
+    height = z - float(ground.height(x))
     loop = _Loop(
         robot=robot,
         ground=ground,
@@ -195,7 +196,9 @@ class _Loop:
 
     def _new_record(self) -> None:
         rows = min(CHUNK, self.engine.rows_left + 2)
-        self.records.append(allocate_record(self.robot, rows, max(256, 8 * self.robot.nc)))
+        self.records.append(
+            allocate_record(self.robot, rows, max(256, 8 * (self.robot.nc + self.robot.nv)))
+        )
 
     def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
         if controller is None:
@@ -312,6 +315,7 @@ class _Loop:
             position=rows.q,
             velocity=rows.v,
             torque=rows.torque,
+            stop_torque=rows.stop_torque,
             contact_point=rows.point,
             contact_normal=rows.normal,
             gap=rows.gap,

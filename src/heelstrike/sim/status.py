@@ -17,12 +17,35 @@ class RunStatus(enum.Enum):
 
 
 class EventKind(enum.IntEnum):
-    """What happened at a contact point."""
+    """What happened at a contact point.
+
+    ``TOUCHDOWN`` and ``LIFTOFF``
+        It met the ground, with the impulse that took; it left the ground.
+    ``SLIP``, ``STICK``, ``SLIP_REVERSAL``
+        It began to slide; it came to rest; it slides the other way.
+    ``IMPACT``
+        It was on the ground and received an impulse from an impact elsewhere.
+    ``ZENO``
+        Its ever smaller bounces have come to an end, and it stays on the ground.
+    ``PAINLEVE``
+        No contact force, or several, agreed with the laws of motion and friction. With an impulse:
+        the velocity jumped without a collision. Without: one of the solutions was chosen.
+    ``ENERGY_GAIN``
+        Newton's restitution with friction made energy in an impact (Kane's paradox).
+    ``JOINT_STOP``
+        A joint reached the end of its range; the event's `contact` is the index of the joint.
+    """
 
     TOUCHDOWN = 0
     LIFTOFF = 1
     SLIP = 2
     STICK = 3
+    SLIP_REVERSAL = 4
+    IMPACT = 5
+    ZENO = 6
+    PAINLEVE = 7
+    ENERGY_GAIN = 8
+    JOINT_STOP = 9
 
 
 class Scheme(enum.IntEnum):

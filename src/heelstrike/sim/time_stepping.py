@@ -25,8 +25,9 @@ import numpy as np
 from numba import types
 
 from heelstrike.compilation import compiled_for, inner_kernel, type_of
-from heelstrike.contact.ground import Ground, GroundModel
+from heelstrike.contact.ground import Ground, GroundModel, ground_height
 from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -82,12 +83,15 @@ TOUCHDOWN = int(EventKind.TOUCHDOWN)
 LIFTOFF = int(EventKind.LIFTOFF)
 SLIP = int(EventKind.SLIP)
 STICK = int(EventKind.STICK)
+JOINT_STOP = int(EventKind.JOINT_STOP)
 
 # A contact point enters the problem when it could close within a step at this speed (m/s) or at
 # twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
 # costs time but never changes the answer.
 CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
+# The same for joint stops (rad/s or m/s).
+CLOSING_RATE = 20.0
 # A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
 LIFTOFF_GAP = 1e-7
 SLIP_SPEED = 1e-6
@@ -232,12 +236,56 @@ def select_candidates(
 
 
 @inner_kernel
+def select_stops(
+    model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
+) -> int:
+    """Append the joint stops that could act in this step: contacts without friction.
+
+    A stop has a normal row ±1 at its joint and a tangent row of zeros.
+    """
+    points = model.contact_link.shape[0]
+    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    for joint in range(model.parent.shape[0]):
+        for end in range(2):
+            sign = 1.0 - 2.0 * end
+            limit = model.upper[joint] if end == 1 else model.lower[joint]
+            gap = sign * (memory.q[joint] - limit)
+            normal = sign * memory.next_v[joint]
+            before = sign * memory.v[joint]
+            if linearised:
+                if not gap < step * max(CLOSING_RATE, -2.0 * normal):
+                    continue
+                normal += gap / step
+            elif scheme == MOREAU_JEAN:
+                if not gap + 0.5 * step * before <= activation:
+                    continue
+            elif not gap <= activation:
+                continue
+            for j in range(model.parent.shape[0]):
+                memory.jacobian[2 * count, j] = 0.0
+                memory.jacobian[2 * count + 1, j] = 0.0
+            memory.jacobian[2 * count, joint] = sign
+            memory.free[2 * count] = normal
+            memory.free[2 * count + 1] = 0.0
+            memory.problem_friction[count] = 0.0
+            pressed = sign * memory.stop_torque[joint] > 0.0
+            memory.problem_mode[count] = STICKING if pressed else 0
+            memory.candidate[count] = points + 2 * joint + end
+            count += 1
+    return count
+
+
+@inner_kernel
 def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
     count = select_candidates(model, step, scheme, activation, memory)
+    count = select_stops(model, step, scheme, activation, count, memory)
     nv = model.parent.shape[0]
+    points = model.contact_link.shape[0]
+    for j in range(nv):
+        memory.stop_torque[j] = 0.0
     contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
         contacts.force[contact, 0] = 0.0
@@ -271,6 +319,12 @@ def solve_contacts(
         memory.next_v[j] += memory.rate[j]
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= points:
+            joint = (contact - points) // 2
+            memory.stop_torque[joint] += (
+                memory.jacobian[2 * place, joint] * memory.impulse[2 * place] / step
+            )
+            continue
         contacts.force[contact, 0] = memory.impulse[2 * place] / step
         contacts.force[contact, 1] = memory.impulse[2 * place + 1] / step
         memory.slip[contact] = memory.velocity[2 * place + 1]
@@ -336,6 +390,17 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
         for place in range(first, record.event_count[0]):
             record.event_impulse[place, 0] *= step
             record.event_impulse[place, 1] *= step
+    for joint in range(model.parent.shape[0]):
+        pushed = memory.stop_torque[joint] != 0.0
+        if pushed and memory.stopped[joint] == 0:
+            place = record.event_count[0]
+            record.event_time[place] = time + step
+            record.event_kind[place] = JOINT_STOP
+            record.event_contact[place] = joint
+            record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
+            record.event_impulse[place, 1] = 0.0
+            record.event_count[0] = place + 1
+        memory.stopped[joint] = 1 if pushed else 0
 
 
 @inner_kernel
@@ -346,6 +411,7 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
     for i in range(memory.v.shape[0]):
         record.q[row, i] = memory.q[i]
         record.v[row, i] = memory.v[i]
+        record.stop_torque[row, i] = memory.stop_torque[i]
     for i in range(memory.torque.shape[0]):
         record.torque[row, i] = memory.torque[i]
     contacts = memory.contacts
@@ -362,14 +428,18 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
 
 
 @inner_kernel
-def center_height(model: Model, memory: Memory) -> float:
-    """World height of the centre of mass."""
+def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
+    """Height of the centre of mass above the ground below it."""
+    tree = memory.tree
     mass = 0.0
-    moment = 0.0
+    x = 0.0
+    z = 0.0
     for i in range(model.parent.shape[0]):
-        mass += memory.tree.inertia[i, 0]
-        moment += memory.tree.inertia[i, 2]
-    return memory.tree.pivot[1] + moment / mass
+        mass += tree.inertia[i, 0]
+        x += tree.inertia[i, 1]
+        z += tree.inertia[i, 2]
+    below = ground_height(ground, tree.pivot[0] + x / mass)
+    return tree.pivot[1] + z / mass - below
 
 
 @inner_kernel
@@ -449,7 +519,7 @@ def _advance(
             note_row(record, time, memory)
         if not solved:
             return SOLVER_FAILED
-        if center_height(model, memory) < fallen:
+        if center_height(model, ground, memory) < fallen:
             return FELL
         if k == last:
             return DONE
