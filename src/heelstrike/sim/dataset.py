@@ -12,7 +12,7 @@ import enum
 import math
 import os
 import tempfile
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,7 @@ _ROWS = {
     "position": (("coordinate",), "m or rad", "generalised positions"),
     "velocity": (("coordinate",), "m/s or rad/s", "generalised velocities"),
     "torque": (("actuator",), "N m", "joint torques within their limits"),
+    "stop_torque": (("coordinate",), "N m or N", "force of the joint stops on the robot"),
     "contact_point": (("contact", "axis"), "m", "world position of the contact points"),
     "contact_normal": (("contact", "axis"), "1", "ground normal under the contact points"),
     "gap": (("contact",), "m", "distance of the contact points to the ground"),
@@ -111,7 +112,7 @@ def to_dataset(run: Run) -> xarray.Dataset:
         "event_contact": (
             ("event",),
             np.array([event.contact for event in events], dtype=np.int64),
-            {"units": "1", "long_name": "index of the contact point of the event"},
+            {"units": "1", "long_name": "index of the contact point, or of the joint for a stop"},
         ),
         "event_impulse": (
             ("event", "component"),
@@ -285,6 +286,7 @@ def load_run(path: str | os.PathLike[str], robot: Robot | None = None) -> Run:
 
 
 def _read(source: Path, robot: Robot | None) -> Run:
+    _refuse_bombs(source)
     with contextlib.ExitStack() as stack:
         dataset = stack.enter_context(_open(source, None))
         layout = dataset.attrs.get("heelstrike_format")
@@ -296,7 +298,6 @@ def _read(source: Path, robot: Robot | None) -> Run:
                 f"{FORMAT}. Update heelstrike."
             )
         described = stack.enter_context(_open(source, ROBOT_GROUP))
-        _refuse_bombs(source, dataset, described)
         try:
             stored = robot_from_dataset(described.load())
         except (KeyError, ValueError) as error:
@@ -313,16 +314,29 @@ def _open(source: Path, group: str | None) -> xarray.Dataset:
         return xarray.open_dataset(
             source, engine="h5netcdf", group=group, decode_cf=False, cache=False
         )
-    except PermissionError as error:
-        raise RunFileError(f"{source}: no permission to read it") from error
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         what = "not a run of heelstrike, or cut short" if group is None else "it holds no robot"
         raise RunFileError(f"{source}: {what} ({error})") from error
 
 
-def _refuse_bombs(source: Path, *datasets: xarray.Dataset) -> None:
-    """Refuse a small file that claims to hold a huge run."""
-    declared = sum(math.prod(v.shape) * 8 for d in datasets for v in d.variables.values())
+def _refuse_bombs(source: Path) -> None:
+    """Refuse a small file that claims to hold a huge run, before any of it is read."""
+    import h5py  # type: ignore[import-untyped]
+
+    declared = 0
+
+    def count(_: str, item: Any) -> None:
+        nonlocal declared
+        if isinstance(item, h5py.Dataset) and item.shape is not None:
+            declared += math.prod(item.shape) * item.dtype.itemsize
+
+    try:
+        with h5py.File(source, "r") as file:
+            file.visititems(count)
+    except PermissionError as error:
+        raise RunFileError(f"{source}: no permission to read it") from error
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise RunFileError(f"{source}: not a run of heelstrike, or cut short ({error})") from error
     # zlib shrinks a thousandfold at best.
     if declared > 1100 * source.stat().st_size + 2**20:
         raise RunFileError(
@@ -350,7 +364,7 @@ def _run(source: Path, dataset: xarray.Dataset, robot: Robot) -> Run:
         "contact": robot.nc,
         **{name: len(labels) for name, labels in _LABELS.items()},
     }
-    arrays = {
+    arrays: dict[str, Any] = {
         name: _numbers(source, dataset, name, (rows, *(sizes[dim] for dim in dims)))
         for name, (dims, _, _) in _ROWS.items()
     }
@@ -402,8 +416,12 @@ def _events(source: Path, dataset: xarray.Dataset, robot: Robot) -> tuple[Event,
         _numbers(source, dataset, name, (count,)).tolist() for name in _EVENTS[:3]
     )
     impulse = _numbers(source, dataset, "event_impulse", (count, 2)).tolist()
-    if any(not 0 <= c < robot.nc for c in contact):
-        raise RunFileError(f"{source}: damaged, an event names a contact point that is not there")
+    for k, c in zip(kind, contact, strict=True):
+        where, count = (
+            ("joint", robot.nv) if k == EventKind.JOINT_STOP else ("contact point", robot.nc)
+        )
+        if not 0 <= c < count:
+            raise RunFileError(f"{source}: damaged, an event names a {where} that is not there")
     return tuple(
         Event(time=t, kind=EventKind(int(k)), contact=int(c), impulse=(p[0], p[1]))
         for t, k, c, p in zip(time, kind, contact, impulse, strict=True)
@@ -467,6 +485,8 @@ class _Attributes:
         for field in fields(kind):
             name = f"{prefix}_{field.name}"
             default = field.default
+            if name not in self.values and default is not MISSING:
+                continue  # a setting that did not exist when the file was written
             if isinstance(default, enum.Enum):
                 members = {member.name.lower(): member for member in type(default)}
                 values[field.name] = self.member(name, members)
