@@ -25,7 +25,7 @@ import numpy as np
 from numba import types
 
 from heelstrike.compilation import compiled_for, inner_kernel, type_of
-from heelstrike.contact.ground import Ground, GroundModel, ground_height
+from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
@@ -59,31 +59,22 @@ from heelstrike.sim.engine import (
     solver_order,
     whole_steps,
 )
-from heelstrike.sim.memory import (
-    BAD_TORQUE,
-    COMPLEMENTARITY,
-    CONE,
-    NON_PENETRATION,
-    PENETRATION,
-    SATURATIONS,
-    STEPS,
-    Memory,
-    Record,
-    allocate_memory,
-    allocate_record,
+from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
+from heelstrike.sim.recording import (
+    center_height,
+    limit_torque,
+    note_events,
+    note_extremes,
+    note_row,
+    sound,
 )
-from heelstrike.sim.status import EventKind, Scheme
+from heelstrike.sim.status import Scheme
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
 PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
 PAPER_SYMPLECTIC = int(Scheme.PAPER_SYMPLECTIC)
 MOREAU_JEAN = int(Scheme.MOREAU_JEAN)
 LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
-TOUCHDOWN = int(EventKind.TOUCHDOWN)
-LIFTOFF = int(EventKind.LIFTOFF)
-SLIP = int(EventKind.SLIP)
-STICK = int(EventKind.STICK)
-JOINT_STOP = int(EventKind.JOINT_STOP)
 
 # A contact point enters the problem when it could close within a step at this speed (m/s) or at
 # twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
@@ -92,10 +83,6 @@ CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
 # The same for joint stops (rad/s or m/s).
 CLOSING_RATE = 20.0
-# A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
-LIFTOFF_GAP = 1e-7
-SLIP_SPEED = 1e-6
-INFINITY = float("inf")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,23 +142,6 @@ class TimeStepping:
             If the ground has restitution and the scheme knows plastic impacts only.
         """
         return _TimeSteppingEngine(self, setting)
-
-
-@inner_kernel
-def limit_torque(model: Model, memory: Memory) -> bool:
-    """Clip the torques to their limits; return whether all were finite."""
-    for i in range(model.actuator_joint.shape[0]):
-        wanted = memory.torque[i]
-        if not abs(wanted) < INFINITY:
-            memory.tally[BAD_TORQUE] = i
-            return False
-        if wanted > model.torque_upper[i]:
-            memory.torque[i] = model.torque_upper[i]
-            memory.tally[SATURATIONS] += 1
-        elif wanted < model.torque_lower[i]:
-            memory.torque[i] = model.torque_lower[i]
-            memory.tally[SATURATIONS] += 1
-    return True
 
 
 @inner_kernel
@@ -330,125 +300,6 @@ def solve_contacts(
         memory.slip[contact] = memory.velocity[2 * place + 1]
         memory.mode[contact] = memory.problem_mode[place]
     return status == SOLVED
-
-
-@inner_kernel
-def note_extremes(model: Model, memory: Memory) -> None:
-    """Keep the worst penetration and residuals of the run."""
-    extreme = memory.extreme
-    for contact in range(model.contact_link.shape[0]):
-        extreme[PENETRATION] = max(extreme[PENETRATION], -memory.contacts.gap[contact])
-    extreme[COMPLEMENTARITY] = max(extreme[COMPLEMENTARITY], memory.residual[0])
-    extreme[CONE] = max(extreme[CONE], memory.residual[1])
-    extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], memory.residual[2])
-
-
-@inner_kernel
-def note_event(record: Record, time: float, kind: int, contact: int, memory: Memory) -> None:
-    """Append an event; its impulse is that of the step it happened in."""
-    place = record.event_count[0]
-    record.event_time[place] = time
-    record.event_kind[place] = kind
-    record.event_contact[place] = contact
-    record.event_impulse[place, 0] = memory.contacts.force[contact, 0]
-    record.event_impulse[place, 1] = memory.contacts.force[contact, 1]
-    record.event_count[0] = place + 1
-
-
-@inner_kernel
-def note_events(model: Model, record: Record, time: float, step: float, memory: Memory) -> None:
-    """Find touchdowns, lift-offs and changes between stick and slip of this step.
-
-    An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
-    Points that already stand on the ground when the run begins do not touch down.
-    """
-    for contact in range(model.contact_link.shape[0]):
-        pushed = memory.contacts.force[contact, 0] > 0.0
-        first = record.event_count[0]
-        if memory.closed[contact] == 0 and pushed:
-            memory.closed[contact] = 1
-            memory.slipping[contact] = 0
-            stood = memory.tally[STEPS] == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
-            if not stood:
-                note_event(record, time + step, TOUCHDOWN, contact, memory)
-        elif (
-            memory.closed[contact] == 1
-            and not pushed
-            and memory.contacts.gap[contact] > LIFTOFF_GAP
-        ):
-            memory.closed[contact] = 0
-            memory.slipping[contact] = 0
-            note_event(record, time, LIFTOFF, contact, memory)
-        if memory.closed[contact] == 1 and pushed:
-            slips = abs(memory.slip[contact]) > SLIP_SPEED
-            if slips and memory.slipping[contact] == 0:
-                memory.slipping[contact] = 1
-                note_event(record, time + step, SLIP, contact, memory)
-            elif not slips and memory.slipping[contact] == 1:
-                memory.slipping[contact] = 0
-                note_event(record, time + step, STICK, contact, memory)
-        for place in range(first, record.event_count[0]):
-            record.event_impulse[place, 0] *= step
-            record.event_impulse[place, 1] *= step
-    for joint in range(model.parent.shape[0]):
-        pushed = memory.stop_torque[joint] != 0.0
-        if pushed and memory.stopped[joint] == 0:
-            place = record.event_count[0]
-            record.event_time[place] = time + step
-            record.event_kind[place] = JOINT_STOP
-            record.event_contact[place] = joint
-            record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
-            record.event_impulse[place, 1] = 0.0
-            record.event_count[0] = place + 1
-        memory.stopped[joint] = 1 if pushed else 0
-
-
-@inner_kernel
-def note_row(record: Record, time: float, memory: Memory) -> None:
-    """Append the state now and what acts on it to the record."""
-    row = record.row_count[0]
-    record.time[row] = time
-    for i in range(memory.v.shape[0]):
-        record.q[row, i] = memory.q[i]
-        record.v[row, i] = memory.v[i]
-        record.stop_torque[row, i] = memory.stop_torque[i]
-    for i in range(memory.torque.shape[0]):
-        record.torque[row, i] = memory.torque[i]
-    contacts = memory.contacts
-    for i in range(memory.slip.shape[0]):
-        for k in range(2):
-            record.point[row, i, k] = contacts.position[i, k]
-            record.normal[row, i, k] = contacts.normal[i, k]
-            record.force[row, i, k] = contacts.force[i, k]
-        record.gap[row, i] = contacts.gap[i]
-        record.slip[row, i] = memory.slip[i]
-    for k in range(3):
-        record.residual[row, k] = memory.residual[k]
-    record.row_count[0] = row + 1
-
-
-@inner_kernel
-def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
-    """Height of the centre of mass above the ground below it."""
-    tree = memory.tree
-    mass = 0.0
-    x = 0.0
-    z = 0.0
-    for i in range(model.parent.shape[0]):
-        mass += tree.inertia[i, 0]
-        x += tree.inertia[i, 1]
-        z += tree.inertia[i, 2]
-    below = ground_height(ground, tree.pivot[0] + x / mass)
-    return tree.pivot[1] + z / mass - below
-
-
-@inner_kernel
-def sound(memory: Memory) -> bool:
-    """Whether the state is finite and not absurd."""
-    for i in range(memory.v.shape[0]):
-        if not (abs(memory.q[i]) < 1e9 and abs(memory.v[i]) < 1e6):
-            return False
-    return True
 
 
 def _advance(
