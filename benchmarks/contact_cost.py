@@ -1,0 +1,129 @@
+"""What one contact solve costs, compiled, with both feet of bravo7 flat on the ground.
+
+Four vertices, eight rows, rank six. The free velocities are those of 200 postures and joint
+velocities around standing, under gravity and small random torques for one millisecond; cold
+solves go through Lemke, warm ones are given the modes of the solution before.
+
+Run: python benchmarks/contact_cost.py
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from typing import Any
+
+import numpy as np
+
+from heelstrike import load_robot
+from heelstrike.compilation import kernel
+from heelstrike.contact.modes import OPEN, Solver
+from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.workspace import SHORTCUTS, contact_workspace
+from heelstrike.dynamics.queries import bias_force, mass_matrix, point_jacobian
+
+
+@kernel
+def solve_many(
+    repeats: int,
+    count: int,
+    delassus: Any,
+    free: Any,
+    friction: Any,
+    order: Any,
+    first: Any,
+    mode: Any,
+    impulse: Any,
+    velocity: Any,
+    residual: Any,
+    work: Any,
+) -> int:
+    """Solve one problem ``repeats`` times from the same first modes; return the failures."""
+    failures = 0
+    for _ in range(repeats):
+        for i in range(count):
+            mode[i] = first[i]
+        failures += (
+            solve_contact_kernel(
+                count, delassus, free, friction, order, mode, impulse, velocity, residual, work
+            )
+            != 0
+        )
+    return failures
+
+
+def standing_problems(number: int) -> list[tuple[Any, Any]]:
+    """Return Delassus matrices and free velocities of bravo7 on both feet, vertical legs."""
+    robot = load_robot("bravo7")
+    rng = np.random.default_rng(0)
+    state = robot.reference_state()
+    problems = []
+    for _ in range(number):
+        q = state.q
+        v = 1e-3 * rng.standard_normal(robot.nv)
+        M = mass_matrix(robot, q)
+        J = np.concatenate(
+            [
+                point_jacobian(robot, q, link, local)[[1, 0]]  # z is the normal, x the tangent
+                for link, local in zip(
+                    robot.model.contact_link, robot.model.contact_position, strict=True
+                )
+            ]
+        )
+        torque = rng.uniform(-5.0, 5.0, robot.nv)
+        torque[:3] = 0.0
+        free = J @ (v + 1e-3 * np.linalg.solve(M, torque - bias_force(robot, q, v)))
+        problems.append((J @ np.linalg.solve(M, J.T), free))
+    return problems
+
+
+def measure(number: int = 200, repeats: int = 200) -> dict[str, dict[str, float]]:
+    """Return median and 99th percentile of the time per solve, in microseconds."""
+    problems = standing_problems(number)
+    count = problems[0][1].size // 2
+    friction = np.full(count, 0.75)
+    work = contact_workspace(count)
+    impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
+    mode = np.zeros(count, np.int64)
+    cold = np.full(count, OPEN, np.int64)
+    figures: dict[str, dict[str, float]] = {}
+    for name in ("lemke", "fischer_burmeister", "gauss_seidel", "warm"):
+        order = np.array([Solver("lemke" if name == "warm" else name).code], np.int64)
+        times = []
+        shortcuts = 0
+        for delassus, free in problems:
+            arguments = (count, delassus, free, friction, order)
+            solve_contact_kernel(*arguments, mode, impulse, velocity, residual, work)
+            first = mode.copy() if name == "warm" else cold
+            rest = (first, mode, impulse, velocity, residual, work)
+            if solve_many(1, *arguments, *rest) != 0:
+                raise RuntimeError(f"{name} failed on a standing problem: {residual}")
+            work.counters[SHORTCUTS] = 0
+            begin = time.perf_counter()
+            solve_many(repeats, *arguments, *rest)
+            times.append((time.perf_counter() - begin) / repeats * 1e6)
+            shortcuts += int(work.counters[SHORTCUTS])
+        figures[name] = {
+            "median_us": float(np.median(times)),
+            "p99_us": float(np.percentile(times, 99)),
+            "warm_share": shortcuts / (number * repeats),
+        }
+    return figures
+
+
+def main() -> None:
+    """Print the figures as a table, or as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    figures = measure()
+    if parser.parse_args().json:
+        print(json.dumps(figures, indent=2))
+        return
+    print("both feet flat, 4 vertices, µs per solve")
+    for name, row in figures.items():
+        print(f"{name:20s} median {row['median_us']:7.2f}   99 % {row['p99_us']:7.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,97 @@
+"""The closed sets of the contact problem: contact modes, solvers, and how a solve can end.
+
+Kernels use the plain integers; people use the enums, whose members have the same values.
+"""
+
+from __future__ import annotations
+
+import enum
+
+OPEN = 0
+STICK = 1
+SLIP_FORWARD = 2
+SLIP_BACKWARD = 3
+SLIDING_FORWARD = 4
+SLIDING_BACKWARD = 5
+
+LEMKE = 0
+FISCHER_BURMEISTER = 1
+GAUSS_SEIDEL = 2
+WARM_START = 3
+
+SOLVED = 0
+RAY = 1
+ITERATION_LIMIT = 2
+UNCERTIFIED = 3
+
+
+class ContactMode(enum.IntEnum):
+    """What a contact does, told by the velocity after the solve.
+
+    ``OPEN`` separates; ``STICK`` touches without slipping; ``SLIP_FORWARD`` touches and slips
+    along the positive tangent, ``SLIP_BACKWARD`` along the negative one.
+
+    The two ``SLIDING`` modes are not found but prescribed, by a caller that solves for
+    accelerations: the contact already slides with a velocity that is not zero, so its friction
+    stays on that edge of the cone whatever the tangential acceleration.
+    """
+
+    OPEN = OPEN
+    STICK = STICK
+    SLIP_FORWARD = SLIP_FORWARD
+    SLIP_BACKWARD = SLIP_BACKWARD
+    SLIDING_FORWARD = SLIDING_FORWARD
+    SLIDING_BACKWARD = SLIDING_BACKWARD
+
+
+class Solver(enum.Enum):
+    """The ways to solve a contact problem; the values are the names that options accept."""
+
+    LEMKE = "lemke"
+    FISCHER_BURMEISTER = "fischer_burmeister"
+    GAUSS_SEIDEL = "gauss_seidel"
+    WARM_START = "warm_start"
+
+    @property
+    def code(self) -> int:
+        """Return the integer by which kernels know this solver."""
+        return _SOLVER_CODES[self]
+
+    @classmethod
+    def from_code(cls, code: int) -> Solver:
+        """Return the solver that kernels know by this integer."""
+        return _SOLVERS_BY_CODE[int(code)]
+
+
+_SOLVER_CODES = {
+    Solver.LEMKE: LEMKE,
+    Solver.FISCHER_BURMEISTER: FISCHER_BURMEISTER,
+    Solver.GAUSS_SEIDEL: GAUSS_SEIDEL,
+    Solver.WARM_START: WARM_START,
+}
+_SOLVERS_BY_CODE = {code: solver for solver, code in _SOLVER_CODES.items()}
+
+
+class SolveStatus(enum.IntEnum):
+    """How a solve ended."""
+
+    SOLVED = SOLVED
+    RAY = RAY
+    ITERATION_LIMIT = ITERATION_LIMIT
+    UNCERTIFIED = UNCERTIFIED
+
+    @property
+    def text(self) -> str:
+        """Return the status in a person's words."""
+        return _STATUS_TEXTS[self]
+
+
+_STATUS_TEXTS = {
+    SolveStatus.SOLVED: "solved, and the residuals confirm it",
+    SolveStatus.RAY: (
+        "no solution exists along this ray: the pivots left the feasible set without a solution; "
+        "the contacts are probably asked for velocities that no impulse can give"
+    ),
+    SolveStatus.ITERATION_LIMIT: "the iteration limit was reached before a solution",
+    SolveStatus.UNCERTIFIED: "the solver stopped, but the residuals do not confirm its answer",
+}

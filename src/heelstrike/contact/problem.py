@@ -1,0 +1,414 @@
+"""The contact problem and its one entry: certified, with fallbacks.
+
+Given the Delassus matrix G, the free term b and a friction coefficient per contact, find the
+impulse with ``w = G lambda + b`` and, at every contact, ``0 <= w_n _|_ lambda_n >= 0`` and
+``|lambda_t| <= mu lambda_n`` opposing ``w_t`` as far as it can.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.compilation import inner_kernel, kernel
+from heelstrike.contact.active_set import REST_TOLERANCE, evaluate, label
+from heelstrike.contact.certificate import Certificate
+from heelstrike.contact.fischer_burmeister import fischer_burmeister
+from heelstrike.contact.gauss_seidel import gauss_seidel
+from heelstrike.contact.lemke import PATHS, lemke
+from heelstrike.contact.modes import (
+    FISCHER_BURMEISTER,
+    LEMKE,
+    OPEN,
+    RAY,
+    SOLVED,
+    UNCERTIFIED,
+    WARM_START,
+    ContactMode,
+    Solver,
+    SolveStatus,
+)
+from heelstrike.contact.reduction import reduce_problem
+from heelstrike.contact.workspace import (
+    FAILURES,
+    FALLBACKS,
+    IMPULSE,
+    ITERATE,
+    ITERATIONS,
+    LAST_FALLBACKS,
+    PRESCRIBED,
+    RESIDUAL,
+    SHORTCUTS,
+    SKEWED,
+    SOLVES,
+    SUCCEEDED,
+    TOLERANCE,
+    TRIAL_MODE,
+    VELOCITY,
+    ContactWorkspace,
+    Floats,
+    Integers,
+    contact_workspace,
+)
+from heelstrike.errors import ContactProblemError
+
+CLEAN = 1e-11
+"""Modes with smaller residuals are taken at once; others may be nearly right, and better follow."""
+
+
+@inner_kernel
+def keep(
+    count: int,
+    mode: Integers,
+    impulse: Floats,
+    velocity: Floats,
+    residual: Floats,
+    work: ContactWorkspace,
+) -> None:
+    """Copy the trial in the workspace to the caller's arrays."""
+    for i in range(2 * count):
+        impulse[i] = work.vectors[IMPULSE, i]
+        velocity[i] = work.vectors[VELOCITY, i]
+    for i in range(3):
+        residual[i] = work.vectors[RESIDUAL, i]
+    for contact in range(count):
+        mode[contact] = work.labels[TRIAL_MODE, contact]
+
+
+@kernel
+def solve_contact_kernel(
+    count: int,
+    delassus: Floats,
+    free: Floats,
+    friction: Floats,
+    order: Integers,
+    mode: Integers,
+    impulse: Floats,
+    velocity: Floats,
+    residual: Floats,
+    work: ContactWorkspace,
+) -> int:
+    """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
+
+    The modes in ``mode`` are tried first. Unless their certificate is clean, the solvers in
+    ``order`` are called in turn until one is certified.
+
+    Parameters
+    ----------
+    count : int
+        Number of contacts; the leading blocks of the arrays are used.
+    delassus : (2 count, 2 count) float64
+        Delassus matrix, symmetric, components ordered n0 t0 n1 t1 ...
+    free : (2 count,) float64
+        Free velocity (or acceleration), the free term b.
+    friction : (count,) float64
+        Friction coefficient of each contact; zero for a joint stop.
+    order : (any,) int64
+        Solver codes to try in turn (:class:`~heelstrike.contact.modes.Solver`).
+    mode : (count,) int64
+        In: guessed modes (``SLIDING_FORWARD`` and ``SLIDING_BACKWARD`` are prescriptions, not
+        guesses). Out: the modes found, told by the velocity; a contact prescribed to slide keeps
+        its mode or becomes ``OPEN``.
+    impulse, velocity : (2 count,) float64
+        Out: the solution, or after a failure the candidate with the smallest residuals; always
+        finite if the data are.
+    residual : (3,) float64
+        Out: complementarity, cone and penetration, relative (see ``Certificate``).
+    work : ContactWorkspace
+        Buffers; ``counters`` is updated, ``settings`` is read.
+    """
+    counters, labels, vectors = work.counters, work.labels, work.vectors
+    tolerance = work.settings[TOLERANCE]
+    counters[SOLVES] += 1
+    counters[ITERATIONS] = 0
+    counters[LAST_FALLBACKS] = 0
+    counters[SUCCEEDED] = WARM_START
+    for contact in range(count):
+        labels[TRIAL_MODE, contact] = mode[contact]
+    for i in range(2 * count):
+        impulse[i] = 0.0
+        velocity[i] = free[i]
+    for i in range(3):
+        residual[i] = math.inf
+    unknowns = reduce_problem(count, delassus, free, friction, mode, work)
+    for i in range(unknowns):
+        vectors[ITERATE, i] = 0.0
+
+    clean = min(tolerance, CLEAN)
+    status = UNCERTIFIED
+    best = math.inf
+    for attempt in range(-1, order.shape[0]):
+        outcome = UNCERTIFIED
+        if attempt >= 0:
+            counters[SUCCEEDED] = order[attempt]
+            if attempt > 0:
+                counters[FALLBACKS] += 1
+                counters[LAST_FALLBACKS] += 1
+        call = count - count
+        proposing = True
+        while proposing:
+            if attempt < 0:
+                proposing = False
+            elif order[attempt] == LEMKE:
+                outcome = lemke(count, unknowns, call, work)
+                proposing = call + 1 < PATHS
+            elif order[attempt] == FISCHER_BURMEISTER:
+                outcome = fischer_burmeister(count, unknowns, call, work)
+                proposing = outcome == SOLVED
+            else:
+                outcome = gauss_seidel(count, unknowns, call, work)
+                proposing = outcome == SOLVED
+            call += 1
+            worst = evaluate(count, delassus, free, friction, work)
+            if worst < best:
+                best = worst
+                keep(count, mode, impulse, velocity, residual, work)
+            if worst <= clean:
+                break
+        if outcome == SOLVED or best <= clean:
+            outcome = UNCERTIFIED
+        if best <= (tolerance if attempt >= 0 else clean):
+            outcome = SOLVED
+        if outcome == SOLVED:
+            status = SOLVED
+            break
+        if attempt == 0 or outcome == RAY:
+            status = outcome
+    if attempt < 0:
+        counters[SHORTCUTS] += 1
+    if status != SOLVED:
+        counters[FAILURES] += 1
+
+    # The same answer whichever solver found it: contacts at rest are released to carry any
+    # impulse in their cone, so that the split is of least norm among all.
+    released = label(count, delassus, free, impulse, velocity, mode, work)
+    for _ in range(3):
+        if not released or status != SOLVED:
+            break
+        for contact in range(count):
+            labels[TRIAL_MODE, contact] = mode[contact]
+        worst = evaluate(count, delassus, free, friction, work)
+        if worst > min(tolerance, max(best, 2.0 * REST_TOLERANCE)):
+            break
+        keep(count, mode, impulse, velocity, residual, work)
+        released = label(count, delassus, free, impulse, velocity, mode, work)
+    for contact in range(count):
+        if labels[PRESCRIBED, contact] != OPEN and mode[contact] != OPEN:
+            mode[contact] = labels[PRESCRIBED, contact]
+    return status
+
+
+@dataclass(frozen=True)
+class ContactSolution:
+    """The solution of a contact problem, with the proof of what it is worth.
+
+    Attributes
+    ----------
+    impulse : (nc, 2) float
+        Normal and tangential impulse (or force) on the robot at each contact; where several
+        have the same effect, the one of least norm.
+    velocity : (nc, 2) float
+        Normal and tangential velocity (or acceleration) after it, ``G @ impulse + free``.
+    mode : tuple of ContactMode
+        What each contact does.
+    certificate : Certificate
+        Status and residuals; look at ``certificate.valid`` before using the impulse.
+    """
+
+    impulse: Floats
+    velocity: Floats
+    mode: tuple[ContactMode, ...]
+    certificate: Certificate
+
+
+DEFAULT_ORDER = (Solver.LEMKE, Solver.FISCHER_BURMEISTER, Solver.GAUSS_SEIDEL)
+"""The order in which solvers are tried; a chosen solver moves to the front."""
+
+
+def solver_order(solver: str | Solver, *, fallback: bool = True) -> Integers:
+    """Return the codes of the solvers to try: the one asked for, then the others in order.
+
+    Raises
+    ------
+    ContactProblemError
+        If the solver's name is not known.
+    """
+    first = _solver(solver)
+    others = tuple(other for other in DEFAULT_ORDER if other is not first) if fallback else ()
+    return np.array([choice.code for choice in (first, *others)], np.int64)
+
+
+def solve_contact(
+    delassus: ArrayLike,
+    free: ArrayLike,
+    friction: ArrayLike,
+    *,
+    solver: str | Solver = Solver.LEMKE,
+    tolerance: float = 1e-9,
+    fallback: bool = True,
+) -> ContactSolution:
+    """Solve a contact problem with Coulomb friction in the plane.
+
+    Find the impulse ``lambda`` with ``w = G lambda + b`` and, at every contact,
+    ``0 <= w_n _|_ lambda_n >= 0`` and ``|lambda_t| <= mu lambda_n`` opposing ``w_t`` as far as
+    it can (the paper's eq. 15-16, 20-21 and 24-25).
+
+    Parameters
+    ----------
+    delassus : (nc * 2, nc * 2) array_like
+        ``G = J M^-1 J^T``, symmetric and positive semidefinite, often singular; components
+        ordered n0 t0 n1 t1 ...; [1/kg] for points.
+    free : (nc * 2,) or (nc, 2) array_like
+        Velocity without contact impulses [m/s], or acceleration [m/s^2].
+    friction : (nc,) array_like or float
+        Friction coefficient of each contact, zero for none.
+    solver : {"lemke", "fischer_burmeister", "gauss_seidel"}
+        The solver to try first.
+    tolerance : float
+        Largest relative residual that is accepted, see :class:`Certificate`.
+    fallback : bool
+        Whether the other solvers are tried, in the order Lemke, Fischer-Burmeister,
+        Gauss-Seidel, when the first fails.
+
+    Returns
+    -------
+    ContactSolution
+        With a certificate that says whether, and how well, the problem is solved. A failed
+        solve returns the candidate with the smallest residuals and a status other than
+        ``SOLVED``; it does not raise.
+
+    Raises
+    ------
+    ContactProblemError
+        If the data are malformed: shapes, NaN, negative friction, an asymmetric matrix, an
+        unknown solver.
+
+    Examples
+    --------
+    A block of 2 kg, falling at 1 m/s and sliding at 0.2 m/s, meets ground with friction 0.5:
+
+    >>> solution = solve_contact([[0.5, 0.0], [0.0, 0.5]], [-1.0, 0.2], 0.5)
+    >>> solution.impulse
+    array([[ 2. , -0.4]])
+    >>> solution.mode[0].name, solution.certificate.valid
+    ('STICK', True)
+    """
+    matrix, offset, coefficient = _checked(delassus, free, friction)
+    count = coefficient.size
+    if not tolerance > 0.0:
+        raise ContactProblemError(f"tolerance must be positive; got {tolerance}")
+    order = solver_order(solver, fallback=fallback)
+    mode = np.full(count, OPEN, np.int64)
+    impulse, velocity, certificate = run_solvers(
+        matrix, offset, coefficient, order, mode, tolerance=tolerance
+    )
+    return ContactSolution(
+        impulse=impulse.reshape(count, 2),
+        velocity=velocity.reshape(count, 2),
+        mode=tuple(ContactMode(value) for value in mode),
+        certificate=certificate,
+    )
+
+
+def run_solvers(
+    delassus: Floats,
+    free: Floats,
+    friction: Floats,
+    order: Integers,
+    mode: Integers,
+    *,
+    tolerance: float,
+    symmetric: bool = True,
+) -> tuple[Floats, Floats, Certificate]:
+    """Call the kernel on checked data with fresh memory; return impulse, velocity, certificate."""
+    count = friction.size
+    work = contact_workspace(count)
+    work.settings[TOLERANCE] = tolerance
+    work.settings[SKEWED] = 0.0 if symmetric else 1.0
+    impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
+    status = solve_contact_kernel(
+        count, delassus, free, friction, order, mode, impulse, velocity, residual, work
+    )
+    certificate = Certificate(
+        status=SolveStatus(status),
+        solver=Solver.from_code(work.counters[SUCCEEDED]),
+        iterations=int(work.counters[ITERATIONS]),
+        fallbacks=int(work.counters[LAST_FALLBACKS]),
+        complementarity=float(residual[0]),
+        cone=float(residual[1]),
+        penetration=float(residual[2]),
+        tolerance=float(tolerance),
+    )
+    return impulse, velocity, certificate
+
+
+def _solver(solver: str | Solver) -> Solver:
+    choices = ", ".join(choice.value for choice in DEFAULT_ORDER)
+    try:
+        choice = Solver(solver)
+    except ValueError:
+        choice = Solver.WARM_START
+    if choice is Solver.WARM_START:
+        raise ContactProblemError(f"unknown contact solver {solver!r}; choose one of: {choices}")
+    return choice
+
+
+def _checked(
+    delassus: ArrayLike, free: ArrayLike, friction: ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    try:
+        matrix = np.array(delassus, dtype=np.float64, order="C")
+        offset = np.array(free, dtype=np.float64, order="C").reshape(-1)
+        coefficient = np.array(friction, dtype=np.float64, order="C")
+    except (TypeError, ValueError) as error:
+        raise ContactProblemError(
+            f"delassus, free and friction must be arrays of real numbers: {error}"
+        ) from error
+    if offset.size % 2:
+        raise ContactProblemError(
+            f"free has {offset.size} entries, but every contact needs two (normal, tangent)"
+        )
+    count = offset.size // 2
+    if matrix.shape != (2 * count, 2 * count) and not (count == 0 and matrix.size == 0):
+        raise ContactProblemError(
+            f"delassus has shape {matrix.shape}, but free has {count} contacts, which needs "
+            f"({2 * count}, {2 * count})"
+        )
+    if coefficient.ndim == 0:
+        coefficient = np.full(count, float(coefficient))
+    if coefficient.shape != (count,):
+        raise ContactProblemError(
+            f"friction has shape {coefficient.shape}; give one number, or one for each of the "
+            f"{count} contacts"
+        )
+    for name, values in (("delassus", matrix), ("free", offset), ("friction", coefficient)):
+        if not np.all(np.isfinite(values)):
+            where = np.argwhere(~np.isfinite(values))[0]
+            raise ContactProblemError(
+                f"{name}{where.tolist()} is {values[tuple(where)]}; all entries must be finite"
+            )
+    if np.any(coefficient < 0.0):
+        contact = int(np.argmin(coefficient))
+        raise ContactProblemError(
+            f"friction[{contact}] is {coefficient[contact]}; a friction coefficient cannot be "
+            "negative"
+        )
+    diagonal = np.diag(matrix)
+    if np.any(diagonal < 0.0):
+        row = int(np.argmin(diagonal))
+        raise ContactProblemError(
+            f"delassus[{row}, {row}] is {diagonal[row]}; J M^-1 J^T cannot have a negative "
+            "diagonal entry"
+        )
+    bound = np.sqrt(np.outer(diagonal, diagonal))
+    asymmetry = np.abs(matrix - matrix.T) > 1e-8 * bound + np.finfo(float).tiny
+    if np.any(asymmetry):
+        row, column = (int(index) for index in np.argwhere(asymmetry)[0])
+        raise ContactProblemError(
+            f"delassus is not symmetric: entry [{row}, {column}] is {matrix[row, column]}, but "
+            f"[{column}, {row}] is {matrix[column, row]}"
+        )
+    return matrix, offset, coefficient

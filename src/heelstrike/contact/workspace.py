@@ -1,0 +1,108 @@
+"""The memory of the contact solvers, allocated once and reused by every solve."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# Places in ``ContactWorkspace.counters``. The first three describe the last solve, the others
+# accumulate over all solves until the caller clears them.
+ITERATIONS = 0
+SUCCEEDED = 1
+LAST_FALLBACKS = 2
+SOLVES = 3
+FALLBACKS = 4
+FAILURES = 5
+SHORTCUTS = 6
+COUNTERS = 8
+
+# Places in ``ContactWorkspace.settings``.
+TOLERANCE = 0
+SKEWED = 1
+SETTINGS = 2
+
+# Rows of ``ContactWorkspace.labels``, by what they are indexed with.
+NORMAL = 0  # contact: its normal unknown
+TANGENT = 1  # contact: its tangential unknown, -1 for none
+PRESCRIBED = 2  # contact: the mode the caller prescribes, OPEN for none
+TRIAL_MODE = 3  # contact: the mode under trial
+SOURCE = 4  # unknown: its row in the original data
+EQUATION = 5  # equation of the trial: the unknown it belongs to
+PIVOT_ROW = 6  # equation: the tableau row that holds its unknown, -1 for none
+ROW_LABEL = 7  # tableau row: the variable it holds
+COLUMN_LABEL = 8  # tableau column: the variable it holds
+PLACE = 9  # variable: its row, or minus its column
+LABELS = 10
+
+# Rows of ``ContactWorkspace.vectors``, by what they are indexed with.
+CONE = 0  # contact: friction coefficient of the scaled problem
+SLOPE = 1  # contact: tangential over normal impulse where sliding is prescribed, else zero
+SCALE = 2  # unknown: impulse per unit of it
+OFFSET = 3  # unknown: scaled free velocity
+LEAN = 4  # equation: tangential per normal unknown at a slipping contact, else zero
+WEIGHT = 5  # equation: length of the impulse per unit of its unknown
+POINT = 6  # equation: its unknown, in units of impulse
+IMPULSE = 7  # row of the data: the impulse under trial
+VELOCITY = 8  # row of the data: the velocity it gives
+RESIDUAL = 9  # the three residuals of the trial
+ITERATE = 10  # unknown: iterate of an iterative solver
+STEP = 11  # unknown or equation: a correction
+SPEED = 12  # unknown or equation: scaled velocity
+EQUATIONS = 13  # unknown: what the iterate leaves of the equations
+PROGRESS = 14  # an iterative solver's own numbers
+VECTORS = 15
+
+
+class ContactWorkspace(NamedTuple):
+    """Buffers of the contact kernels for up to ``capacity`` contacts (d = 2).
+
+    Attributes
+    ----------
+    counters : (8,) int64
+        ``ITERATIONS``, ``SUCCEEDED`` (solver code) and ``LAST_FALLBACKS`` of the last solve;
+        ``SOLVES``, ``FALLBACKS``, ``FAILURES`` and ``SHORTCUTS`` (solves answered by the
+        warm-started modes) accumulated over all solves. The names are module constants.
+    settings : (2,) float64
+        ``TOLERANCE``: the largest residual that is certified; 1e-9 unless changed. ``SKEWED``:
+        not zero if the matrix may be asymmetric, as in a general complementarity problem.
+    labels, vectors : (.., ..) int64 and float64
+        Lists of the solvers, one a row; the module's constants name the rows.
+    matrix, tableau, basis, edges, dual : (.., ..) float64
+        The scaled problem; the dictionary that is pivoted; and the least-norm split's null
+        space, cone edges and dual dictionary.
+    """
+
+    counters: Integers
+    settings: Floats
+    labels: Integers
+    vectors: Floats
+    matrix: Floats
+    tableau: Floats
+    basis: Floats
+    edges: Floats
+    dual: Floats
+
+
+def contact_workspace(capacity: int) -> ContactWorkspace:
+    """Allocate the buffers for contact problems of up to ``capacity`` contacts."""
+    contacts = max(int(capacity), 1)
+    unknowns = 2 * contacts
+    pairs = 4 * contacts
+    settings = np.zeros(SETTINGS)
+    settings[TOLERANCE] = 1e-9
+    return ContactWorkspace(
+        counters=np.zeros(COUNTERS, np.int64),
+        settings=settings,
+        labels=np.zeros((LABELS, 2 * pairs + 2), np.int64),
+        vectors=np.zeros((VECTORS, max(unknowns, 8))),
+        matrix=np.zeros((unknowns, unknowns)),
+        tableau=np.zeros((pairs, pairs + 2)),
+        basis=np.zeros((unknowns, unknowns)),
+        edges=np.zeros((unknowns, unknowns + 1)),
+        dual=np.zeros((unknowns, unknowns + 2)),
+    )
