@@ -1,0 +1,41 @@
+"""How high the swing foot must be at every phase of a step (the paper's P_swnᵈ, eq. 12)."""
+
+from __future__ import annotations
+
+import enum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+ROUNDED = 0.04
+"""Share of the step, at either end, over which the parabola is rounded off."""
+
+
+class ClearanceProfile(enum.Enum):
+    """Shape of the least height of the swing foot over the phase s = t/T of the step.
+
+    ``PARABOLA`` is 4 s (1 − s). A foot that follows it leaves the ground with a velocity, so the
+    first and last 4 % of the step are rounded to slope zero.
+
+    ``SMOOTH`` is (4 s (1 − s))², flat at both ends, for a foot that can only lift from rest: one
+    that lands without impact, or whose toe the impact of the other foot would drive down.
+    """
+
+    PARABOLA = "parabola"
+    SMOOTH = "smooth"
+
+    def height(self, phase: ArrayLike) -> NDArray[np.float64]:
+        """Share of the greatest height at phases, (...), from 0 to 1.
+
+        Examples
+        --------
+        >>> ClearanceProfile.PARABOLA.height([0.0, 0.25, 0.5]).tolist()
+        [0.0, 0.75, 1.0]
+        """
+        s = np.asarray(phase, dtype=np.float64)
+        hump: NDArray[np.float64] = 4.0 * s * (1.0 - s)
+        if self is ClearanceProfile.SMOOTH:
+            return hump**2
+        from_end = np.minimum(s, 1.0 - s)
+        rounding: NDArray[np.float64] = 1.0 - np.maximum(1.0 - from_end / ROUNDED, 0.0) ** 2
+        return hump * rounding

@@ -1,0 +1,102 @@
+"""Why there is no gait: the constraints in conflict, and by how much."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.errors import InfeasibleGaitError
+from heelstrike.gait.program import Program, Solution
+from heelstrike.gait.starts import starting_points
+from heelstrike.gait.transcription import Group, Row
+
+Floats = NDArray[np.float64]
+
+FEASIBLE = 1e-7
+"""Scaled violations up to which a point satisfies all constraints."""
+TAKES_PART = 0.05
+"""Multiplier from which a constraint takes part in a conflict; 1 for those that are violated."""
+ATTEMPTS = 2
+"""Starting points from which the violations are minimised."""
+NAMED = 4
+"""Groups of constraints that a message names before it only counts."""
+
+
+def nearest_to_feasible(program: Program) -> Floats:
+    """Minimise the sum of all violations, and return a point that has none.
+
+    Raises
+    ------
+    InfeasibleGaitError
+        If some violation always remains; the message names the constraints in conflict.
+    """
+    transcription = program.transcription
+    elastic = program.relaxed()
+    nearest: Solution | None = None
+    for guess in islice(starting_points(transcription.request), ATTEMPTS):
+        solution = elastic.solve(guess)
+        if np.abs(program.violations(solution.unknowns)).max() <= FEASIBLE:
+            return solution.unknowns
+        if nearest is None or solution.objective < nearest.objective:
+            nearest = solution
+    assert nearest is not None
+    raise InfeasibleGaitError(_message(program, nearest))
+
+
+def _message(program: Program, nearest: Solution) -> str:
+    request = program.transcription.request
+    violated = _worst_violations(program, nearest.unknowns)
+    binding = _binding_groups(program, nearest, set(violated))
+    against = f" They are in conflict with: {_listed(binding)}." if binding else ""
+    step = ""
+    if request.free_step:
+        duration, length = nearest.unknowns[-2:]
+        step = f", with steps of {length:.3g} m in {duration:.3g} s,"
+    return (
+        f"robot {request.robot.name!r}: no gait with {request} was found. The nearest to one{step} "
+        f"violates: {_listed(list(violated.values()))}.{against} Ask for a shorter or slower step, "
+        "or relax one of these constraints."
+    )
+
+
+def _listed(items: list[str]) -> str:
+    more = f"; and {len(items) - NAMED} more" if len(items) > NAMED else ""
+    return "; ".join(items[:NAMED]) + more
+
+
+def _labelled_rows(program: Program) -> list[tuple[Row, float | None]]:
+    """Meaning of every constraint of the program, with its phase if it is one along the path."""
+    transcription = program.transcription
+    rows: list[tuple[Row, float | None]] = [(row, None) for row in transcription.touchdown.rows]
+    for phase in program.phases:
+        rows += [(row, float(phase)) for row in transcription.path.rows]
+    return rows
+
+
+def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:
+    """What is violated most in each group of constraints, in words, the worst group first."""
+    violations = np.abs(program.violations(unknowns))
+    worst: dict[Group, tuple[float, str]] = {}
+    for (row, phase), violation in zip(_labelled_rows(program), violations, strict=True):
+        if violation <= FEASIBLE or violation <= worst.get(row.group, (0.0, ""))[0]:
+            continue
+        subject = f" ({row.subject})" if row.subject else ""
+        when = "" if phase is None else f" at {100.0 * phase:.0f} % of the step"
+        amount = f"{violation * row.scale:.3g} {row.group.unit}"
+        worst[row.group] = (violation, f"{row.group.text}{subject} by {amount}{when}")
+    ordered = sorted(worst.items(), key=lambda item: -item[1][0])
+    return {group: text for group, (_, text) in ordered}
+
+
+def _binding_groups(program: Program, nearest: Solution, violated: set[Group]) -> list[str]:
+    """Inequalities that hold, but only just, and keep the violated ones from holding."""
+    strength: dict[Group, float] = {}
+    for (row, _), multiplier in zip(_labelled_rows(program), nearest.multipliers, strict=True):
+        if row.lower < row.upper:
+            strength[row.group] = max(strength.get(row.group, 0.0), abs(float(multiplier)))
+    ordered = sorted(strength, key=lambda group: -strength[group])
+    return [
+        group.text for group in ordered if strength[group] > TAKES_PART and group not in violated
+    ]

@@ -1,0 +1,155 @@
+"""Starting points for the optimiser: steps drawn by inverse kinematics, in a fixed order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.dynamics.symbolic import TracedDynamics, symbols
+from heelstrike.gait.request import Request
+from heelstrike.gait.sole import Sole
+
+Floats = NDArray[np.float64]
+
+HEIGHTS = (0.97, 0.92, 0.85)
+"""Heights of the trunk over the ground, as a share of what straight legs would allow."""
+LEANS = (0.0, 0.1)
+"""Pitches of the trunk (rad)."""
+BENT = 0.5
+"""Angle (rad) by which joints inside a leg are bent before inverse kinematics."""
+TYPICAL_DURATION = 2.2
+"""Step duration in units of sqrt(height / gravity) where none is given."""
+TYPICAL_LENGTH = 0.3
+"""Step length in standing heights where none is given."""
+SWEEPS = 60
+DAMPING = 1e-4
+
+
+def starting_points(request: Request) -> Iterator[Floats]:
+    """Guesses of the unknowns (q(T), v(T), v(0), T, L), the most promising ones first.
+
+    Each draws two postures, both feet on the ground and the swing foot passing the stance foot,
+    and takes the boundary velocities from the cubic through them.
+    """
+    length, duration = _typical_step(request)
+    kinematics = _Kinematics(request)
+    bends = (1.0, -1.0) if kinematics.bend_is_free else (1.0,)
+    for lean, height, bend in product(LEANS, HEIGHTS, bends):
+        legs = height * request.height
+        low = np.sqrt(max(legs**2 - (0.5 * length) ** 2, (0.5 * legs) ** 2))
+        lift = request.clearance + 0.02 * request.height
+        end = kinematics.posture((length, 0.0), (0.5 * length, low, lean), bend)
+        middle = kinematics.posture((0.0, lift), (0.0, legs, lean), bend)
+        start = _mirrored(request, end)
+        change = 2.0 * (end - start) / duration
+        bow = 8.0 / duration * (middle - 0.5 * (start + end))
+        yield np.concatenate([end, 0.5 * (change - bow), 0.5 * (change + bow), [duration, length]])
+
+
+def _typical_step(request: Request) -> tuple[float, float]:
+    """Length and duration to start from; as given, or as usual for the robot's size."""
+    length, duration = request.step_length, request.step_duration
+    usual = TYPICAL_DURATION * request.pendulum_time
+    if request.speed is not None:
+        # Fast walkers take steps that are both longer and quicker.
+        length = float(np.sqrt(TYPICAL_LENGTH * request.height * request.speed * usual))
+        duration = length / request.speed
+    length = TYPICAL_LENGTH * request.height if length is None else length
+    duration = usual if duration is None else duration
+    return (
+        float(np.clip(length, *request.length_bounds)),
+        float(np.clip(duration, *request.duration_bounds)),
+    )
+
+
+def _mirrored(request: Request, joints: Floats) -> Floats:
+    mirror = request.robot.mirror
+    assert mirror is not None
+    reference = request.robot.model.reference[3:]
+    counterpart = mirror.joint[3:] - 3
+    mirrored: Floats = mirror.sign[3:] * (joints - reference)[counterpart] + reference
+    return mirrored
+
+
+class _Kinematics:
+    """Postures with both soles and the trunk in given places, as nearly as the robot can."""
+
+    def __init__(self, request: Request) -> None:
+        robot = request.robot
+        self._robot = robot
+        q = casadi.SX.sym("q", robot.nv)
+        dynamics = TracedDynamics(robot, symbols(q))
+        places = []
+        for foot in (request.stance, request.swing):
+            places += [*dynamics.point_position(foot.link, foot.point)]
+            places.append(dynamics.work.angle[foot.link] - foot.angle)
+        places += [*dynamics.work.origin[2], dynamics.work.angle[2]]
+        places_vector = casadi.vertcat(*places)
+        self._places = casadi.Function(
+            "places", [q], [places_vector, casadi.jacobian(places_vector, q)]
+        )
+        self._lower, self._upper = robot.model.lower, robot.model.upper
+        self._inside = [*_inside(request, request.stance), *_inside(request, request.swing)]
+
+    @property
+    def bend_is_free(self) -> bool:
+        """Whether a joint inside a leg may bend both ways from the reference configuration."""
+        reference = self._robot.model.reference
+        return any(
+            self._lower[j] < reference[j] - BENT and self._upper[j] > reference[j] + BENT
+            for j in self._inside
+        )
+
+    def posture(
+        self, swing: tuple[float, float], trunk: tuple[float, float, float], bend: float
+    ) -> Floats:
+        """Joint positions with the stance sole at the origin, (nv - 3,).
+
+        Parameters
+        ----------
+        swing : tuple of 2 float
+            Place (x, z) of the middle of the swing sole, which is level.
+        trunk : tuple of 3 float
+            Place (x, z) and pitch of the trunk.
+        bend : float
+            Sense (+1, -1) in which joints inside a leg are bent at first if they may both ways.
+        """
+        target = np.array([0.0, 0.0, 0.0, *swing, 0.0, *trunk])
+        q = self._bent(bend)
+        for _ in range(SWEEPS):
+            value, jacobian = (np.array(part) for part in self._places(q))
+            missing = target - value.ravel()
+            if np.abs(missing).max() < 1e-9:
+                break
+            normal = jacobian.T @ jacobian + DAMPING * np.eye(q.size)
+            step = np.linalg.solve(normal, jacobian.T @ missing)
+            q = np.clip(q + step / max(1.0, np.abs(step).max() / BENT), self._lower, self._upper)
+        return q[3:]
+
+    def _bent(self, bend: float) -> Floats:
+        """Reference configuration with the joints inside the legs bent, in range."""
+        reference = self._robot.model.reference
+        q = np.clip(reference, self._lower, self._upper)
+        for j in self._inside:
+            wanted = reference[j] + bend * BENT * self._robot.model.axis[j, 0]
+            q[j] = np.clip(wanted, self._lower[j], self._upper[j])
+            if abs(q[j] - reference[j]) < 0.5 * BENT:  # a stop is in the way
+                other = reference[j] - bend * BENT * self._robot.model.axis[j, 0]
+                q[j] = np.clip(other, self._lower[j], self._upper[j])
+        return q
+
+
+def _inside(request: Request, foot: Sole) -> list[int]:
+    """Hinges between the first and the last of a leg: its knees."""
+    model = request.robot.model
+    chain = []
+    link = foot.link
+    while link > 2:
+        if model.axis[link, 0] != 0.0:
+            chain.append(int(link))
+        link = int(model.parent[link])
+    return chain[1:-1]
