@@ -63,6 +63,8 @@ _LABELS = {
     "condition": ["complementarity", "cone", "non-penetration"],
 }
 _METHODS = {"TimeStepping": TimeStepping}
+NONE = "none"
+"""How a setting that is None is written, for NetCDF has no such attribute."""
 _COUNTS = ("solves", "shortcuts", "fallbacks", "failures")
 _WORST = ("penetration", "complementarity", "cone", "non_penetration")
 _EVENTS = ("event_time", "event_kind", "event_contact", "event_impulse")
@@ -183,6 +185,8 @@ def _field_names(kind: Any) -> list[str]:
 
 
 def _plain(value: Any) -> str | int | float:
+    if value is None:
+        return NONE
     if isinstance(value, enum.Enum):
         return value.name.lower()
     return value if isinstance(value, str | int) else float(value)
@@ -487,7 +491,9 @@ class _Attributes:
             default = field.default
             if name not in self.values and default is not MISSING:
                 continue  # a setting that did not exist when the file was written
-            if isinstance(default, enum.Enum):
+            if self.values.get(name) == NONE:
+                values[field.name] = None
+            elif isinstance(default, enum.Enum):
                 members = {member.name.lower(): member for member in type(default)}
                 values[field.name] = self.member(name, members)
             elif isinstance(default, str):

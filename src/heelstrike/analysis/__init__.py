@@ -1,0 +1,73 @@
+"""What a run says about walking: zero moment point, friction, slip, tracking, energy, steps."""
+
+from heelstrike.analysis.actuation import (
+    CostOfTransport,
+    actuator_power,
+    cost_of_transport,
+    distance_travelled,
+    torque_cost,
+)
+from heelstrike.analysis.energy import EnergyBalance, energy_balance
+from heelstrike.analysis.friction import FrictionUse, friction_use
+from heelstrike.analysis.motion import Motion, run_motion
+from heelstrike.analysis.penetration import penetration
+from heelstrike.analysis.slip import max_slip, slip_distance
+from heelstrike.analysis.sole import Sole, soles
+from heelstrike.analysis.summary import Summary, summarize
+from heelstrike.analysis.support import (
+    Stance,
+    SupportPhase,
+    double_support_fraction,
+    single_support,
+    stances,
+    support_phases,
+    walking_steps,
+)
+from heelstrike.analysis.tracking import (
+    ReferenceMotion,
+    TrackingError,
+    reference_motion,
+    tracking_error,
+)
+from heelstrike.analysis.wrenches import foot_wrenches
+from heelstrike.analysis.zero_moment_point import (
+    ZeroMomentPoint,
+    zero_moment_point,
+    zero_moment_point_limits,
+)
+
+__all__ = [
+    "CostOfTransport",
+    "EnergyBalance",
+    "FrictionUse",
+    "Motion",
+    "ReferenceMotion",
+    "Sole",
+    "Stance",
+    "Summary",
+    "SupportPhase",
+    "TrackingError",
+    "ZeroMomentPoint",
+    "actuator_power",
+    "cost_of_transport",
+    "distance_travelled",
+    "double_support_fraction",
+    "energy_balance",
+    "foot_wrenches",
+    "friction_use",
+    "max_slip",
+    "penetration",
+    "reference_motion",
+    "run_motion",
+    "single_support",
+    "slip_distance",
+    "soles",
+    "stances",
+    "summarize",
+    "support_phases",
+    "torque_cost",
+    "tracking_error",
+    "walking_steps",
+    "zero_moment_point",
+    "zero_moment_point_limits",
+]

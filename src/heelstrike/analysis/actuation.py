@@ -1,0 +1,85 @@
+"""What the motors spend: the paper's torque cost (eq. 40), their work, the cost of transport."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.motion import Motion, run_motion
+from heelstrike.sim.run import Run
+
+Floats = NDArray[np.float64]
+
+
+def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> float:
+    """∫ ΓᵀΓ dt over the rows from `start` to `end` (s), in N²m²s (paper eq. 40).
+
+    Torques are held from row to row, so that the sum is the integral.
+    """
+    held = np.diff(run.time)
+    square = (run.torque[:-1] ** 2).sum(axis=1)
+    inside = (run.time[:-1] >= start) & (run.time[:-1] < end)
+    return float((square * held)[inside].sum())
+
+
+def actuator_power(run: Run) -> Floats:
+    """Mean mechanical power τ ω of every actuator from each row to the next, (nt − 1, nu), in W.
+
+    The velocity is the mean of the two rows, which makes the work of an impulsive step exact.
+    """
+    speed = run.velocity[:, run.robot.model.actuator_joint]
+    return np.asarray(run.torque[:-1] * 0.5 * (speed[:-1] + speed[1:]))
+
+
+@dataclass(frozen=True)
+class CostOfTransport:
+    """Energy spent a unit of weight and distance, without dimension.
+
+    Attributes
+    ----------
+    absolute : float
+        ∫ Σ |τ ω| dt / (m g d): braking costs as much as driving.
+    positive : float
+        ∫ Σ max(τ ω, 0) dt / (m g d): braking is free.
+    distance : float
+        d, how far the centre of mass moved along x, in m.
+    """
+
+    absolute: float
+    positive: float
+    distance: float
+
+
+def cost_of_transport(run: Run, *, motion: Motion | None = None) -> CostOfTransport:
+    """Mechanical cost of transport of a run.
+
+    NaN if the robot has no weight or its centre of mass moved less than 1 mm.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    motion : Motion, optional
+        Its motion, if already at hand.
+    """
+    distance = distance_travelled(run, motion=motion)
+    held = np.diff(run.time)[:, None]
+    power = actuator_power(run)
+    scale = run.robot.weight * abs(distance)
+    if not (run.robot.weight > 0.0 and abs(distance) > 1e-3):
+        scale = float("nan")
+    return CostOfTransport(
+        absolute=float((np.abs(power) * held).sum() / scale),
+        positive=float((np.maximum(power, 0.0) * held).sum() / scale),
+        distance=distance,
+    )
+
+
+def distance_travelled(run: Run, *, motion: Motion | None = None) -> float:
+    """How far the centre of mass moved along x over a run, in m; negative backwards."""
+    if not len(run.time):
+        return 0.0
+    center = (run_motion(run) if motion is None else motion).center_of_mass
+    return float(center[-1, 0] - center[0, 0])

@@ -1,0 +1,83 @@
+"""Where the energy of a run comes from and goes to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.actuation import actuator_power
+from heelstrike.analysis.motion import motion, run_motion
+from heelstrike.sim.run import Run
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EnergyBalance:
+    """Energy of the robot and the work done on it since the first row, row by row, in J.
+
+    Attributes
+    ----------
+    time : (nt,) float
+        Seconds.
+    kinetic, potential : (nt,) float
+        Energy of links, rotors and joint springs; zero height is z = 0.
+    actuators : (nt,) float
+        Work of the actuators.
+    dampers : (nt,) float
+        Work of the joint dampers, never positive in exact motion.
+    contacts : (nt,) float
+        Work of the ground: impacts and sliding friction. An exact contact never adds energy.
+    stops : (nt,) float
+        Work of the joint stops, of which the same is true.
+    """
+
+    time: Floats
+    kinetic: Floats
+    potential: Floats
+    actuators: Floats
+    dampers: Floats
+    contacts: Floats
+    stops: Floats
+
+    @property
+    def total(self) -> Floats:
+        """Mechanical energy, (nt,), in J."""
+        return self.kinetic + self.potential
+
+    @property
+    def residual(self) -> Floats:
+        """Change of energy that no work explains, (nt,), in J: the error of the time method."""
+        gained = self.total - self.total[:1]
+        return gained - self.actuators - self.dampers - self.contacts - self.stops
+
+
+def energy_balance(run: Run) -> EnergyBalance:
+    """Balance the energy of a run against the work done on its robot.
+
+    Work over a step is force times the mean of the velocities at its two ends, which for an
+    impulse is exactly the change of kinetic energy. With ``record_every`` above 1 rows stand for
+    the steps between them, and the balance is only as good as the sampling.
+    """
+    robot, model = run.robot, run.robot.model
+    held = np.diff(run.time)
+    mean = 0.5 * (run.velocity[:-1] + run.velocity[1:])
+    at_rows = run_motion(run)
+    over_steps = motion(robot, run.position[:-1], mean, run.contact_point[:-1])
+    contact_power = (run.world_force[:-1] * over_steps.contact_velocity).sum(axis=(1, 2))
+    damper_power = -(mean * run.velocity[:-1]) @ model.damping
+
+    def work(power: Floats) -> Floats:
+        return np.concatenate(([0.0], np.cumsum(power * held)))[: len(run.time)]
+
+    return EnergyBalance(
+        time=run.time,
+        kinetic=at_rows.kinetic,
+        potential=at_rows.potential,
+        actuators=work(actuator_power(run).sum(axis=1)),
+        dampers=work(damper_power),
+        contacts=work(contact_power),
+        stops=work((run.stop_torque[:-1] * mean).sum(axis=1)),
+    )

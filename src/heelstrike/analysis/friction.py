@@ -1,0 +1,80 @@
+"""How much of the friction cone the contact forces use (paper eq. 9, Figure 6)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.support import NOTHING
+from heelstrike.sim.run import Run
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionUse:
+    """Tangential force over what friction allows, |f_t| / (μ f_n), row by row.
+
+    1 is the edge of the friction cone; NaN where nothing presses.
+
+    Attributes
+    ----------
+    contact : (nt, nc) float
+        Of each contact point. Two points of one flat sole share their tangential force in a way
+        that mechanics does not decide: the run holds the split of least norm.
+    foot : (nt, nf) float
+        Of each foot, from the sums over its contact points; unique.
+    total : (nt,) float
+        Of all contact points together.
+    """
+
+    contact: Floats
+    foot: Floats
+    total: Floats
+
+    @property
+    def max(self) -> float:
+        """Largest use by any foot at any time; NaN if no foot ever presses."""
+        used = self.foot[np.isfinite(self.foot) | np.isinf(self.foot)]
+        return float(used.max()) if used.size else float("nan")
+
+
+def friction_use(run: Run) -> FrictionUse:
+    """Compute which share of the friction cone a run uses (paper eq. 9)."""
+    pressing = run.contact_force[..., 0]
+    tangential = run.contact_force[..., 1]
+    allowed = friction_coefficient(run) * pressing
+    floor = NOTHING * run.robot.weight
+    rows = len(run.time)
+    foot = np.full((rows, len(run.robot.feet)), np.nan)
+    for i, each in enumerate(run.robot.feet):
+        contacts = list(each.contacts)
+        foot[:, i] = _share(
+            tangential[:, contacts].sum(axis=1),
+            allowed[:, contacts].sum(axis=1),
+            pressing[:, contacts].sum(axis=1),
+            floor,
+        )
+    return FrictionUse(
+        contact=_share(tangential, allowed, pressing, floor),
+        foot=foot,
+        total=_share(tangential.sum(axis=1), allowed.sum(axis=1), pressing.sum(axis=1), floor),
+    )
+
+
+def friction_coefficient(run: Run) -> Floats:
+    """Friction coefficient of the ground under every contact point, (nt, nc)."""
+    ground = run.ground.model()
+    corners = ground.vertices[:, 0]
+    segment = np.searchsorted(corners, run.contact_point[..., 0], side="right") - 1
+    return np.asarray(ground.friction[np.clip(segment, 0, len(ground.friction) - 1)])
+
+
+def _share(tangential: Floats, allowed: Floats, pressing: Floats, floor: float) -> Floats:
+    """|tangential| / allowed; NaN where nothing presses, 0/0 of a frictionless ground is 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.abs(tangential) / allowed
+    share = np.where((allowed == 0.0) & (tangential == 0.0), 0.0, share)
+    return np.where(pressing > floor, share, np.nan)

@@ -1,0 +1,16 @@
+"""How deep contact points sink into the ground: not at all, if contact is hard."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.sim.run import Run
+
+
+def penetration(run: Run) -> NDArray[np.float64]:
+    """Depth of every contact point below the ground in each row, (nt, nc), in m; zero above.
+
+    ``run.certificates.penetration`` is the worst over all steps, recorded or not.
+    """
+    return np.maximum(0.0, -run.gap)

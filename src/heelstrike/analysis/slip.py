@@ -1,0 +1,30 @@
+"""How far contact points slide while they press."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.support import pushing
+from heelstrike.sim.run import Run
+
+Floats = NDArray[np.float64]
+
+
+def slip_distance(run: Run) -> Floats:
+    """Distance that every contact point has slid while pressed, up to each row, (nt, nc), in m.
+
+    The sum over steps of |tangential velocity at the end of the step| times the step, taken over
+    steps in which the point pushes. It never decreases: sliding there and back counts twice. With
+    ``record_every`` above 1, rows stand for the steps between them.
+    """
+    speed = np.where(pushing(run), np.abs(run.slip_velocity), 0.0)
+    slid = np.zeros_like(speed)
+    slid[1:] = np.cumsum(speed[:-1] * np.diff(run.time)[:, None], axis=0)
+    return slid
+
+
+def max_slip(run: Run) -> float:
+    """Largest distance that any contact point slid over the whole run, in m."""
+    slid = slip_distance(run)
+    return float(slid[-1].max()) if slid.size else 0.0

@@ -1,0 +1,57 @@
+"""The frame in which a foot's wrench and zero moment point are given: the ankle over the sole."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.robot.robot import Foot, Robot
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sole:
+    """The line under a foot from its first to its last contact point.
+
+    Attributes
+    ----------
+    foot : Foot
+        The foot.
+    reference : (2,) float
+        Reference point in the link frame (m): the foot link's origin, that is the ankle, projected
+        onto the sole. A foot of one contact point has its reference there.
+    heel, toe : float
+        Ends of the sole, measured forward along it from the reference point (m).
+    """
+
+    foot: Foot
+    reference: Floats
+    heel: float
+    toe: float
+
+
+def sole(robot: Robot, foot: Foot) -> Sole:
+    """Find the sole of a foot: the common tangent under its first and last contact discs."""
+    contacts = list(foot.contacts)
+    center = robot.model.contact_position[contacts]
+    radius = robot.model.contact_radius[contacts]
+    length = float(np.hypot(*(center[-1] - center[0])))
+    if length <= abs(radius[-1] - radius[0]):  # one point, or one disc inside the other
+        return Sole(foot, center[0] - [0.0, radius[0]], 0.0, 0.0)
+    along = (center[-1] - center[0]) / length
+    below = np.array([along[1], -along[0]])
+    sine = (radius[-1] - radius[0]) / length
+    down = np.sqrt(1.0 - sine**2) * below - sine * along  # normal to the tangent, out of the foot
+    forward = np.array([-down[1], down[0]])
+    bottom = center + radius[:, None] * down
+    reference = bottom[0] - (bottom[0] @ forward) * forward
+    place = (bottom - reference) @ forward
+    return Sole(foot, reference, float(place.min()), float(place.max()))
+
+
+def soles(robot: Robot) -> tuple[Sole, ...]:
+    """Return the sole of every foot of a robot, in the order of ``robot.feet``."""
+    return tuple(sole(robot, foot) for foot in robot.feet)

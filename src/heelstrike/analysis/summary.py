@@ -1,0 +1,282 @@
+"""The figures of a run on one page, for a person and for a program."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from heelstrike.analysis.actuation import cost_of_transport, torque_cost
+from heelstrike.analysis.friction import friction_use
+from heelstrike.analysis.motion import run_motion
+from heelstrike.analysis.slip import max_slip
+from heelstrike.analysis.support import double_support_fraction, walking_steps
+from heelstrike.analysis.tracking import tracking_error
+from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.sim.run import Run, SolverCount
+from heelstrike.sim.status import RunStatus
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from heelstrike.gait.gait import Gait
+
+UNKNOWN = float("nan")
+
+
+@dataclass(frozen=True)
+class GaitFigures:
+    """The gait that a run followed.
+
+    Attributes
+    ----------
+    step_length_m, step_duration_s : float
+        Length and duration of one step.
+    cost_N2m2s : float
+        ∫ ΓᵀΓ dt of one step of the gait as designed (paper eq. 40).
+    """
+
+    step_length_m: float
+    step_duration_s: float
+    cost_N2m2s: float  # noqa: N815 - units keep their capitals
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Figures of a run. Those that do not exist for it are NaN (null in JSON).
+
+    Attributes
+    ----------
+    robot : str
+        Name of the robot.
+    status, message : str
+        How the run ended.
+    steps : int
+        Walking steps taken: touchdowns of alternating feet.
+    distance_m : float
+        How far the centre of mass moved along x.
+    duration_s : float
+        Time simulated.
+    gait : GaitFigures or None
+        The gait that the run followed, if it was given.
+    tracking_rms_rad, tracking_max_rad : float
+        Error of the actuated joints against the gait.
+    zmp_min_m, zmp_max_m : float
+        Range of the zero moment point of the stance foot in single support, ahead of the ankle's
+        projection onto the sole.
+    zmp_limits_m : tuple of float
+        Heel and toe in the same frame.
+    zmp_margin_min_m : float
+        Least distance of that zero moment point to the ends of the sole's touching points.
+    friction_use_max : float
+        Largest |f_t| / (μ f_n) of a foot.
+    slip_max_m : float
+        Largest distance that a contact point slid while pressed, over the whole run.
+    penetration_max_m, complementarity_max : float
+        Worst values over all steps, from the certificates; the latter is relative.
+    solver : SolverCount
+        How the contact problems were solved.
+    torque_cost_N2m2s : float
+        ∫ ΓᵀΓ dt over the whole run.
+    cost_of_transport, cost_of_transport_positive : float
+        ∫ Σ |τ ω| dt / (m g d), and the same of positive work only.
+    double_support_fraction : float
+        Share of the time in which both feet push.
+    saturations : int
+        Times that a torque was clipped to its limit.
+    compile_s, wall_s : float
+        Time spent on compilation, and on the simulation.
+    real_time_factor : float
+        Time simulated over time spent on the simulation.
+    """
+
+    robot: str
+    status: str
+    message: str
+    steps: int
+    distance_m: float
+    duration_s: float
+    gait: GaitFigures | None
+    tracking_rms_rad: float
+    tracking_max_rad: float
+    zmp_min_m: float
+    zmp_max_m: float
+    zmp_limits_m: tuple[float, float]
+    zmp_margin_min_m: float
+    friction_use_max: float
+    slip_max_m: float
+    penetration_max_m: float
+    complementarity_max: float
+    solver: SolverCount
+    torque_cost_N2m2s: float  # noqa: N815 - units keep their capitals
+    cost_of_transport: float
+    cost_of_transport_positive: float
+    double_support_fraction: float
+    saturations: int
+    compile_s: float
+    wall_s: float
+    real_time_factor: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain dictionaries, lists and numbers, with None for what does not exist."""
+        plain: dict[str, Any] = _plain(asdict(self))
+        return plain
+
+    def to_json(self, *, indent: int | None = 2) -> str:
+        """Return the summary as JSON text."""
+        return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
+
+    def __str__(self) -> str:
+        rows = _rows(self)
+        width = max(len(label) for label, _ in rows)
+        lines = [f"{label:<{width}}  {value}" for label, value in rows]
+        return "\n".join([self._title(), *lines])
+
+    def __rich__(self) -> Table:
+        from rich.table import Table
+
+        good = self.status == RunStatus.COMPLETED.value
+        table = Table(
+            title=self._title(), title_style="bold green" if good else "bold red", show_header=False
+        )
+        table.add_column(style="cyan", no_wrap=True)
+        table.add_column()
+        for label, value in _rows(self):
+            table.add_row(label, value)
+        return table
+
+    def _title(self) -> str:
+        return f"{self.robot}: {self.message}"
+
+
+def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
+    """Compute the figures of a run.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    gait : Gait, optional
+        The gait it followed, for the tracking error.
+
+    Raises
+    ------
+    GaitError
+        If the gait does not fit the robot of the run.
+    """
+    motion = run_motion(run)
+    duration = float(run.time[-1] - run.time[0]) if len(run.time) else 0.0
+    tracking = tracking_error(run, gait) if gait is not None and len(run.time) else None
+    zmp = zero_moment_point(run, motion=motion)
+    alone = zmp.stance[np.isfinite(zmp.stance)]
+    margin = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
+    margin = margin[np.isfinite(margin)]
+    transport = cost_of_transport(run, motion=motion)
+    return Summary(
+        robot=run.robot.name,
+        status=run.status.value,
+        message=run.message,
+        steps=len(walking_steps(run)),
+        distance_m=transport.distance,
+        duration_s=duration,
+        gait=None if gait is None else _gait_figures(gait),
+        tracking_rms_rad=UNKNOWN if tracking is None else tracking.rms,
+        tracking_max_rad=UNKNOWN if tracking is None else tracking.max,
+        zmp_min_m=float(alone.min()) if alone.size else UNKNOWN,
+        zmp_max_m=float(alone.max()) if alone.size else UNKNOWN,
+        zmp_limits_m=zero_moment_point_limits(run.robot),
+        zmp_margin_min_m=float(margin.min()) if margin.size else UNKNOWN,
+        friction_use_max=friction_use(run).max,
+        slip_max_m=max_slip(run),
+        penetration_max_m=run.certificates.penetration,
+        complementarity_max=run.certificates.complementarity,
+        solver=run.solver,
+        torque_cost_N2m2s=torque_cost(run),
+        cost_of_transport=transport.absolute,
+        cost_of_transport_positive=transport.positive,
+        double_support_fraction=double_support_fraction(run),
+        saturations=run.saturations,
+        compile_s=run.timing.compile_s,
+        wall_s=run.timing.wall_s,
+        real_time_factor=duration / run.timing.wall_s if run.timing.wall_s > 0.0 else UNKNOWN,
+    )
+
+
+def _gait_figures(gait: Gait) -> GaitFigures:
+    return GaitFigures(float(gait.step_length), float(gait.step_duration), float(gait.cost))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def _rows(s: Summary) -> list[tuple[str, str]]:
+    """Label and value of every line of the table a person reads."""
+    speed = s.distance_m / s.duration_s if s.duration_s > 0.0 else UNKNOWN
+    rows = [
+        ("status", s.status),
+        ("steps", str(s.steps)),
+        (
+            "distance",
+            f"{_number(s.distance_m, 4)} m in {_number(s.duration_s, 4)} s "
+            f"({_number(speed, 3)} m/s)",
+        ),
+    ]
+    if s.gait is not None:
+        rows.append(
+            (
+                "gait",
+                f"{_number(s.gait.step_length_m, 3)} m in "
+                f"{_number(s.gait.step_duration_s, 3)} s a step, "
+                f"∫ΓᵀΓ dt = {_number(s.gait.cost_N2m2s, 4)} N²m²s",
+            )
+        )
+        rows.append(
+            (
+                "joint tracking error",
+                f"{_number(s.tracking_rms_rad, 3)} rad rms, "
+                f"{_number(s.tracking_max_rad, 3)} rad at most",
+            )
+        )
+    fallen_back = f", {s.solver.fallbacks} fallbacks" if s.solver.fallbacks else ""
+    rows += [
+        (
+            "zero moment point",
+            f"{_number(s.zmp_min_m, 3)} … {_number(s.zmp_max_m, 3)} m "
+            f"(sole {_number(s.zmp_limits_m[0], 3)} … {_number(s.zmp_limits_m[1], 3)} m)",
+        ),
+        ("friction use", f"{_number(s.friction_use_max, 3)} of the cone"),
+        ("slip", f"{_number(s.slip_max_m, 2)} m"),
+        ("penetration", f"{_number(s.penetration_max_m, 2)} m"),
+        (
+            "contact problems",
+            f"{s.solver.solves} solved by {s.solver.name}{fallen_back}, "
+            f"{s.solver.failures} failures; complementarity {_number(s.complementarity_max, 2)}",
+        ),
+        (
+            "cost of transport",
+            f"{_number(s.cost_of_transport, 3)} "
+            f"({_number(s.cost_of_transport_positive, 3)} positive work)",
+        ),
+        ("torques at their limit", str(s.saturations)),
+        (
+            "computing time",
+            f"{_number(s.wall_s, 3)} s ({_number(s.real_time_factor, 3)} × real time), "
+            f"compilation {_number(s.compile_s, 3)} s",
+        ),
+    ]
+    return rows
+
+
+def _number(value: float, digits: int) -> str:
+    """Significant digits with a true minus sign; a dash for what does not exist."""
+    return f"{value:.{digits}g}".replace("-", "−") if math.isfinite(value) else "–"

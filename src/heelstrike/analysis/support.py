@@ -1,0 +1,176 @@
+"""Which feet carry the robot, when, and how many steps it took."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.sim.run import Run
+from heelstrike.sim.status import EventKind
+
+NOTHING = 1e-9
+"""Normal forces below this fraction of the robot's weight are no force."""
+
+
+def pushing(run: Run) -> NDArray[np.bool_]:
+    """Tell which contact points push in each row, (nt, nc).
+
+    A row's forces act over the step that follows it, so that a foot pushes in the row whose step
+    ends with its touchdown.
+    """
+    return np.asarray(run.contact_force[..., 0] > NOTHING * run.robot.weight)
+
+
+def pushing_feet(run: Run) -> NDArray[np.bool_]:
+    """Tell which feet push in each row, (nt, nf)."""
+    points = pushing(run)
+    feet = [points[:, list(foot.contacts)].any(axis=1) for foot in run.robot.feet]
+    return np.array(feet, dtype=bool).reshape(len(feet), len(points)).T
+
+
+def single_support(run: Run) -> NDArray[np.bool_]:
+    """Tell in which rows exactly one foot, and nothing else, carries the robot, (nt,).
+
+    An impact at which the foot behind still pushes is not single support; the impact of a foot
+    that takes over at once is.
+    """
+    feet = [list(foot.contacts) for foot in run.robot.feet]
+    elsewhere = np.delete(pushing(run), [i for contacts in feet for i in contacts], axis=1)
+    return np.asarray((pushing_feet(run).sum(axis=1) == 1) & ~elsewhere.any(axis=1))
+
+
+@dataclass(frozen=True)
+class SupportPhase:
+    """Time during which the same feet carry the robot.
+
+    Attributes
+    ----------
+    start, end : float
+        Time in s.
+    feet : tuple of int
+        Indices of the feet that push: one in single support, two in double support, none in
+        flight.
+    """
+
+    start: float
+    end: float
+    feet: tuple[int, ...]
+
+    @property
+    def duration(self) -> float:
+        """Length of the phase in s."""
+        return self.end - self.start
+
+
+def support_phases(run: Run) -> tuple[SupportPhase, ...]:
+    """Divide a run into phases between which the set of pushing feet changes."""
+    feet = pushing_feet(run)
+    if not len(feet):
+        return ()
+    changes = np.flatnonzero((feet[1:] != feet[:-1]).any(axis=1)) + 1
+    bounds = [0, *changes.tolist(), len(feet) - 1]
+    return tuple(
+        SupportPhase(
+            float(run.time[first]),
+            float(run.time[last]),
+            tuple(int(foot) for foot in np.flatnonzero(feet[first])),
+        )
+        for first, last in pairwise(bounds)
+        if run.time[last] > run.time[first]
+    )
+
+
+def double_support_fraction(run: Run) -> float:
+    """Share of the time in which two feet or more push; NaN for a run without duration."""
+    held = np.diff(run.time)
+    if not held.sum() > 0.0:
+        return float("nan")
+    double = pushing_feet(run)[:-1].sum(axis=1) >= 2
+    return float(held[double].sum() / held.sum())
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Stay of a foot on the ground, from its touchdown to its lift-off.
+
+    Attributes
+    ----------
+    foot : int
+        Index of the foot.
+    touchdown : float
+        When its first contact point met the ground, in s.
+    liftoff : float
+        When its last one left it, in s; infinite if it was still there at the end.
+    impulse : float
+        Normal impulse on the foot in the step of its touchdown, in N s.
+    """
+
+    foot: int
+    touchdown: float
+    liftoff: float
+    impulse: float
+
+
+def stances(run: Run) -> tuple[Stance, ...]:
+    """List the stays of all feet on the ground in the order of their touchdowns.
+
+    A foot that pushes in the first row touches down there, with no impulse.
+    """
+    foot_of = {i: foot for foot, each in enumerate(run.robot.feet) for i in each.contacts}
+    closed: dict[int, set[int]] = {foot: set() for foot in range(len(run.robot.feet))}
+    current: dict[int, int] = {}
+    found: list[Stance] = []
+    for contact in _first_contacts(run):
+        foot = foot_of.get(contact, -1)
+        if foot >= 0:
+            closed[foot].add(contact)
+    for foot, contacts in closed.items():
+        if contacts:
+            current[foot] = len(found)
+            found.append(Stance(foot, float(run.time[0]), np.inf, 0.0))
+    for event in run.events:
+        foot = foot_of.get(event.contact, -1)
+        if foot < 0:
+            continue
+        if event.kind is EventKind.TOUCHDOWN:
+            if not closed[foot]:
+                current[foot] = len(found)
+                found.append(Stance(foot, event.time, np.inf, 0.0))
+            stance = found[current[foot]]
+            if event.time == stance.touchdown:  # heel and toe may land in the same step
+                impulse = stance.impulse + event.impulse[0]
+                found[current[foot]] = replace(stance, impulse=impulse)
+            closed[foot].add(event.contact)
+        elif event.kind is EventKind.LIFTOFF and event.contact in closed[foot]:
+            closed[foot].remove(event.contact)
+            if not closed[foot]:
+                found[current[foot]] = replace(found[current[foot]], liftoff=event.time)
+    return tuple(sorted(found, key=lambda stance: stance.touchdown))
+
+
+def walking_steps(run: Run) -> tuple[Stance, ...]:
+    """List the stances that end a walking step: the landing foot is not the one that landed last.
+
+    The contact the robot starts with is no step, nor is the first landing of a robot dropped from
+    the air, nor a foot that lands again without the other one having landed in between.
+    """
+    taken: list[Stance] = []
+    last: set[int] = set()
+    for stance in stances(run):
+        if stance.touchdown == run.time[0]:
+            last.add(stance.foot)
+            continue
+        if last and last != {stance.foot}:
+            taken.append(stance)
+        last = {stance.foot}
+    return tuple(taken)
+
+
+def _first_contacts(run: Run) -> list[int]:
+    """Contact points on the ground at the beginning."""
+    if not len(run.time):
+        return []
+    return [int(contact) for contact in np.flatnonzero(pushing(run)[0])]

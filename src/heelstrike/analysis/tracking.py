@@ -1,0 +1,158 @@
+"""How closely the joints follow a gait (paper Figure 3).
+
+The reference is the one that :class:`heelstrike.control.ComputedTorque` follows. Its phase
+restarts, and left and right change places, when the swing foot is on the ground in the second half
+of a step; a step that lasts longer than planned goes on along its polynomials for a tenth of its
+duration and then holds still. All of it follows from the touchdowns of the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.support import stances
+from heelstrike.sim.run import Run
+
+if TYPE_CHECKING:
+    from heelstrike.gait.gait import Gait
+
+Floats = NDArray[np.float64]
+
+EARLIEST = 0.5
+"""Touchdowns before this fraction of a step do not end it."""
+LATEST = 1.1
+"""The reference of a late step rests after this fraction of its duration."""
+SAME_TIME = 1e-9  # seconds; times of rows and events agree but for rounding
+
+
+@dataclass(frozen=True, eq=False)
+class ReferenceMotion:
+    """What a controller that follows a gait wanted the joints to do, row by row.
+
+    Attributes
+    ----------
+    position, velocity : (nt, nu) float
+        Reference of the actuated joints, in the order of the actuators (rad, rad/s).
+    stance : (nt,) int
+        Index of the foot taken for the stance foot.
+    phase : (nt,) float
+        Time since the step began, in s.
+    starts : tuple of float
+        Times at which steps began, in s.
+    """
+
+    position: Floats
+    velocity: Floats
+    stance: NDArray[np.int64]
+    phase: Floats
+    starts: tuple[float, ...]
+
+
+def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
+    """Reconstruct the reference that a run followed, from its touchdowns (paper eq. 41).
+
+    Raises
+    ------
+    GaitError
+        If the gait does not fit the robot of the run.
+    """
+    gait.check_joints(run.robot)
+    from heelstrike.gait import cubic  # the optimiser behind it is slow to load
+
+    starts = _step_starts(run, gait)
+    step = np.searchsorted(np.array(starts) - SAME_TIME, run.time, side="right") - 1
+    step = np.maximum(step, 0)
+    stance = (gait.stance_foot + step) % 2
+    phase = run.time - np.array(starts)[step]
+    followed = np.minimum(phase, LATEST * gait.step_duration)[:, None]
+    late = (phase > LATEST * gait.step_duration)[:, None]
+    position = np.zeros((len(run.time), run.robot.nu))
+    velocity = np.zeros_like(position)
+    polynomials = (
+        (gait.stance_foot, list(gait.coefficients)),
+        (1 - gait.stance_foot, list(gait.mirrored_coefficients(run.robot))),
+    )
+    for foot, coefficients in polynomials:
+        standing = (stance == foot)[:, None]
+        position += standing * cubic.position(coefficients, followed)
+        velocity += standing * ~late * cubic.velocity(coefficients, followed)
+    return ReferenceMotion(position, velocity, stance, phase, tuple(starts))
+
+
+def _step_starts(run: Run, gait: Gait) -> list[float]:
+    """Times at which the phase of a gait restarts: the swing foot is down after half a step."""
+    if not len(run.time):
+        return [0.0]
+    on_ground = stances(run)
+    starts = [float(run.time[0])]
+    swing = 1 - gait.stance_foot
+    while True:
+        earliest = starts[-1] + EARLIEST * gait.step_duration
+        landed = [
+            max(stance.touchdown, earliest)
+            for stance in on_ground
+            if stance.foot == swing and stance.liftoff > earliest
+        ]
+        if not landed or landed[0] > run.time[-1] + SAME_TIME:
+            return starts
+        starts.append(landed[0])
+        swing = 1 - swing
+
+
+@dataclass(frozen=True, eq=False)
+class TrackingError:
+    """Measured minus reference motion of the actuated joints.
+
+    Attributes
+    ----------
+    reference : ReferenceMotion
+        The reference.
+    position, velocity : (nt, nu) float
+        Errors in rad and rad/s.
+    """
+
+    reference: ReferenceMotion
+    position: Floats
+    velocity: Floats
+
+    @cached_property
+    def joint_rms(self) -> Floats:
+        """Root mean square of the position error of each joint over all rows, (nu,), in rad."""
+        return np.asarray(np.sqrt((self.position**2).mean(axis=0)))
+
+    @cached_property
+    def joint_max(self) -> Floats:
+        """Largest position error of each joint, (nu,), in rad."""
+        return np.asarray(np.abs(self.position).max(axis=0))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the position error over all rows and joints, in rad."""
+        return float(np.sqrt((self.position**2).mean()))
+
+    @property
+    def max(self) -> float:
+        """Largest position error of any joint, in rad."""
+        return float(np.abs(self.position).max())
+
+
+def tracking_error(run: Run, gait: Gait) -> TrackingError:
+    """Compare the joints of a run with the gait they were to follow (paper Figure 3).
+
+    Raises
+    ------
+    GaitError
+        If the gait does not fit the robot of the run.
+    """
+    reference = reference_motion(run, gait)
+    joints = run.robot.model.actuator_joint
+    return TrackingError(
+        reference,
+        run.position[:, joints] - reference.position,
+        run.velocity[:, joints] - reference.velocity,
+    )

@@ -1,0 +1,52 @@
+"""What the ground does to each foot: one force and one moment (paper's F_r, F_l)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.motion import Motion, run_motion
+from heelstrike.analysis.sole import soles
+from heelstrike.sim.run import Run
+
+Floats = NDArray[np.float64]
+
+
+def foot_wrenches(run: Run, *, motion: Motion | None = None) -> Floats:
+    """Wrench of the ground on each foot, (nt, nf, 3): (f_x, f_z, m_y) in N, N and N m.
+
+    Forces act on the robot, in world axes. The moment is about +y and about the foot's reference
+    point, the ankle projected onto the sole (`heelstrike.analysis.sole`): the sum of
+    z f_x − x f_z over the foot's contact points, (x, z) being measured from that point. Unlike the
+    forces of single contact points, the wrench is unique also when the foot lies flat.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    motion : Motion, optional
+        Its motion, if already at hand.
+    """
+    reference = sole_points(run, motion=motion)
+    force = run.world_force
+    result = np.zeros((len(run.time), len(run.robot.feet), 3))
+    for i, foot in enumerate(run.robot.feet):
+        contacts = list(foot.contacts)
+        arm = run.contact_point[:, contacts] - reference[:, None, i]
+        f = force[:, contacts]
+        result[:, i, :2] = f.sum(axis=1)
+        result[:, i, 2] = (arm[..., 1] * f[..., 0] - arm[..., 0] * f[..., 1]).sum(axis=1)
+    return result
+
+
+def sole_points(run: Run, *, motion: Motion | None = None) -> Floats:
+    """World positions (x, z) of the feet's reference points, (nt, nf, 2), in m."""
+    motion = run_motion(run) if motion is None else motion
+    points = np.zeros((len(run.time), len(run.robot.feet), 2))
+    for i, sole in enumerate(soles(run.robot)):
+        angle = motion.link_angle[:, sole.foot.link]
+        c, s = np.cos(angle), np.sin(angle)
+        x, z = sole.reference
+        turned = np.stack((c * x + s * z, c * z - s * x), axis=-1)
+        points[:, i] = motion.link_origin[:, sole.foot.link] + turned
+    return points

@@ -1,0 +1,66 @@
+"""How runs under different methods drift apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from heelstrike.robot import Robot
+from heelstrike.view.style import figure_title, legend_above, new_figure, styled
+
+Floats = NDArray[np.float64]
+
+PANELS = (
+    ("position", "positions (rad, m)"),
+    ("energy", "energy (J)"),
+    ("zmp", "zero moment point (m)"),
+)
+# Okabe and Ito's colours, which colour-blind readers can tell apart, and strokes for those who
+# print.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+STROKES = ("-", "--", "-.", ":")
+SMALLEST = 1e-16
+
+
+def draw_comparison(
+    robot: Robot,
+    reference: str,
+    times: Mapping[str, Floats],
+    series: Mapping[str, Mapping[str, Floats]],
+) -> Figure:
+    """Draw absolute differences from the reference over time, one panel a quantity.
+
+    Parameters
+    ----------
+    robot : Robot
+        Whose runs they are.
+    reference : str
+        Name of the run they are held against; it is not drawn.
+    times : mapping of str to (n,) float
+        Instants in s, by method.
+    series : mapping of str to mapping of str to (n,) float
+        Differences by method and quantity (`position`, `energy`, `zmp`).
+    """
+    others = [name for name in series if name != reference]
+    with styled():
+        figure = new_figure(9.0, 7.0)
+        panels = figure.subplots(len(PANELS), 1, sharex=True)
+        for axes, (quantity, label) in zip(panels, PANELS, strict=True):
+            for i, name in enumerate(others):
+                values = np.abs(series[name][quantity])
+                axes.semilogy(
+                    times[name],
+                    np.where(values > SMALLEST, values, np.nan),
+                    color=COLORS[i % len(COLORS)],
+                    linestyle=STROKES[i % len(STROKES)],
+                    linewidth=1.0,
+                    label=name,
+                )
+            axes.set_ylabel(label)
+        panels[-1].set_xlabel("time (s)")
+        figure_title(figure, robot, f"differences from {reference}")
+        legend_above(panels[0])
+    return figure

@@ -1,0 +1,326 @@
+"""The shape of a robot as line segments: what figures, animations and portraits are made of.
+
+A robot is drawn from its tree alone: a bone from every link to the links it carries, a sole
+through the contact points, and a bone to twice the distance of the centre of mass where a link
+carries nothing, so that a trunk has a height. Massless links, the carriers of a floating base, are
+not drawn.
+"""
+
+from __future__ import annotations
+
+import enum
+import os
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from numpy.typing import NDArray
+
+from heelstrike.dynamics.queries import link_poses
+from heelstrike.robot.robot import Robot
+from heelstrike.view.style import (
+    FOOT_COLORS,
+    INK,
+    ORANGE,
+    PALE,
+    legend_above,
+    new_figure,
+    save_figure,
+    styled,
+)
+
+Floats = NDArray[np.float64]
+
+SAME_PLACE = 1e-6  # metres
+DISC_CORNERS = 16
+THICKEST = 15.0  # points, of a bone that has the whole mass
+THINNEST = 2.5
+LEGS_APART = 0.3  # rad that each leg of a portrait is turned at its root
+
+
+class Side(enum.IntEnum):
+    """Where a bone is, in the order of drawing: the viewer stands to the robot's right."""
+
+    FAR = 0
+    MIDDLE = 1
+    NEAR = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Line segments fixed to the links of a robot.
+
+    Attributes
+    ----------
+    link : (ns, 2) int
+        Link of each end of each segment.
+    local : (ns, 2, 2) float
+        Place (x, z) of each end in the frame of its link, in m.
+    width : (ns,) float
+        Line width in points.
+    side : (ns,) int
+        `Side` of each segment.
+    foot : (ns,) int
+        Index of the foot at the end of the segment's leg, -1 for the trunk.
+    """
+
+    link: NDArray[np.int64]
+    local: Floats
+    width: Floats
+    side: NDArray[np.int64]
+    foot: NDArray[np.int64]
+
+    @property
+    def colors(self) -> list[str]:
+        """Colour of each segment: legs as their feet, the rest dark."""
+        return [INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)] for foot in self.foot]
+
+    def segments(self, origin: Floats, angle: Floats) -> Floats:
+        """Place the segments in the world.
+
+        Parameters
+        ----------
+        origin : (..., nv, 2) float
+            Positions of the link frames, in m.
+        angle : (..., nv) float
+            Rotations of the links about +y, in rad.
+
+        Returns
+        -------
+        (..., ns, 2, 2) float
+            Segments, ends, (x, z).
+        """
+        theta = angle[..., self.link]
+        c, s = np.cos(theta), np.sin(theta)
+        x, z = self.local[..., 0], self.local[..., 1]
+        return np.asarray(origin[..., self.link, :] + np.stack((c * x + s * z, c * z - s * x), -1))
+
+
+def skeleton(robot: Robot) -> Skeleton:
+    """Make the line segments of a robot, those in front last."""
+    model = robot.model
+    reference = link_poses(robot, model.reference).origin
+    leg = legs(robot)
+    side = _sides(robot)
+    bones: list[tuple[int, Floats, int, Floats, float]] = []
+    share = np.cbrt(model.mass / max(robot.total_mass, 1e-12))
+    width = np.maximum(THINNEST, THICKEST * share)
+    nowhere = np.zeros(2)
+    for link in range(robot.nv):
+        if model.mass[link] == 0.0:
+            continue
+        before = len(bones)
+        for child in np.flatnonzero(model.parent == link):
+            if np.hypot(*(reference[child] - reference[link])) > SAME_PLACE:
+                bones.append((link, nowhere, int(child), nowhere, width[link]))
+        contacts = np.flatnonzero(model.contact_link == link)
+        for start, end in _outline(model.contact_position[contacts], bool(len(bones) > before)):
+            bones.append((link, start, link, end, width[link]))
+        for contact in contacts:
+            radius = float(model.contact_radius[contact])
+            if radius > SAME_PLACE:
+                for start, end in _disc(model.contact_position[contact], radius):
+                    bones.append((link, start, link, end, THINNEST))
+        center = model.center_of_mass[link]
+        if len(bones) == before and np.hypot(*center) > SAME_PLACE:
+            bones.append((link, nowhere, link, 2.0 * center, width[link]))
+    bones.sort(key=lambda bone: side[bone[0]])
+    links = np.array([(a, b) for a, _, b, _, _ in bones], dtype=np.int64).reshape(-1, 2)
+    return Skeleton(
+        link=links,
+        local=np.array([(p, r) for _, p, _, r, _ in bones], dtype=np.float64).reshape(-1, 2, 2),
+        width=np.array([bone[4] for bone in bones], dtype=np.float64),
+        side=side[links[:, 0]],
+        foot=leg[links[:, 0]],
+    )
+
+
+def _outline(points: Floats, carries: bool) -> list[tuple[Floats, Floats]]:
+    """Closed line from a link's origin through its contact points; none if it is a bone already."""
+    if carries or not len(points):
+        return []
+    corners = [np.zeros(2), *points]
+    if len(points) > 1:
+        corners.append(np.zeros(2))
+    return [(a, b) for a, b in pairwise(corners) if np.hypot(*(b - a)) > SAME_PLACE]
+
+
+def _disc(center: Floats, radius: float) -> list[tuple[Floats, Floats]]:
+    turn = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS + 1)
+    rim = center + radius * np.column_stack((np.cos(turn), np.sin(turn)))
+    return list(pairwise(rim))
+
+
+def legs(robot: Robot) -> NDArray[np.int64]:
+    """Index of the foot whose leg each link belongs to, -1 if it carries none or several."""
+    carried: list[set[int]] = [set() for _ in range(robot.nv)]
+    for index, foot in enumerate(robot.feet):
+        link = foot.link
+        while link >= 0:
+            carried[link].add(index)
+            link = int(robot.model.parent[link])
+    several = len(robot.feet) > 1
+    return np.array(
+        [next(iter(feet)) if several and len(feet) == 1 else -1 for feet in carried],
+        dtype=np.int64,
+    )
+
+
+def leg_labels(robot: Robot) -> list[tuple[str, str]]:
+    """Colours of the legs with the names of their feet; none for a robot of one leg."""
+    if len(robot.feet) < 2:
+        return []
+    return [
+        (FOOT_COLORS[i % len(FOOT_COLORS)], foot.name.replace("_", " "))
+        for i, foot in enumerate(robot.feet)
+    ]
+
+
+def _sides(robot: Robot) -> NDArray[np.int64]:
+    """Near and far links. Of two mirrored ones the left one, or else the later one, is far."""
+    side = np.full(robot.nv, int(Side.MIDDLE))
+    if robot.mirror is None:
+        return side
+    for link, other in enumerate(robot.mirror.joint):
+        if link == other:
+            continue
+        first, second = (_says_left(robot, int(i)) for i in (link, other))
+        far = first if first != second else link > other
+        side[link] = Side.FAR if far else Side.NEAR
+    return side
+
+
+def _says_left(robot: Robot, link: int) -> bool:
+    return "left" in f"{robot.joint_names[link]} {robot.link_names[link]}".lower()
+
+
+def draw_robot(
+    axes: Axes, robot: Robot, q: Floats, *, alpha: float = 1.0, scale: float = 1.0
+) -> LineCollection:
+    """Draw a robot in one configuration.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where, with metres along both axes.
+    robot : Robot
+        The robot.
+    q : (nq,) float
+        Its configuration.
+    alpha, scale : float
+        Opacity, and factor of all line widths.
+    """
+    bones = skeleton(robot)
+    poses = link_poses(robot, q)
+    lines = LineCollection(
+        list(bones.segments(poses.origin, poses.angle)),
+        colors=bones.colors,
+        linewidths=bones.width * scale,
+        capstyle="round",
+        alpha=alpha,
+        zorder=3,
+    )
+    axes.add_collection(lines)
+    return lines
+
+
+def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
+    """Write a portrait of a robot, standing as in its file but with its legs apart.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    path : str or path
+        Picture to write: .png, .pdf or .svg.
+
+    Raises
+    ------
+    ViewError
+        If the file cannot be written.
+    """
+    model = robot.model
+    q = _legs_apart(robot)
+    poses = link_poses(robot, q)
+    if robot.floating and robot.nc:  # stand on z = 0
+        q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
+        poses = link_poses(robot, q)
+    bones = skeleton(robot)
+    low, high = extent(bones.segments(poses.origin, poses.angle))
+    size = max(float((high - low).max()), 1e-3)
+    with styled():
+        figure = new_figure(4.6, 5.8)
+        axes = figure.add_subplot()
+        draw_robot(axes, robot, q)
+        massive = np.flatnonzero(model.mass > 0.0)
+        joints = [i for i in massive if model.axis[i, 0] != 0.0 and model.parent[i] >= 0]
+        axes.plot(
+            *poses.origin[joints].T, "o", color="white", mec=INK, ms=5, zorder=5, label="joint"
+        )
+        axes.plot(
+            *poses.center_of_mass[massive].T,
+            "P",
+            color=ORANGE,
+            mec="white",
+            ms=7,
+            zorder=6,
+            label="centre of mass",
+        )
+        points = _contact_bottoms(robot, poses.origin, poses.angle)
+        if len(points):
+            axes.plot(*points.T, "^", color=INK, ms=5, zorder=6, label="contact point")
+        ground = float(points[:, 1].min()) if len(points) else float(low[1])
+        axes.axhspan(ground - 0.06 * size, ground, color=PALE, zorder=0)
+        middle = 0.5 * float(low[0] + high[0])
+        axes.set(
+            xlim=(middle - 0.42 * size, middle + 0.42 * size),
+            ylim=(ground - 0.06 * size, high[1] + 0.06 * size),
+            xlabel="x (m)",
+            ylabel="z (m)",
+            aspect="equal",
+        )
+        figure.suptitle(
+            f"{robot.name}: {robot.total_mass:.4g} kg,\n"
+            f"{robot.nv} coordinates, {robot.nu} actuators"
+        )
+        legend_above(axes)
+        return save_figure(figure, path)
+
+
+def _legs_apart(robot: Robot) -> Floats:
+    """Reference configuration with mirrored legs spread, so that both are seen, feet level."""
+    model = robot.model
+    q = model.reference.copy()
+    leg = legs(robot)
+    for index, foot in enumerate(robot.feet):
+        chain = [i for i in np.flatnonzero(leg == index) if model.axis[i, 0] != 0.0]
+        if robot.mirror is None or int(robot.mirror.foot[index]) == index or len(chain) < 2:
+            continue
+        first, last = chain[0], foot.link
+        forward = index < int(robot.mirror.foot[index])
+        turn = -LEGS_APART if forward else LEGS_APART
+        for joint, angle in ((first, turn), (last, -turn)):
+            moved = q[joint] + angle * model.axis[joint, 0]
+            q[joint] = np.clip(moved, model.lower[joint], model.upper[joint])
+    return q
+
+
+def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:
+    """Lowest points of the contact discs, (nc, 2)."""
+    model = robot.model
+    c, s = np.cos(angle[model.contact_link]), np.sin(angle[model.contact_link])
+    x, z = model.contact_position.T
+    center = origin[model.contact_link] + np.column_stack((c * x + s * z, c * z - s * x))
+    center[:, 1] -= model.contact_radius
+    return center
+
+
+def extent(segments: Floats) -> tuple[Floats, Floats]:
+    """Lower left and upper right corner of segments (..., 2), in m."""
+    points = segments.reshape(-1, 2)
+    if not len(points):
+        return np.zeros(2), np.ones(2)
+    return points.min(axis=0), points.max(axis=0)

@@ -1,0 +1,123 @@
+"""plot(): the figures of a run by their names."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from heelstrike.sim.run import Run
+from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
+from heelstrike.view.errors import ViewError
+from heelstrike.view.style import save_figure, styled
+
+if TYPE_CHECKING:
+    from heelstrike.gait.gait import Gait
+
+_DRAWINGS: dict[str, tuple[str, Callable[[Run, Gait | None, slice], Figure]]] = {
+    "tracking": (
+        "joint positions with the gait's reference (paper Figure 3)",
+        joint_figures.draw_tracking,
+    ),
+    "velocities": (
+        "joint velocities with the gait's reference (paper Figure 4)",
+        joint_figures.draw_velocities,
+    ),
+    "zmp": (
+        "zero moment point of the stance foot within its sole (paper Figure 5)",
+        contact_figures.draw_zero_moment_point,
+    ),
+    "friction": (
+        "tangential force of each foot within the friction cone (paper Figure 6)",
+        contact_figures.draw_friction,
+    ),
+    "forces": ("normal and tangential force on each foot", contact_figures.draw_forces),
+    "torque": ("joint torques with their limits", joint_figures.draw_torque),
+    "gaps": ("heights of the contact points above the ground", contact_figures.draw_gaps),
+    "energy": (
+        "mechanical energy, the work that changed it, and what no work explains",
+        energy_figure.draw_energy,
+    ),
+    "snapshots": ("the robot in the course of one step", snapshots.draw_snapshots),
+}
+
+FIGURES = tuple(_DRAWINGS)
+"""Names of the figures that :func:`plot` draws."""
+
+
+def plot(
+    run: Run,
+    what: str,
+    *,
+    gait: Gait | None = None,
+    path: str | os.PathLike[str] | None = None,
+    span: tuple[float, float] | None = None,
+) -> Figure:
+    """Draw a figure of a run.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    what : str
+        One of :data:`FIGURES`: ``"tracking"``, ``"velocities"``, ``"zmp"`` and ``"friction"`` are
+        the paper's Figures 3 to 6; ``"forces"``, ``"torque"``, ``"gaps"``, ``"energy"``,
+        ``"snapshots"``.
+    gait : Gait, optional
+        The gait that the run followed; without it no references are drawn.
+    path : str or path, optional
+        File to write: .png, .pdf or .svg.
+    span : tuple of float, optional
+        First and last time to show, in s; all of the run by default. The snapshots are taken in
+        the middle step of it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure. It belongs to no window; ``figure.savefig`` writes it.
+
+    Raises
+    ------
+    ViewError
+        If there is no such figure, nothing to show, or the file cannot be written.
+    GaitError
+        If the gait does not fit the robot of the run.
+    """
+    if what not in _DRAWINGS:
+        raise ViewError(_unknown(what))
+    rows = _rows(run, span)
+    with styled():
+        figure = _DRAWINGS[what][1](run, gait, rows)
+    if path is not None:
+        save_figure(figure, path)
+    return figure
+
+
+def _rows(run: Run, span: tuple[float, float] | None) -> slice:
+    """Rows of a run within a span of time."""
+    if not len(run.time):
+        raise ViewError(f"there is nothing to draw: the run has no rows ({run.message})")
+    if span is None:
+        return slice(0, len(run.time))
+    try:
+        start, end = (float(t) for t in span)
+    except (TypeError, ValueError):
+        raise ViewError(f"a span is a pair of times in s, got {span!r}") from None
+    first, last = np.searchsorted(run.time, (start - 1e-9, end + 1e-9))
+    if not last > first:
+        raise ViewError(
+            f"there is nothing to draw: the run has no rows from {start} s to {end} s; it lasts "
+            f"from {run.time[0]:g} s to {run.time[-1]:g} s"
+        )
+    return slice(int(first), int(last))
+
+
+def _unknown(what: str) -> str:
+    near = difflib.get_close_matches(str(what).lower(), FIGURES, n=1)
+    guess = f" Did you mean {near[0]!r}?" if near else ""
+    names = "; ".join(f"{name}: {words}" for name, (words, _) in _DRAWINGS.items())
+    return f"there is no figure called {what!r}.{guess} There are {names}."

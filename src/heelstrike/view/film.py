@@ -1,0 +1,262 @@
+"""The picture of a run at one instant, redrawn frame by frame on a single canvas.
+
+Only what moves is drawn anew: the canvas is wiped with a copy of its background, and a handful of
+artists whose data change are drawn over it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+from numpy.typing import NDArray
+
+from heelstrike.analysis.motion import run_motion
+from heelstrike.sim.run import Run
+from heelstrike.view.arrows import Arrows
+from heelstrike.view.drawing import extent, leg_labels, skeleton
+from heelstrike.view.style import (
+    FORCE_COLOR,
+    GREY,
+    INK,
+    ORANGE,
+    PALE,
+    ZERO_MOMENT_POINT_COLOR,
+)
+
+Floats = NDArray[np.float64]
+
+DPI = 100
+FOLLOWS_WITHIN = 0.6
+"""Seconds over which the camera evens out the motion of the centre of mass."""
+POLYLINE = 120  # points of the ground that are drawn
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """What is to be seen in every frame of a film, in world axes.
+
+    Attributes
+    ----------
+    time : (nf,) float
+        Time of each frame, in s.
+    row : (nf,) int
+        Row of the run that each frame shows.
+    segments : (nf, ns, 2, 2) float
+        The robot.
+    center : (nf, 2) float
+        Centre of mass, in m.
+    point : (nf, nc, 2) float
+        Contact points, in m.
+    force : (nf, nc, 2) float
+        Mean force on the robot at them since the frame before, in N, so that impacts, which last
+        one step, are seen with their impulse and not missed between frames.
+    pressure : (nf, 2) float
+        Zero moment point of the mean forces, in m; NaN where nothing pushes.
+    """
+
+    time: Floats
+    row: NDArray[np.int64]
+    segments: Floats
+    center: Floats
+    point: Floats
+    force: Floats
+    pressure: Floats
+
+
+def frames(run: Run, interval: float) -> Frames:
+    """Pick the instants of a run that a film shows, `interval` (s) apart."""
+    count = int(np.floor((run.time[-1] - run.time[0]) / interval + 1e-9)) + 1
+    time = run.time[0] + interval * np.arange(count)
+    row = np.maximum(np.searchsorted(run.time, time + 1e-9, side="right") - 1, 0)
+    motion = run_motion(run)
+    held = np.diff(run.time)[:, None]
+    world = np.zeros_like(run.contact_point)  # impulses on the robot up to each row
+    world[1:] = np.cumsum(run.world_force[:-1] * held[..., None], axis=0)
+    pressing = np.zeros_like(run.gap)
+    pressing[1:] = np.cumsum(run.contact_force[:-1, :, 0] * held, axis=0)
+    before = np.append(row[:1], row[:-1])
+    elapsed = (run.time[row] - run.time[before])[:, None]
+    same = elapsed[:, 0] <= 0.0  # two frames of one row, or the first frame
+    elapsed[same] = 1.0
+    force = (world[row] - world[before]) / elapsed[..., None]
+    normal = (pressing[row] - pressing[before]) / elapsed
+    force[same] = run.world_force[row[same]]
+    normal[same] = run.contact_force[row[same], :, 0]
+    on_ground = run.contact_point[row] - run.gap[row][..., None] * run.contact_normal[row]
+    total = normal.sum(axis=1)
+    pushes = total > 1e-6 * run.robot.weight
+    pressure = np.full((count, 2), np.nan)
+    pressure[pushes] = np.einsum(
+        "fc,fck->fk", normal[pushes] / total[pushes, None], on_ground[pushes]
+    )
+    return Frames(
+        time=time,
+        row=row,
+        segments=skeleton(run.robot).segments(motion.link_origin[row], motion.link_angle[row]),
+        center=motion.center_of_mass[row],
+        point=run.contact_point[row],
+        force=force,
+        pressure=pressure,
+    )
+
+
+class Film:
+    """A canvas that shows one frame after the other.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    size : (int, int)
+        Width and height of the picture, in pixels.
+    fps : float
+        Frames a second.
+    speed : float
+        Simulated seconds a second.
+    """
+
+    def __init__(self, run: Run, size: tuple[int, int], fps: float, speed: float) -> None:
+        self.frames = frames(run, speed / fps)
+        self.size = size
+        self._ground = run.ground
+        self._camera = self._follow(1.0 / fps * speed)
+        scale = min(size) / 540.0
+        figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
+        self._canvas = FigureCanvasAgg(figure)
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        self._frame_view(size)
+        axes.set(xlim=self._x, ylim=self._z)
+        bones = skeleton(run.robot)
+        self._soil = Polygon(np.zeros((1, 2)), closed=True, facecolor=PALE, edgecolor=GREY, lw=1.0)
+        axes.add_patch(self._soil)
+        self._marks = LineCollection([], colors=GREY, linewidths=1.0)
+        self._robot = LineCollection(
+            [], colors=bones.colors, linewidths=scale * bones.width, capstyle="round"
+        )
+        for collection in (self._marks, self._robot):
+            axes.add_collection(collection, autolim=False)
+        self._arrows = Arrows(axes, self._size, run.robot.weight, width=2.5 * scale)
+        (self._pressure,) = axes.plot(
+            [], [], "D", color=ZERO_MOMENT_POINT_COLOR, mec="white", ms=9.0 * scale
+        )
+        (self._center,) = axes.plot([], [], "o", color=ORANGE, mec="white", ms=7.0 * scale)
+        font = 11.0 * scale
+        self._clock = axes.text(
+            0.02, 0.97, "", transform=axes.transAxes, va="top", fontsize=1.3 * font, color=INK
+        )
+        self._metres = [
+            axes.text(0.0, 0.0, "", ha="center", va="top", fontsize=0.9 * font, color=GREY)
+            for _ in range(int(np.ptp(self._x)) + 2)
+        ]
+        self._speed = "" if speed == 1.0 else f"   (speed × {speed:g})"
+        self._legend(figure, run, font)
+        self._moving: list[Artist] = [
+            self._soil,
+            self._marks,
+            *self._metres,
+            self._robot,
+            self._arrows.shafts,
+            self._arrows.heads,
+            self._center,
+            self._pressure,
+            self._clock,
+        ]
+        for artist in self._moving:
+            artist.set_animated(True)
+        canvas: Any = self._canvas  # matplotlib leaves these without types
+        canvas.draw()
+        self._background = canvas.copy_from_bbox(figure.bbox)
+
+    def __len__(self) -> int:
+        return len(self.frames.time)
+
+    def draw(self, index: int) -> memoryview:
+        """Draw a frame; return its pixels, four bytes each, valid until the next one."""
+        frames, camera = self.frames, self._camera[index]
+        canvas: Any = self._canvas
+        canvas.restore_region(self._background)
+        self._draw_ground(camera)
+        self._robot.set_segments(list(frames.segments[index] - camera))
+        self._arrows.show(frames.point[index] - camera, frames.force[index])
+        for marker, place in (
+            (self._pressure, frames.pressure[index] - camera),
+            (self._center, frames.center[index] - camera),
+        ):
+            marker.set_data(place[:1], place[1:])
+        self._clock.set_text(f"t = {frames.time[index]:.2f} s{self._speed}")
+        renderer = canvas.get_renderer()
+        for artist in self._moving:
+            artist.draw(renderer)
+        return memoryview(canvas.buffer_rgba())
+
+    def _follow(self, interval: float) -> Floats:
+        """Place of the camera in the world, (nf, 2): on the ground, ahead with the robot."""
+        center = self.frames.center[:, 0]
+        reach = min(round(FOLLOWS_WITHIN / interval), len(center) - 1)
+        # Straight continuation at both ends, so that the camera neither lags nor stops early.
+        before = center[0] - (center[1 : reach + 1] - center[0])[::-1]
+        after = center[-1] - (center[-reach - 1 : -1] - center[-1])[::-1]
+        padded = np.concatenate((before, center, after))
+        window = np.hanning(2 * reach + 3)[1:-1]
+        x = np.convolve(padded, window / window.sum(), mode="valid")
+        return np.column_stack((x, np.asarray(self._ground.height(x))))
+
+    def _frame_view(self, size: tuple[int, int]) -> None:
+        """Choose limits that hold the robot in all frames."""
+        seen = self.frames.segments - self._camera[:, None, None]
+        low, high = extent(seen)
+        self._size = max(float(high[1]), float(high[1] - low[1]), 1e-3)
+        bottom, top = min(-0.15 * self._size, float(low[1]) - 0.05 * self._size), 1.22 * high[1]
+        half = 1.05 * max(abs(float(low[0])), abs(float(high[0])))
+        aspect = size[0] / size[1]
+        height = max(float(top) - bottom, 2.0 * half / aspect)
+        self._z = (bottom, bottom + height)
+        self._x = (-0.5 * height * aspect, 0.5 * height * aspect)
+
+    def _draw_ground(self, camera: Floats) -> None:
+        left, right = self._x
+        corners = self._ground.model().vertices[:, 0] - camera[0]
+        x = np.union1d(
+            np.linspace(left, right, POLYLINE), corners[(corners > left) & (corners < right)]
+        )
+        z = np.asarray(self._ground.height(x + camera[0])) - camera[1]
+        below = self._z[0] - 1.0
+        outline = np.column_stack((x, z))
+        self._soil.set_xy(np.concatenate((outline, [[right, below], [left, below]])))
+        marks = np.arange(np.ceil(2.0 * (left + camera[0])), 2.0 * (right + camera[0])) / 2.0
+        tall = np.where(marks == np.round(marks), 0.03, 0.015) * self._size
+        height = np.asarray(self._ground.height(marks)) - camera[1]
+        top = np.column_stack((marks - camera[0], height))
+        self._marks.set_segments(list(np.stack((top, top - np.outer(tall, [0.0, 1.0])), axis=1)))
+        whole = np.flatnonzero(marks == np.round(marks))
+        for i, label in enumerate(self._metres):
+            if i < len(whole):
+                label.set_text(f"{marks[whole[i]]:.0f} m".replace("-", "−"))
+                label.set_position(top[whole[i]] - [0.0, 0.035 * self._size])
+            else:
+                label.set_text("")
+
+    def _legend(self, figure: Figure, run: Run, font: float) -> None:
+        def line(color: str, label: str) -> Line2D:
+            return Line2D([], [], color=color, lw=4.0, solid_capstyle="round", label=label)
+
+        def dot(marker: str, color: str, label: str) -> Line2D:
+            return Line2D([], [], marker=marker, color=color, mec="white", ls="", ms=8, label=label)
+
+        handles = [line(color, label) for color, label in leg_labels(run.robot)]
+        if run.robot.nc:
+            handles += [
+                line(FORCE_COLOR, "contact force"),
+                dot("D", ZERO_MOMENT_POINT_COLOR, "zero moment point"),
+            ]
+        handles.append(dot("o", ORANGE, "centre of mass"))
+        figure.legend(handles=handles, loc="upper right", fontsize=0.85 * font, labelspacing=0.35)

@@ -1,0 +1,103 @@
+"""A strip of the robot in the course of one step."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from heelstrike.analysis.motion import run_motion
+from heelstrike.analysis.support import walking_steps
+from heelstrike.sim.run import Run
+from heelstrike.view.arrows import Arrows
+from heelstrike.view.drawing import extent, leg_labels, skeleton
+from heelstrike.view.impacts import impact_rows
+from heelstrike.view.style import FORCE_COLOR, PALE, figure_title, new_figure
+
+if TYPE_CHECKING:
+    from heelstrike.gait.gait import Gait
+
+POSES = 7
+
+
+def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa: ARG001
+    """The robot at equal times of its middle step, side by side, with the forces on it."""
+    motion = run_motion(run)
+    bones = skeleton(run.robot)
+    start, end = _middle_step(run, rows)
+    times = np.linspace(start, end, POSES)
+    at = _usual_rows(run, times)
+    segments = bones.segments(motion.link_origin[at], motion.link_angle[at])
+    center = motion.center_of_mass[at, 0]
+    ground = np.asarray(run.ground.height(center))
+    origin = np.column_stack((center, ground))
+    low, high = extent(segments - origin[:, None, None])
+    size = max(float(high[1]), 0.5 * float((high - low).max()), 1e-3)
+    spacing = max(float(high[0] - low[0]), 0.3 * size) + 0.12 * size
+    figure = new_figure(9.0, 3.6)
+    axes = figure.add_subplot()
+    arrows = []
+    for i, row in enumerate(at):
+        shift = np.array([i * spacing, 0.0]) - origin[i]
+        axes.add_collection(
+            LineCollection(
+                list(segments[i] + shift),
+                colors=bones.colors,
+                linewidths=0.55 * bones.width,
+                capstyle="round",
+                zorder=3,
+            )
+        )
+        arrows.append((run.contact_point[row] + shift, run.world_force[row]))
+        axes.annotate(
+            f"{run.time[row]:.2f} s",
+            (i * spacing, 0.0),
+            xytext=(0.0, -8.0),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+        )
+    if run.robot.nc:
+        foot, force = (np.concatenate(parts) for parts in zip(*arrows, strict=True))
+        Arrows(axes, size, run.robot.weight, width=1.6).show(foot, force)
+    left, right = low[0] - 0.15 * size, (POSES - 1) * spacing + high[0] + 0.15 * size
+    step = np.linspace(left, right, 200)
+    if np.ptp(np.asarray(run.ground.height(np.linspace(center[0], center[-1], 50)))) < 1e-9:
+        axes.fill_between(step, -0.02 * size, 0.0, color=PALE, zorder=0)
+    axes.set(
+        xlim=(left, right),
+        ylim=(min(-0.16 * size, float(low[1]) - 0.05 * size), high[1] + 0.05 * size),
+        aspect="equal",
+    )
+    axes.set_axis_off()
+    figure_title(figure, run.robot, f"from {start:.2f} s to {end:.2f} s")
+    handles = [
+        Line2D([], [], color=color, lw=3.0, label=label)
+        for color, label in (*leg_labels(run.robot), (FORCE_COLOR, "contact force"))
+    ]
+    figure.legend(handles=handles, loc="upper right", ncols=len(handles))
+    return figure
+
+
+def _usual_rows(run: Run, times: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Rows at the given times, but the impacts' ones: after the first, before the last."""
+    usual = np.flatnonzero(~impact_rows(run))
+    if not len(usual):
+        usual = np.arange(len(run.time))
+    place = np.searchsorted(run.time[usual], times - 1e-9)
+    place[-1] = np.searchsorted(run.time[usual], times[-1] + 1e-9) - 1
+    return np.asarray(usual[np.clip(place, 0, len(usual) - 1)])
+
+
+def _middle_step(run: Run, rows: slice) -> tuple[float, float]:
+    """Start and end of the step in the middle of the rows; all of them if there is none."""
+    first, last = float(run.time[rows.start]), float(run.time[rows.stop - 1])
+    touchdowns = [s.touchdown for s in walking_steps(run) if first <= s.touchdown <= last]
+    if len(touchdowns) < 2:
+        return first, last
+    middle = (len(touchdowns) - 1) // 2
+    return touchdowns[middle], touchdowns[middle + 1]

@@ -1,0 +1,148 @@
+"""One look for all pictures: a palette that colour-blind readers can tell apart, readable sizes.
+
+Nothing here touches matplotlib's global state: figures are made without pyplot and inside
+:func:`styled`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from heelstrike.robot.robot import Robot
+from heelstrike.view.errors import ViewError
+
+# Okabe and Ito's palette.
+BLUE = "#0072B2"
+VERMILION = "#D55E00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
+SKY = "#56B4E9"
+ORANGE = "#E69F00"
+INK = "#222222"
+GREY = "#7A7A7A"
+PALE = "#E8E8E4"
+
+FOOT_COLORS = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE)
+"""Colours of the feet and their legs in the order of ``robot.feet``, in all pictures."""
+
+FORCE_COLOR = GREEN
+ZERO_MOMENT_POINT_COLOR = PURPLE
+BOUND: dict[str, Any] = {"color": INK, "linestyle": (0, (5, 3)), "linewidth": 1.0}
+"""How limits are drawn."""
+
+_STYLE: dict[str, Any] = {
+    "font.size": 10.0,
+    "axes.titlesize": 10.5,
+    "axes.labelsize": 10.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": GREY,
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.8,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": PALE,
+    "grid.linewidth": 0.8,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "lines.linewidth": 1.4,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "figure.dpi": 100.0,
+    "savefig.dpi": 150.0,
+    "savefig.facecolor": "white",
+    "svg.hashsalt": "heelstrike",
+}
+
+
+@contextlib.contextmanager
+def styled() -> Iterator[None]:
+    """Draw with heelstrike's look, whatever the caller's own settings are."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        settings: Any = matplotlib.rcParams
+        settings.update(_STYLE)
+        yield
+
+
+def new_figure(width: float, height: float, *, constrained: bool = True) -> Figure:
+    """Make a figure (inches) that belongs to no window and to no global list."""
+    figure = Figure(figsize=(width, height), layout="constrained" if constrained else None)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure; its kind follows from the name: .png, .pdf, .svg.
+
+    Raises
+    ------
+    ViewError
+        If the folder does not exist, or matplotlib knows no such kind of picture.
+    """
+    target = checked_target(path)
+    kinds = figure.canvas.get_supported_filetypes()
+    if target.suffix.lstrip(".").lower() not in kinds:
+        raise ViewError(f"cannot write {target}: the name of a picture ends in .png, .pdf or .svg")
+    try:
+        with styled():
+            figure.savefig(target)
+    except OSError as error:
+        raise ViewError(f"cannot write {target}: {error.strerror or error}") from error
+    return target
+
+
+def checked_target(path: str | os.PathLike[str]) -> Path:
+    """Return the path of a file to write, if its folder is there."""
+    target = Path(path)
+    if not target.parent.is_dir():
+        raise ViewError(f"cannot write {target}: there is no folder {target.parent}")
+    if target.is_dir():
+        raise ViewError(f"cannot write {target}: it is a folder; give the name of a file")
+    return target
+
+
+def figure_title(figure: Figure, robot: Robot, title: str, *, note: str = "") -> None:
+    """Write above a figure whose robot it shows and what of it; a note goes to the right."""
+    figure.suptitle(f"{robot.name}: {title}", x=0.01, ha="left", fontsize=12)
+    if note:
+        figure.text(0.99, 0.985, note, ha="right", va="top", fontsize=8.5, color=GREY)
+
+
+def time_axis(axes: Axes, time: NDArray[np.float64], *, labelled: bool = True) -> None:
+    """Let the x axis show a span of time, without margins."""
+    if time[-1] > time[0]:
+        axes.set_xlim(time[0], time[-1])
+    if labelled:
+        axes.set_xlabel("time (s)")
+
+
+def legend_above(axes: Axes, *, right: bool = False) -> None:
+    """Put the legend above the axes, in one row, out of the way of the curves."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            handles,
+            labels,
+            loc="lower right" if right else "lower left",
+            bbox_to_anchor=(1.0 if right else 0.0, 1.0),
+            ncols=len(handles),
+            borderaxespad=0.1,
+            columnspacing=1.5,
+            handletextpad=0.5,
+        )

@@ -1,0 +1,130 @@
+"""Energy is accounted for, and the time method's error with it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import walking
+from synthetic_runs import box, pendulum
+
+import heelstrike as hs
+from heelstrike.analysis import energy_balance
+
+G = 9.81
+
+
+def test_free_fall_loses_exactly_what_the_scheme_loses() -> None:
+    """After k steps of semi-implicit Euler a body has fallen g h² k (k + 1) / 2 at g h k.
+
+    Its energy differs from that of the true fall by −m g² h t / 2: the residual.
+    """
+    robot, h = box(height=3.0), 1e-3
+    run = hs.simulate(
+        robot, state=robot.reference_state(), duration=0.4, method=hs.TimeStepping(step=h)
+    )
+    balance = energy_balance(run)
+    np.testing.assert_allclose(balance.kinetic, 0.5 * 2.0 * (G * run.time) ** 2, rtol=1e-10)
+    np.testing.assert_allclose(balance.residual, -0.5 * 2.0 * G**2 * h * run.time, atol=1e-9)
+    np.testing.assert_array_equal(balance.actuators, 0.0)
+    np.testing.assert_array_equal(balance.contacts, 0.0)
+
+
+def test_plastic_landing_takes_the_kinetic_energy() -> None:
+    """What a block has on landing is lost to the ground, all of it, whatever the step."""
+    robot, h = box(height=0.05 + 0.2), 1e-3
+    run = hs.simulate(
+        robot,
+        state=robot.reference_state(),
+        duration=0.4,
+        method=hs.TimeStepping(step=h),
+        stop_when_fallen=False,
+    )
+    balance = energy_balance(run)
+    # The scheme resolves the height of the fall to v h, and that is the error of m g 0.2 m.
+    assert balance.contacts[-1] == pytest.approx(-2.0 * G * 0.2, abs=2.0 * G * 2.0 * h)
+    assert np.all(np.diff(balance.contacts) <= 1e-12)
+    assert balance.total[-1] == pytest.approx(balance.potential[-1], abs=1e-12)
+
+
+def test_sliding_friction_takes_the_kinetic_energy() -> None:
+    """Friction does −μ m g s, and the mean velocity of each step makes that exact."""
+    robot = box()
+    run = hs.simulate(
+        robot,
+        state=hs.State(robot.model.reference, np.array([2.0, 0.0, 0.0])),
+        duration=0.5,
+        ground=hs.Ground(friction=0.5),
+    )
+    balance = energy_balance(run)
+    assert balance.contacts[-1] == pytest.approx(-0.5 * 2.0 * 2.0**2, rel=1e-9)
+    np.testing.assert_allclose(balance.residual, 0.0, atol=1e-9)
+
+
+class Push:
+    """Turn a joint with a constant torque."""
+
+    def __init__(self, torque: float) -> None:
+        self.value = torque
+
+    def torque(self, t: float, state: object, contacts: object) -> np.ndarray:
+        return np.array([self.value])
+
+
+def test_driven_damped_pendulum() -> None:
+    """Work of motor and damper explain the energy, with an error that falls with the step."""
+    robot = pendulum(damping=0.8)
+    residuals = []
+    for h in (2e-3, 1e-3, 5e-4):
+        run = hs.simulate(
+            robot,
+            Push(6.0),
+            state=robot.reference_state(),
+            duration=2.0,
+            method=hs.TimeStepping(step=h),
+        )
+        balance = energy_balance(run)
+        turned = run.position[-1, 0] - run.position[0, 0]
+        assert balance.actuators[-1] == pytest.approx(6.0 * turned, rel=5.0 * h)
+        # Only where the joint turns back can the mean and the old velocity differ in sign.
+        assert np.all(np.diff(balance.dampers) < 1e-6)
+        residuals.append(np.abs(balance.residual).max())
+    orders = np.log2(np.array(residuals[:-1]) / residuals[1:])
+    assert np.all(np.abs(orders - 1.0) < 0.1), orders
+
+
+def test_joint_stop_takes_what_the_pendulum_brings() -> None:
+    """From −60° at rest it arrives at +60° with the motor's work; the plastic stop takes it."""
+    robot, h = pendulum(limited=True), 1e-3
+    start = np.deg2rad(-60.0)
+    run = hs.simulate(
+        robot,
+        Push(3.0),
+        state=hs.State([start], [0.0]),
+        duration=2.0,
+        method=hs.TimeStepping(step=h),
+    )
+    balance = energy_balance(run)
+    after = int(np.argmax(balance.stops < -1.0)) + 2
+    assert run.position[after, 0] == pytest.approx(np.deg2rad(60.0), abs=1e-4)
+    work = 3.0 * np.deg2rad(120.0)
+    assert balance.actuators[after] == pytest.approx(work, rel=5e-3)
+    assert balance.stops[after] == pytest.approx(-work, rel=2e-2)
+
+
+def test_walk() -> None:
+    """Over a steady walk motors give what impacts take, and hard contact gives nothing.
+
+    The step keeps a foot at rest in the pose of its beginning, so that the foot's velocity in the
+    pose of its end is of order h, and so is the work of the ground on a foot at rest.
+    """
+    balance = energy_balance(walking.walk(steps=4))
+    given_by_ground = np.maximum(np.diff(balance.contacts), 0.0).sum()
+    assert given_by_ground < 1e-2 * -balance.contacts[-1]
+    start, end = np.searchsorted(balance.time, (1.4 + 0.35, 2.1 + 0.35))
+    given = balance.actuators[end] - balance.actuators[start]
+    taken = balance.contacts[end] - balance.contacts[start]
+    assert given == pytest.approx(-taken, rel=0.01)
+    # What no work explains is the error of a method of first order.
+    finer = energy_balance(walking.walk(steps=4, step=5e-4))
+    ratio = np.abs(balance.residual).max() / np.abs(finer.residual).max()
+    assert ratio == pytest.approx(2.0, abs=0.2)

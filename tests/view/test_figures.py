@@ -1,0 +1,207 @@
+"""The figures of a run show what they say, and leave nothing behind."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+import pytest
+import walking
+from matplotlib.axes import Axes
+from matplotlib.image import imread
+from PIL import Image
+from synthetic_runs import box, make_run, pendulum
+
+import heelstrike as hs
+from heelstrike.analysis import energy_balance, reference_motion, zero_moment_point
+from heelstrike.view import FIGURES, ViewError, plot
+from heelstrike.view.impacts import impact_rows
+
+
+def curve(axes: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:
+    """Data of the line with a label."""
+    (line,) = [line for line in axes.get_lines() if line.get_label() == label]
+    return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+
+
+def panel(figure: matplotlib.figure.Figure, title: str) -> Axes:
+    (axes,) = [axes for axes in figure.axes if axes.get_title(loc="left") == title]
+    return axes
+
+
+@pytest.mark.parametrize("what", FIGURES)
+def test_every_figure_is_a_picture_with_units(what: str, tmp_path: Path) -> None:
+    path = tmp_path / f"{what}.png"
+    figure = plot(walking.walk(steps=4), what, gait=walking.gait(), path=path)
+    pixels = imread(path)
+    assert pixels.shape[0] > 300
+    assert pixels.shape[1] > 900
+    assert np.unique(pixels.reshape(-1, pixels.shape[-1]), axis=0).shape[0] > 20  # not blank
+    assert "bravo7" in figure.get_suptitle()
+    for axes in figure.axes:
+        if axes.axison:
+            assert axes.get_ylabel().rstrip(")").split("(")[-1] in {"rad", "rad/s", "N m", "N", "J", "m"} or axes.get_ylabel().endswith("(m)")  # fmt: skip
+    if what != "snapshots":
+        assert figure.axes[-1].get_xlabel() == "time (s)"
+
+
+@pytest.mark.parametrize("what", FIGURES)
+@pytest.mark.parametrize("kind", ["fall", "one row", "slope, without gait"])
+def test_unusual_runs_are_drawn_too(what: str, kind: str) -> None:
+    robot = walking.bravo7()
+    if kind == "fall":
+        state = hs.State(robot.model.reference, np.full(robot.nv, 0.4))
+        run = hs.simulate(robot, state=state, duration=3.0)
+        assert not run.completed
+    elif kind == "one row":
+        run = make_run(robot, [0.5])
+    else:
+        run = hs.simulate(
+            robot, state=robot.reference_state(), duration=0.2, ground=hs.Ground(slope=0.1)
+        )
+    plot(run, what)
+
+
+@pytest.mark.parametrize("what", ["tracking", "torque", "energy", "snapshots"])
+def test_a_pendulum_has_these(what: str) -> None:
+    plot(hs.simulate(pendulum(0.1), state=hs.State([1.0], [0.0]), duration=0.1), what)
+
+
+def test_what_a_robot_has_not_is_said() -> None:
+    swinging = hs.simulate(pendulum(), state=hs.State([1.0], [0.0]), duration=0.01)
+    with pytest.raises(ViewError, match="no feet"):
+        plot(swinging, "zmp")
+    lying = hs.simulate(box(), state=box().reference_state(), duration=0.01)
+    with pytest.raises(ViewError, match="no actuators"):
+        plot(lying, "torque")
+
+
+def test_tracking_shows_measured_and_reference() -> None:
+    run, gait = walking.walk(steps=4), walking.gait()
+    axes = panel(plot(run, "tracking", gait=gait), "left knee")
+    joint = run.robot.joint_names.index("left_knee")
+    np.testing.assert_array_equal(curve(axes, "measured")[1], run.position[:, joint])
+    reference = reference_motion(run, gait).position[:, run.robot.actuator_names.index("left_knee")]
+    np.testing.assert_array_equal(curve(axes, "reference")[1], reference)
+    without = panel(plot(run, "tracking"), "left knee")
+    assert [line.get_label() for line in without.get_lines()] == ["measured"]
+
+
+def test_zero_moment_point_with_the_ends_of_the_sole() -> None:
+    run = walking.walk(steps=4)
+    (axes,) = plot(run, "zmp").axes
+    np.testing.assert_array_equal(
+        curve(axes, "right foot")[1],
+        np.where(zero_moment_point(run).single_support, zero_moment_point(run).foot[:, 0], np.nan),
+    )
+    dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--"]
+    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in dashed) == [-0.1, 0.1]
+    assert axes.get_ylim()[0] < -0.1 < 0.1 < axes.get_ylim()[1]
+
+
+def test_friction_cone() -> None:
+    run = walking.walk(steps=4)
+    figure = plot(run, "friction")
+    axes = panel(figure, "left foot")
+    _, cone = curve(axes, "cone ±μFₙ")
+    _, force = curve(axes, "Fₜ")
+    held = np.isfinite(cone)
+    np.testing.assert_allclose(cone[held], 0.75 * run.contact_force[held][:, [2, 3], 0].sum(axis=1))
+    assert np.all(np.abs(force[held]) <= cone[held])
+    # An impact of 10 kN must not flatten half a kilonewton: it leaves the scale, and is mentioned.
+    assert np.nanmax(cone) > 3e3
+    assert 300.0 < axes.get_ylim()[1] < 2e3
+    assert any("impacts leave the scale" in text.get_text() for text in figure.texts)
+
+
+def test_energy_figure_is_the_balance() -> None:
+    run = walking.walk(steps=4)
+    axes = panel(plot(run, "energy"), "work since the start")
+    np.testing.assert_array_equal(curve(axes, "ground")[1], energy_balance(run).contacts)
+    assert "dampers" not in [line.get_label() for line in axes.get_lines()]  # bravo7 has none
+
+
+def test_impacts_are_the_rows_around_touchdowns() -> None:
+    run = walking.walk(steps=4)
+    rows = np.flatnonzero(impact_rows(run))
+    times = run.time[rows]
+    assert 3 <= len(rows) <= 12
+    assert np.all(np.abs(times / 0.7 - np.round(times / 0.7)) < 5e-3)
+    # They hold the largest forces of the run.
+    usual = np.delete(run.contact_force[..., 0], rows, axis=0)
+    assert usual.max() < 1e3 < run.contact_force[..., 0].max()
+
+
+def test_span() -> None:
+    run = walking.walk(steps=4)
+    for what in FIGURES:
+        figure = plot(run, what, gait=walking.gait(), span=(0.7, 1.4))
+        if what != "snapshots":
+            assert figure.axes[0].get_xlim() == pytest.approx((0.7, 1.4))
+    for span in ((1.0, 0.5), (50.0, 60.0)):
+        with pytest.raises(ViewError, match="no rows from"):
+            plot(run, "zmp", span=span)
+    with pytest.raises(ViewError, match="pair of times"):
+        plot(run, "zmp", span="all")  # type: ignore[arg-type]
+
+
+def test_unknown_figure_lists_the_known_ones() -> None:
+    with pytest.raises(ViewError) as caught:
+        plot(walking.walk(steps=1), "traking")
+    assert "Did you mean 'tracking'?" in str(caught.value)
+    for name in FIGURES:
+        assert name in str(caught.value)
+
+
+def test_run_without_rows() -> None:
+    with pytest.raises(ViewError, match="nothing to draw"):
+        plot(make_run(walking.bravo7(), np.zeros(0)), "zmp")
+
+
+@pytest.mark.parametrize("suffix", [".pdf", ".svg", ".PNG"])
+def test_kinds_of_picture(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"figure{suffix}"
+    plot(walking.walk(steps=1), "zmp", path=path)
+    assert path.stat().st_size > 3000
+
+
+def test_where_a_picture_cannot_go(tmp_path: Path) -> None:
+    run = walking.walk(steps=1)
+    with pytest.raises(ViewError, match="no folder"):
+        plot(run, "zmp", path=tmp_path / "nowhere" / "zmp.png")
+    with pytest.raises(ViewError, match="it is a folder"):
+        plot(run, "zmp", path=tmp_path)
+    with pytest.raises(ViewError, match=r"\.png, \.pdf or \.svg"):
+        plot(run, "zmp", path=tmp_path / "zmp.docx")
+
+
+def test_pictures_repeat_to_the_last_pixel(tmp_path: Path) -> None:
+    run = walking.walk(steps=1)
+    for name in ("a.png", "b.png"):
+        plot(run, "forces", path=tmp_path / name)
+    with Image.open(tmp_path / "a.png") as a, Image.open(tmp_path / "b.png") as b:
+        np.testing.assert_array_equal(np.asarray(a), np.asarray(b))
+
+
+def test_the_callers_own_settings_neither_matter_nor_change() -> None:
+    with matplotlib.rc_context({"font.size": 31.0, "axes.grid": False}):
+        before = dict(matplotlib.rcParams)
+        figure = plot(walking.walk(steps=1), "zmp")
+        assert dict(matplotlib.rcParams) == before
+        assert figure.axes[0].yaxis.label.get_fontsize() == 10.0
+
+
+def test_no_window_and_no_global_list_of_figures() -> None:
+    script = (
+        "import sys, heelstrike as hs; from heelstrike.view import plot;"
+        "r = hs.load_robot('bravo7');"
+        "plot(hs.simulate(r, state=r.reference_state(), duration=0.01), 'zmp');"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.strip() == "False"
