@@ -1,0 +1,44 @@
+"""The ``heelstrike`` command."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from heelstrike import __version__
+from heelstrike.cli.paper import paper
+from heelstrike.cli.robots import robots
+from heelstrike.cli.walk import walk
+
+app = typer.Typer(
+    name="heelstrike",
+    help="Planar biped robots that walk on exact hard contact.",
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+)
+app.command()(walk)
+app.command()(paper)
+app.command()(robots)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"heelstrike {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def heelstrike(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version."),
+    ] = False,
+) -> None:
+    """Planar biped robots that walk on exact hard contact."""
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,36 @@
+"""``heelstrike paper``: the paper's figures, and its claims beside what is measured here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from heelstrike.cli.terminal import Debug, messages, output, spoken, stage
+
+
+@spoken
+def paper(
+    out: Annotated[Path, typer.Option(file_okay=False, help="Directory for the report.")] = Path(
+        "paper"
+    ),
+    debug: Debug = False,  # noqa: ARG001 - for `spoken`
+) -> None:
+    """Reproduce the paper's Figures 3 to 6 and set its claims beside measured figures.
+
+    Writes report.md, figure3.png to figure6.png, gait.json and run.nc.
+    """
+    with stage("loading") as current:
+        from heelstrike.experiments.paper import reproduce_paper
+
+        report = reproduce_paper(out, progress=current.doing)
+    table = Table(show_lines=True)
+    table.add_column("where", max_width=20)
+    table.add_column("measured here")
+    table.add_column("verdict", max_width=8)
+    for claim in report.claims:
+        table.add_row(claim.source, claim.measured, claim.verdict.value)
+    output().print(table)
+    messages().print(f"{report.page}: the claims in full, with figures")

@@ -1,0 +1,1 @@
+"""Experiments: a walk with all its results; the paper, figure by figure."""

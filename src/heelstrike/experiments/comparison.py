@@ -1,0 +1,292 @@
+"""The same robot and controller under several ways through time: how far do they differ?"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.table import Table
+
+from heelstrike.analysis import (
+    energy_balance,
+    max_slip,
+    stances,
+    zero_moment_point,
+)
+from heelstrike.contact.ground import Ground
+from heelstrike.errors import SimulationError
+from heelstrike.robot import Robot, State
+from heelstrike.sim import CompiledController, Controller, EventKind, Run, simulate
+from heelstrike.sim.engine import Method
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+GRID = 1e-3
+"""Time between the instants at which runs are compared, in s."""
+
+LANDING = 0.02
+"""Impulses are added up over this time from a touchdown, in s: compliant ground needs it."""
+
+IN_EVENTS = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.ZENO, EventKind.PAINLEVE)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How one method fared, and how far it is from the reference.
+
+    Attributes
+    ----------
+    method : str
+        Name of the method.
+    status : str
+        How its run ended.
+    touchdowns : int
+        Touchdowns of feet after the start.
+    touchdown_s : float
+        Largest difference of a touchdown's time, in s.
+    impulse_Ns : float
+        Largest difference of the normal impulse of a landing foot, added up over `LANDING`.
+    zmp_m : float
+        Root mean square difference of the stance foot's zero moment point, in m.
+    energy_J : float
+        Root mean square difference of the mechanical energy, in J.
+    position : float
+        Largest difference of a coordinate at the last common instant (rad or m).
+    penetration_m, slip_m : float
+        Deepest penetration and longest slip of its own run.
+    complementarity : float
+        Largest residual of its own contact problems; zero for laws that solve none.
+    wall_s : float
+        Seconds it took to compute.
+    """
+
+    method: str
+    status: str
+    touchdowns: int
+    touchdown_s: float
+    impulse_Ns: float  # noqa: N815 - units keep their letters
+    zmp_m: float
+    energy_J: float  # noqa: N815
+    position: float
+    penetration_m: float
+    slip_m: float
+    complementarity: float
+    wall_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Runs of the same robot under several methods.
+
+    Attributes
+    ----------
+    runs : dict of str to Run
+        The runs by the names of their methods.
+    reference : str
+        Name of the run that the others are held against.
+    differences : tuple of Difference
+        One a method, in the order they were given.
+    """
+
+    runs: dict[str, Run]
+    reference: str
+    differences: tuple[Difference, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the differences as plain numbers, NaN as None."""
+        return {
+            "reference": self.reference,
+            "methods": [
+                {
+                    name: None if isinstance(value, float) and not math.isfinite(value) else value
+                    for name, value in asdict(each).items()
+                }
+                for each in self.differences
+            ],
+        }
+
+    def plot(self) -> Figure:
+        """Draw how positions, energy and zero moment point differ over time."""
+        from heelstrike.view.comparison_figure import draw_comparison
+
+        times, series = {}, {}
+        for name, run in self.runs.items():
+            times[name], series[name] = _against(run, self.runs[self.reference])
+        return draw_comparison(self.runs[self.reference].robot, self.reference, times, series)
+
+    def __rich__(self) -> Table:
+        table = Table(title=f"differences from {self.reference}", title_justify="left")
+        columns = [
+            ("method", "left"),
+            ("status", "left"),
+            ("touchdowns", "right"),
+            ("time of touchdown (s)", "right"),
+            ("landing impulse (N s)", "right"),
+            ("ZMP (m)", "right"),
+            ("energy (J)", "right"),
+            ("last position (rad, m)", "right"),
+            ("penetration (m)", "right"),
+            ("slip (m)", "right"),
+            ("complementarity", "right"),
+            ("computing (s)", "right"),
+        ]
+        for heading, side in columns:
+            table.add_column(heading, justify=side)  # type: ignore[arg-type]
+        for each in self.differences:
+            cells = [f"{v:.2g}" if isinstance(v, float) else str(v) for v in asdict(each).values()]
+            table.add_row(*(cell.replace("nan", "–") for cell in cells))
+        return table
+
+
+def compare(
+    robot: Robot,
+    controller: Controller | CompiledController | None = None,
+    *,
+    methods: Sequence[Method] | Mapping[str, Method],
+    state: State,
+    duration: float,
+    ground: Ground | None = None,
+    reference: str | None = None,
+    control_period: float | None = None,
+) -> Comparison:
+    """Simulate the same thing by several methods and tell how far their answers differ.
+
+    Parameters
+    ----------
+    robot, controller, state, duration, ground, control_period
+        As in :func:`heelstrike.simulate`.
+    methods : sequence of Method, or mapping of names to them
+        Ways through time; a sequence is named after their classes and options.
+    reference : str, optional
+        Name of the method to hold the others against; the first by default.
+
+    Raises
+    ------
+    SimulationError
+        If no method is given, two have the same name, or the reference is none of them.
+    """
+    named = _named(methods)
+    first = next(iter(named)) if reference is None else reference
+    if first not in named:
+        raise SimulationError(f"the reference {first!r} is none of the methods: {', '.join(named)}")
+    runs = {
+        name: simulate(
+            robot,
+            controller,
+            state=state,
+            duration=duration,
+            method=method,
+            ground=ground,
+            control_period=control_period,
+        )
+        for name, method in named.items()
+    }
+    return Comparison(
+        runs, first, tuple(_difference(name, run, runs[first]) for name, run in runs.items())
+    )
+
+
+def _named(methods: Sequence[Method] | Mapping[str, Method]) -> dict[str, Method]:
+    if isinstance(methods, Mapping):
+        named = dict(methods)
+    else:
+        named = {str(method): method for method in methods}
+        if len(named) < len(methods):
+            raise SimulationError("two of the methods to compare are the same")
+    if not named:
+        raise SimulationError("there is no method to compare")
+    return named
+
+
+def _difference(name: str, run: Run, reference: Run) -> Difference:
+    ours, theirs = _landings(run), _landings(reference)
+    shared = min(len(ours), len(theirs))
+    landing = ours[:shared] - theirs[:shared]
+    _, series = _against(run, reference)
+    return Difference(
+        method=name,
+        status=run.status.value,
+        touchdowns=len(ours),
+        touchdown_s=_largest(landing[:, 0]),
+        impulse_Ns=_largest(landing[:, 1]),
+        zmp_m=_root_mean_square(series["zmp"]),
+        energy_J=_root_mean_square(series["energy"]),
+        position=float(series["position"][-1]) if len(series["position"]) else math.nan,
+        penetration_m=run.certificates.penetration,
+        slip_m=max_slip(run),
+        complementarity=run.certificates.complementarity,
+        wall_s=run.timing.wall_s,
+    )
+
+
+def _landings(run: Run) -> Floats:
+    """Time and normal impulse of every landing of a foot, (n, 2)."""
+    found = []
+    for stance in stances(run):
+        if stance.touchdown == run.time[0]:
+            continue
+        contacts = list(run.robot.feet[stance.foot].contacts)
+        found.append((stance.touchdown, _landing_impulse(run, contacts, stance.touchdown)))
+    return np.array(found, dtype=np.float64).reshape(-1, 2)
+
+
+def _landing_impulse(run: Run, contacts: list[int], touchdown: float) -> float:
+    """Normal impulse on some contact points over the landing.
+
+    Time stepping and compliant laws have it all in their forces; event-driven runs have impacts
+    apart, in their events.
+    """
+    end = touchdown + LANDING
+    spans = np.diff(run.time)
+    rows = (run.time[1:] > touchdown - 1e-12) & (run.time[:-1] < end)
+    force = run.contact_force[:-1, contacts, 0].sum(axis=1)
+    total = float(np.sum((force * spans)[rows]))
+    if getattr(run.method, "impulses_in_events", False):
+        total += sum(
+            event.impulse[0]
+            for event in run.events
+            if event.kind in IN_EVENTS
+            and event.contact in contacts
+            and touchdown - 1e-12 <= event.time < end
+        )
+    return total
+
+
+def _against(run: Run, reference: Run) -> tuple[Floats, dict[str, Floats]]:
+    """Differences of a run from the reference on a common grid of instants."""
+    end = min(run.time[-1], reference.time[-1])
+    grid = np.linspace(0.0, end, max(2, round(end / GRID) + 1))
+    ours, theirs = _sampled(run, grid), _sampled(reference, grid)
+    return grid, {
+        "position": np.abs(ours["position"] - theirs["position"]).max(axis=1),
+        "energy": ours["energy"] - theirs["energy"],
+        "zmp": ours["zmp"] - theirs["zmp"],
+    }
+
+
+def _sampled(run: Run, grid: Floats) -> dict[str, Floats]:
+    """Positions (linearly), energy and zero moment point (the row before) at given instants."""
+    before = np.clip(np.searchsorted(run.time, grid + 1e-9, side="right") - 1, 0, None)
+    position = np.column_stack([np.interp(grid, run.time, column) for column in run.position.T])
+    zmp = zero_moment_point(run).stance if run.robot.feet else np.full(len(run.time), np.nan)
+    return {
+        "position": position,
+        "energy": energy_balance(run).total[before],
+        "zmp": zmp[before],
+    }
+
+
+def _largest(values: Floats) -> float:
+    return float(np.abs(values).max()) if len(values) else math.nan
+
+
+def _root_mean_square(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if len(finite) else math.nan

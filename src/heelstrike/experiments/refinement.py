@@ -1,0 +1,203 @@
+"""How the answer of time stepping depends on its step and on its scheme.
+
+The paper warns that first-order, fixed-step methods may need prohibitively small steps. Here the
+same gait is walked with its two readings of Euler's method and the gap-linearised default, with a
+range of steps, and their order of convergence is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis import summarize
+from heelstrike.contact.ground import Ground
+from heelstrike.control import ComputedTorque
+from heelstrike.experiments.walk import walk
+from heelstrike.gait import Gait
+from heelstrike.robot import Robot
+from heelstrike.sim import RunStatus, Scheme, TimeStepping, simulate
+
+Floats = NDArray[np.float64]
+
+SCHEMES = (Scheme.GAP_LINEARISED, Scheme.PAPER_EXPLICIT, Scheme.PAPER_SYMPLECTIC)
+"""Discretisations compared: the default, and the paper's equations and text."""
+
+TIME_STEPS = (1e-2, 5e-3, 2e-3, 1e-3, 5e-4, 2e-4, 1e-4)
+"""Time steps of the walks, in s."""
+
+FINE_STEPS = (4e-4, 2e-4, 1e-4, 5e-5)
+"""Time steps from which the order of convergence is measured, in s."""
+
+EXACT_STEP = 5e-6
+"""Time step of the motion that counts as exact, in s."""
+
+COMPARED_AT = 0.9
+"""When motions are compared, as a share of the first step: before the foot lands."""
+
+
+@dataclass(frozen=True)
+class RefinedWalk:
+    """One walk of the comparison.
+
+    Attributes
+    ----------
+    scheme : Scheme
+        Discretisation.
+    step : float
+        Time step in s.
+    status : RunStatus
+        How the run ended.
+    steps : int
+        Walking steps taken, of those asked for.
+    tracking_rms : float
+        Tracking error of the joints, in rad.
+    zmp_margin : float
+        Least distance of the zero moment point to the ends of the sole in single support, in m.
+    slip, penetration : float
+        Largest over the walk, in m.
+    real_time_factor : float
+        Simulated over computing time.
+    """
+
+    scheme: Scheme
+    step: float
+    status: RunStatus
+    steps: int
+    tracking_rms: float
+    zmp_margin: float
+    slip: float
+    penetration: float
+    real_time_factor: float
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """How the error of a scheme falls with its step.
+
+    Attributes
+    ----------
+    scheme : Scheme
+        Discretisation.
+    steps : tuple of float
+        Time steps in s.
+    errors : tuple of float
+        Largest difference of a coordinate from the exact motion late in the first walking step,
+        in m or rad.
+    order : float
+        Slope of log(error) over log(step).
+    """
+
+    scheme: Scheme
+    steps: tuple[float, ...]
+    errors: tuple[float, ...]
+    order: float
+
+
+def refine(
+    robot: Robot,
+    gait: Gait,
+    *,
+    ground: Ground | None = None,
+    walking_steps: int = 20,
+    time_steps: Sequence[float] = TIME_STEPS,
+    schemes: Sequence[Scheme] = SCHEMES,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[RefinedWalk, ...]:
+    """Walk the same gait with several schemes and time steps.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    gait : Gait
+        Its gait.
+    ground : Ground, optional
+        The ground.
+    walking_steps : int
+        Walking steps of each walk.
+    time_steps : sequence of float
+        Time steps in s.
+    schemes : sequence of Scheme
+        Discretisations.
+    progress : callable, optional
+        Called with the fraction of the walks that is done.
+    """
+    walks = []
+    for scheme in schemes:
+        for step in time_steps:
+            run = walk(
+                robot,
+                gait,
+                steps=walking_steps,
+                method=TimeStepping(step=step, scheme=scheme),
+                ground=ground,
+            )
+            summary = summarize(run, gait=gait)
+            walks.append(
+                RefinedWalk(
+                    scheme=scheme,
+                    step=step,
+                    status=run.status,
+                    steps=summary.steps,
+                    tracking_rms=summary.tracking_rms_rad,
+                    zmp_margin=summary.zmp_margin_min_m,
+                    slip=summary.slip_max_m,
+                    penetration=summary.penetration_max_m,
+                    real_time_factor=summary.real_time_factor,
+                )
+            )
+            if progress is not None:
+                progress(len(walks) / (len(schemes) * len(time_steps)))
+    return tuple(walks)
+
+
+def converge(
+    robot: Robot,
+    gait: Gait,
+    *,
+    ground: Ground | None = None,
+    time_steps: Sequence[float] = FINE_STEPS,
+    schemes: Sequence[Scheme] = SCHEMES,
+) -> tuple[Convergence, ...]:
+    """Measure the order of convergence of several schemes on the first step of a gait.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    gait : Gait
+        Its gait.
+    ground : Ground, optional
+        The ground.
+    time_steps : sequence of float
+        Time steps in s, two or more.
+    schemes : sequence of Scheme
+        Discretisations.
+    """
+
+    def motion(step: float, scheme: Scheme) -> Floats:
+        """Coordinates at the instant of comparison, a whole number of all steps."""
+        instant = round(COMPARED_AT * gait.step_duration / coarsest) * coarsest
+        run = simulate(
+            robot,
+            ComputedTorque(robot, gait),
+            state=gait.initial_state,
+            duration=instant,
+            method=TimeStepping(step=step, scheme=scheme),
+            ground=ground,
+            record_every=round(instant / step),
+        )
+        return np.asarray(run.position[-1])
+
+    coarsest = max(time_steps)
+    exact = motion(EXACT_STEP, Scheme.GAP_LINEARISED)
+    found = []
+    for scheme in schemes:
+        errors = [float(np.abs(motion(step, scheme) - exact).max()) for step in time_steps]
+        order = float(np.polyfit(np.log(time_steps), np.log(errors), 1)[0])
+        found.append(Convergence(scheme, tuple(time_steps), tuple(errors), order))
+    return tuple(found)

@@ -1,0 +1,115 @@
+"""What a walk leaves in a directory, written so that nothing is lost when something fails.
+
+The gait is saved before it is simulated, the run before anything is drawn from it, and every file
+on its own: one that cannot be made does not take the others with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from heelstrike.gait import Gait
+from heelstrike.sim import Run
+from heelstrike.view.figures import FIGURES
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A file that was written, or what kept it from being written.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    error : Exception or None
+        What went wrong, if anything.
+    """
+
+    path: Path
+    error: Exception | None = None
+
+
+class Results:
+    """The directory of a walk.
+
+    Parameters
+    ----------
+    directory : Path
+        Created if it does not exist.
+
+    Raises
+    ------
+    OSError
+        If the directory cannot be created.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        directory.mkdir(parents=True, exist_ok=True)
+        self.directory = directory
+
+    def save_gait(self, gait: Gait) -> Path:
+        """Write gait.json, and remove the results of an earlier walk, which belong to another."""
+        path = self.directory / "gait.json"
+        gait.save(path)
+        for stale in ("run.nc", "summary.json", *(f"{figure}.png" for figure in FIGURES)):
+            (self.directory / stale).unlink(missing_ok=True)
+        for stale in ("walk.mp4", "walk.gif"):
+            (self.directory / stale).unlink(missing_ok=True)
+        return path
+
+    def save_run(
+        self,
+        run: Run,
+        gait: Gait,
+        *,
+        animation: str | None = "mp4",
+        progress: Callable[[float], None] | None = None,
+    ) -> tuple[Saved, ...]:
+        """Write run.nc, summary.json, a PNG for every figure, and an animation.
+
+        Parameters
+        ----------
+        run : Run
+            The run.
+        gait : Gait
+            The gait it followed.
+        animation : str, optional
+            Kind of animation, "mp4" or "gif"; None for none.
+        progress : callable, optional
+            Called with the fraction of the files that is done.
+
+        Returns
+        -------
+        tuple of Saved
+            Every file, in the order of writing, with what went wrong.
+        """
+        tasks: dict[str, Callable[[Path], object]] = {
+            "run.nc": run.save,
+            "summary.json": lambda path: path.write_text(
+                run.summary(gait=gait).to_json() + "\n", encoding="utf-8"
+            ),
+        }
+        for figure in FIGURES:
+            tasks[f"{figure}.png"] = _drawing(run, gait, figure)
+        if animation is not None:
+            tasks[f"walk.{animation}"] = run.animate
+        saved = []
+        for done, (name, write) in enumerate(tasks.items(), start=1):
+            saved.append(_attempt(self.directory / name, write))
+            if progress is not None:
+                progress(done / len(tasks))
+        return tuple(saved)
+
+
+def _drawing(run: Run, gait: Gait, figure: str) -> Callable[[Path], object]:
+    return lambda path: run.plot(figure, gait=gait, path=path)
+
+
+def _attempt(path: Path, write: Callable[[Path], object]) -> Saved:
+    try:
+        write(path)
+    except Exception as error:  # whatever it is, the other files are still wanted
+        return Saved(path, error)
+    return Saved(path)

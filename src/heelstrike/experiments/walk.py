@@ -1,0 +1,146 @@
+"""Walking a gait for a number of steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from heelstrike.contact.ground import Ground
+from heelstrike.control import ComputedTorque
+from heelstrike.dynamics import center_of_mass, contact_positions
+from heelstrike.errors import GaitError, SimulationError
+from heelstrike.gait import Gait
+from heelstrike.robot import Robot
+from heelstrike.sim import Controller, Run, simulate
+from heelstrike.sim.engine import Method
+
+HEIGHT = 1.044
+"""Height of bravo7's centre of mass above its soles, in m."""
+
+LAST_STEP = 0.1
+"""How much longer than the steps should take a walk is simulated, as a share of one step: the last
+touchdown is then inside it, and the robot has not gone far beyond."""
+
+
+@dataclass(frozen=True)
+class StepSize:
+    """Size of a walking step.
+
+    Attributes
+    ----------
+    length : float
+        In m.
+    duration : float
+        In s.
+    clearance : float
+        Height of the swing foot's path, in m.
+    """
+
+    length: float
+    duration: float
+    clearance: float
+
+
+BRAVO7 = StepSize(0.30, 0.70, 0.03)
+
+OWN_STEPS = {
+    "bravo7": BRAVO7,
+    # One cubic polynomial a joint lifts this robot's foot, whose heel is close behind the ankle and
+    # whose ankle is at the height of the sole, no higher than this.
+    "spring_flamingo": StepSize(0.27, 0.67, 0.01),
+}
+"""Robots whose step is not left to the rule of :func:`typical_step`."""
+
+
+def typical_step(robot: Robot) -> StepSize:
+    """Size of a step that suits a robot.
+
+    For robots without a step of their own it is dynamically similar to bravo7's 0.30 m in 0.70 s:
+    lengths scale with the height of the centre of mass above the feet in the reference
+    configuration, times with its square root.
+
+    Raises
+    ------
+    GaitError
+        If the robot has no contact points under its centre of mass.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> from heelstrike.experiments.walk import typical_step
+    >>> typical_step(hs.load_robot("bravo7"))
+    StepSize(length=0.3, duration=0.7, clearance=0.03)
+    """
+    if robot.name in OWN_STEPS:
+        return OWN_STEPS[robot.name]
+    standing = robot.model.reference
+    height = 0.0
+    if robot.nc:
+        soles = contact_positions(robot, standing)[:, 1] - robot.model.contact_radius
+        height = float(center_of_mass(robot, standing)[1] - soles.min())
+    if not height > 0.0:
+        raise GaitError(
+            f"robot {robot.name!r} has no contact points under its centre of mass, so it cannot "
+            f"stand. Give it feet."
+        )
+    scale = height / HEIGHT
+    return StepSize(
+        length=round(BRAVO7.length * scale, 2),
+        duration=round(BRAVO7.duration * float(np.sqrt(scale)), 2),
+        clearance=round(BRAVO7.clearance * scale, 3),
+    )
+
+
+def walk(
+    robot: Robot,
+    gait: Gait,
+    *,
+    steps: int = 20,
+    controller: Controller | None = None,
+    method: Method | None = None,
+    ground: Ground | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Walk a gait.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    gait : Gait
+        Its gait.
+    steps : int
+        Steps to walk. The run goes on for a tenth of a step after the time they should take.
+    controller : Controller, optional
+        What moves the joints; computed torque with its usual gains by default.
+    method : Method, optional
+        Way through time.
+    ground : Ground, optional
+        The ground.
+    progress : callable, optional
+        Called now and then with the fraction of the walk that is done.
+
+    Raises
+    ------
+    SimulationError
+        If the number of steps is not positive.
+    """
+    if steps < 1:
+        raise SimulationError(f"a walk has at least one step, got {steps}")
+    duration = (steps + LAST_STEP) * gait.step_duration
+
+    def report(time: float) -> None:
+        if progress is not None:
+            progress(time / duration)
+
+    return simulate(
+        robot,
+        ComputedTorque(robot, gait) if controller is None else controller,
+        state=gait.initial_state,
+        duration=duration,
+        method=method,
+        ground=ground,
+        progress=report,
+    )

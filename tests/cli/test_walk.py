@@ -1,0 +1,297 @@
+"""``heelstrike walk``: what it writes, what it says, and that nothing is lost when it fails."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+import heelstrike as hs
+from heelstrike.cli import walk as walk_module
+from heelstrike.cli.main import app
+from heelstrike.sim import Scheme
+from heelstrike.view.figures import FIGURES
+
+STEPS = 3  # of the walk in conftest.py
+
+KEYS = {
+    "status",
+    "steps",
+    "distance_m",
+    "duration_s",
+    "gait",
+    "tracking_rms_rad",
+    "zmp_min_m",
+    "zmp_max_m",
+    "zmp_limits_m",
+    "friction_use_max",
+    "slip_max_m",
+    "penetration_max_m",
+    "complementarity_max",
+    "solver",
+    "cost_of_transport",
+    "compile_s",
+    "wall_s",
+    "real_time_factor",
+}
+
+
+def test_walks_and_writes_everything(walked: tuple[Path, Any]) -> None:
+    out, result = walked
+    assert result.exit_code == 0, result.stderr
+    written = {path.name for path in out.iterdir()}
+    assert written == {
+        "gait.json",
+        "run.nc",
+        "summary.json",
+        "walk.mp4",
+        *(f"{figure}.png" for figure in FIGURES),
+    }
+    assert all((out / name).stat().st_size > 0 for name in written)
+    assert (out / "walk.mp4").read_bytes()[4:8] == b"ftyp"
+    for name in written:
+        assert name in " ".join(result.stderr.split())
+
+
+def test_summary_has_its_keys_and_a_physical_walk(walked: tuple[Path, Any]) -> None:
+    summary = json.loads((walked[0] / "summary.json").read_text(encoding="utf-8"))
+    assert summary.keys() >= KEYS
+    assert summary["gait"].keys() >= {"step_length_m", "step_duration_s", "cost_N2m2s"}
+    assert summary["solver"].keys() >= {"name", "solves", "fallbacks", "failures"}
+    assert summary["status"] == "completed"
+    assert summary["steps"] == STEPS
+    assert summary["gait"]["step_length_m"] == pytest.approx(0.30)
+    assert summary["gait"]["step_duration_s"] == pytest.approx(0.70)
+    # The body moves by a step's length a step, and a little on in the time after the last one.
+    assert summary["distance_m"] == pytest.approx(STEPS * 0.30, abs=0.1)
+    low, high = summary["zmp_limits_m"]
+    assert low <= summary["zmp_min_m"] < summary["zmp_max_m"] <= high
+    assert summary["solver"]["failures"] == 0
+    assert all(math.isfinite(v) for v in summary.values() if isinstance(v, float))
+
+
+def test_the_run_and_gait_can_be_loaded(walked: tuple[Path, Any]) -> None:
+    run = hs.load_run(walked[0] / "run.nc")
+    assert run.completed
+    gait = hs.load_gait(walked[0] / "gait.json", run.robot)
+    summary = json.loads((walked[0] / "summary.json").read_text(encoding="utf-8"))
+    assert run.summary(gait=gait).tracking_rms_rad == pytest.approx(summary["tracking_rms_rad"])
+
+
+def test_table_for_a_person(walked: tuple[Path, Any]) -> None:
+    table = walked[1].stdout
+    for label in ("steps", "zero moment point", "friction use", "cost of transport"):
+        assert label in table
+    assert "\x1b" not in table
+
+
+def test_json_is_all_of_standard_output(walk: Callable[..., Any], tmp_path: Path) -> None:
+    result = walk("--steps", "1", "--json")
+    assert result.exit_code == 0, result.stderr
+    assert result.stderr == ""
+    printed = json.loads(result.stdout)
+    assert printed == json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_gif_replaces_the_film_of_an_earlier_walk(walk: Callable[..., Any], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    for name in ("walk.mp4", "run.nc", "notes.txt"):
+        (out / name).write_text("of yesterday", encoding="utf-8")
+    result = walk("--steps", "1", "--animation", "gif")
+    assert result.exit_code == 0, result.stderr
+    assert (out / "walk.gif").read_bytes().startswith(b"GIF8")
+    assert not (out / "walk.mp4").exists()
+    assert (out / "run.nc").read_bytes() != b"of yesterday"
+    assert (out / "notes.txt").read_text(encoding="utf-8") == "of yesterday"
+
+
+def test_a_gait_walks_from_its_own_directory(walked: tuple[Path, Any], tmp_path: Path) -> None:
+    gait = tmp_path / "gait.json"
+    text = (walked[0] / "gait.json").read_text(encoding="utf-8")
+    gait.write_text(text, encoding="utf-8")
+    options = ["--gait", str(gait), "--out", str(tmp_path), "--steps", "1", "--animation", "none"]
+    assert CliRunner().invoke(app, ["walk", *options]).exit_code == 0
+    assert gait.read_text(encoding="utf-8") == text
+
+
+def test_a_fall_is_kept_and_told(walk: Callable[..., Any], tmp_path: Path) -> None:
+    # Without friction the feet slide away at once.
+    result = walk("--friction", "0")
+    assert result.exit_code == 1
+    assert "error: the robot fell" in result.stderr
+    assert "status" in result.stdout
+    out = tmp_path / "out"
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["status"] == "fell"
+    assert hs.load_run(out / "run.nc").time[-1] > 0.0
+    assert (out / "tracking.png").exists()
+
+
+@pytest.mark.parametrize("lost", ["zmp", "tracking"])
+def test_a_figure_that_fails_takes_nothing_with_it(
+    walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: str
+) -> None:
+    def plot(run: hs.Run, what: str, *, path: Path, **_: Any) -> None:
+        if what == lost:
+            raise RuntimeError("out of ink")
+        path.touch()
+
+    monkeypatch.setattr(hs.Run, "plot", plot)
+    result = walk("--steps", "1", "--animation", "gif")
+    assert result.exit_code == 1
+    assert f"{lost}.png could not be made: RuntimeError: out of ink" in result.stderr
+    written = {path.stem for path in (tmp_path / "out").iterdir()}
+    assert written == {"gait", "run", "summary", "walk", *FIGURES} - {lost}
+
+
+def test_a_film_that_fails_takes_nothing_with_it(
+    walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def animate(run: hs.Run, path: Path) -> None:
+        raise OSError("no codec")
+
+    monkeypatch.setattr(hs.Run, "animate", animate)
+    result = walk("--steps", "1", "--animation", "mp4", "--json")
+    assert result.exit_code == 1
+    assert "walk.mp4 could not be made: OSError: no codec" in result.stderr
+    assert json.loads(result.stdout)["steps"] == 1
+    assert (tmp_path / "out" / "run.nc").exists()
+
+
+def test_the_gait_is_saved_before_it_is_simulated(
+    walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulate(*_: Any, **__: Any) -> None:
+        raise RuntimeError("power cut")
+
+    monkeypatch.setattr("heelstrike.experiments.walk.simulate", simulate)
+    assert isinstance(walk().exception, RuntimeError)
+    assert hs.load_gait(tmp_path / "out" / "gait.json").step_length == pytest.approx(0.30)
+
+
+def test_interrupted_by_ctrl_c(
+    walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def reached(stage: Any, fraction: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("heelstrike.cli.terminal.Stage.reached", reached)
+    monkeypatch.setattr("heelstrike.experiments.results.Results.save_run", lambda *_, **__: ())
+    result = walk("--json")
+    assert result.exit_code == 1
+    assert "error: interrupted at t = " in result.stderr
+    assert json.loads(result.stdout)["status"] == "interrupted"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["bravo"], "Did you mean 'bravo7'?"),
+        (["no/such/robot.xml"], "no/such/robot.xml"),
+        (["--friction", "-0.1"], "friction"),
+        (["--friction", "nan"], "friction"),
+        (["--step", "0"], "time step must be a positive number"),
+        (["--step", "-0.001"], "time step must be a positive number"),
+        (["--step", "nan"], "time step must be a positive number"),
+        (["--step-length", "5"], "cannot take a step of 5 m"),
+        (["--step-length", "-0.3"], "step_length"),
+        (["--step-duration", "0"], "step_duration"),
+        (["--step-duration", "nan"], "step_duration"),
+        (["--steps", "0"], "--steps"),
+        (["--steps", "many"], "--steps"),
+        (["--scheme", "runge-kutta"], "gap-linearised"),
+        (["--method", "magic"], "time-stepping"),
+        (["--stpe", "0.001"], "--step"),
+        (["--gait", "no/such/gait.json"], "there is no such file"),
+        (["--gait", "."], "directory"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else None,
+)
+def test_wrong_input(options: list[str], said: str, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["walk", "--out", str(tmp_path / "out"), *options])
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.split())
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    assert not (tmp_path / "out" / "run.nc").exists()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"\x80\x04\x95\x1c\x00\x00\x00\x8c\x02os\x8c\x06system\x93\x94",  # a pickle
+        b"not json at all",
+        b"[" * 100_000,
+        b'{"format": "heelstrike gait"}',
+        b'{"format": "heelstrike gait", "version": 1, "robot": "__import__(\'os\')", "cost": NaN}',
+        b'{"__class__": "os.system", "args": ["true"]}',
+        b'{"a": ' + b"9" * 6000 + b"}",
+    ],
+    ids=["empty", "pickle", "text", "deep", "hollow", "nan", "class", "digits"],
+)
+def test_hostile_gait_file(content: bytes, tmp_path: Path) -> None:
+    gait = tmp_path / "hostile.json"
+    gait.write_bytes(content)
+    arguments = ["walk", "--gait", str(gait), "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert result.stderr.startswith("error: ")
+    assert str(gait) in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not (tmp_path / "out" / "gait.json").exists()
+
+
+SPATIAL = """<mujoco model="spatial"><worldbody><body name="trunk"><freejoint/>
+<geom size="0.1"/></body></worldbody></mujoco>"""
+
+FOOTLESS = """<mujoco model="footless"><worldbody><body name="trunk">
+<joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
+<joint name="pitch" axis="0 1 0"/><geom size="0.1" contype="0" conaffinity="0"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("robot", "said"), [(SPATIAL, "plane"), (FOOTLESS, "contact points")], ids=["3D", "footless"]
+)
+def test_unsuitable_robot(robot: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text(robot, encoding="utf-8")
+    result = CliRunner().invoke(app, ["walk", str(path), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_saved_gait_has_its_own_step(walk: Callable[..., Any]) -> None:
+    result = walk("--step-length", "0.4")
+    assert result.exit_code == 2
+    assert "a saved gait has its own step length" in " ".join(result.stderr.split())
+
+
+def test_gait_of_another_robot(walked: tuple[Path, Any], tmp_path: Path) -> None:
+    gait = str(walked[0] / "gait.json")
+    arguments = ["walk", "spring_flamingo", "--gait", gait, "--out", str(tmp_path / "out")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert "'bravo7'" in result.stderr
+
+
+def test_out_is_a_file(tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("mine", encoding="utf-8")
+    for out in (taken, taken / "below"):
+        result = CliRunner().invoke(app, ["walk", "--out", str(out)])
+        assert result.exit_code == 2
+        assert "taken" in result.stderr
+        assert "Traceback" not in result.stderr
+    assert taken.read_text(encoding="utf-8") == "mine"
+
+
+def test_schemes_are_those_of_the_library() -> None:
+    assert [scheme.name for scheme in walk_module.Scheme] == [scheme.name for scheme in Scheme]

@@ -1,0 +1,141 @@
+"""The page about the paper: its simulations, its claims, its text."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import heelstrike as hs
+from heelstrike.cli.main import app
+from heelstrike.experiments.claims import CLAIMS, Claim, Verdict, judge
+from heelstrike.experiments.claims import friction as friction_claim
+from heelstrike.experiments.claims import zero_moment_point as zero_moment_point_claim
+from heelstrike.experiments.evidence import STEPS, Evidence, gather
+from heelstrike.experiments.refinement import SCHEMES, converge
+from heelstrike.experiments.report import page
+from heelstrike.sim import RunStatus, Scheme
+
+
+@pytest.fixture(scope="module")
+def evidence() -> Evidence:
+    return gather(lambda _doing, _part: None)
+
+
+@pytest.fixture(scope="module")
+def claims(evidence: Evidence) -> dict[str, Claim]:
+    names = [function.__name__ for function in CLAIMS]
+    return dict(zip(names, judge(evidence), strict=True))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "tracking",
+        "velocities",
+        "zero_moment_point",
+        "friction",
+        "unilateral",
+        "stance_foot",
+        "swing_foot",
+        "symmetry",
+        "plastic_impact",
+        "energy",
+        "shock_accumulation",
+        "first_order",
+        "lemke",
+        "cost",
+    ],
+)
+def test_claim_holds(claims: dict[str, Claim], name: str) -> None:
+    assert claims[name].verdict is Verdict.HOLDS, claims[name].measured
+
+
+@pytest.mark.parametrize("name", ["underactuated", "other_robots"])
+def test_claim_does_not_hold(claims: dict[str, Claim], name: str) -> None:
+    # A flat foot leaves as many freedoms as there are actuators; another robot's file is enough.
+    assert claims[name].verdict is Verdict.FAILS, claims[name].measured
+
+
+def test_default_scheme_walks_at_both_steps(evidence: Evidence) -> None:
+    walked = {row.step: row for row in evidence.refinement if row.scheme is Scheme.GAP_LINEARISED}
+    for step, tracking in ((1e-3, 2e-3), (1e-4, 1e-3)):
+        row = walked[step]
+        assert row.status is RunStatus.COMPLETED
+        assert row.steps == STEPS
+        assert row.tracking_rms <= tracking
+        assert row.penetration <= 1e-9
+        assert row.slip <= 1e-4
+
+
+def test_the_paper_s_own_orderings_walk_at_a_small_step(evidence: Evidence) -> None:
+    for scheme in (Scheme.PAPER_EXPLICIT, Scheme.PAPER_SYMPLECTIC):
+        (row,) = [r for r in evidence.refinement if r.scheme is scheme and r.step == 1e-4]
+        assert row.status is RunStatus.COMPLETED
+        assert row.steps == STEPS
+
+
+def test_order_is_that_of_made_up_errors(
+    bravo7: hs.Robot, gait: hs.Gait, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def simulate(*_: object, method: hs.TimeStepping, **__: object) -> object:
+        class Made:
+            position = np.array([[method.step**2]])
+
+        return Made()
+
+    monkeypatch.setattr("heelstrike.experiments.refinement.simulate", simulate)
+    monkeypatch.setattr("heelstrike.experiments.refinement.EXACT_STEP", 1e-12)
+    for found in converge(bravo7, gait):
+        assert found.order == pytest.approx(2.0)
+    assert [found.scheme for found in converge(bravo7, gait)] == list(SCHEMES)
+
+
+def test_claims_can_fail(evidence: Evidence) -> None:
+    run = evidence.run
+    slippery = replace(evidence, run=replace(run, ground=hs.Ground(friction=0.1)))
+    assert friction_claim(slippery).verdict is Verdict.FAILS
+    force = run.contact_force.copy()
+    force[..., 0] *= np.array([3.0, -1.0, 3.0, -1.0])  # pulls at the toes
+    pulled = replace(evidence, run=replace(run, contact_force=force))
+    assert zero_moment_point_claim(pulled).verdict is Verdict.FAILS
+
+
+def test_page_shows_every_claim_and_figure(evidence: Evidence, claims: dict[str, Claim]) -> None:
+    text = page(evidence, tuple(claims.values()))
+    for claim in claims.values():
+        assert claim.measured.replace("|", r"\|") in text
+        assert claim.criterion.replace("|", r"\|") in text
+    for number in (3, 4, 5, 6):
+        assert f"(figure{number}.png)" in text
+    for table in re.findall(r"(?:^\|.*\n)+", text + "\n", re.MULTILINE):
+        # Cells may contain escaped bars; every row of a table has as many as its heading.
+        bars = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
+        assert len(bars) == 1
+
+
+def test_command_writes_the_page(
+    tmp_path: Path, evidence: Evidence, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("heelstrike.experiments.paper.gather", lambda _progress: evidence)
+    out = tmp_path / "paper"
+    result = CliRunner().invoke(app, ["paper", "--out", str(out)])
+    assert result.exit_code == 0, result.stderr
+    assert {path.name for path in out.iterdir()} == {
+        "report.md",
+        "gait.json",
+        "run.nc",
+        *(f"figure{number}.png" for number in (3, 4, 5, 6)),
+    }
+    assert "report.md" in result.stderr
+    assert "\x1b" not in result.stdout
+
+
+def test_command_refuses_a_file(tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.touch()
+    assert CliRunner().invoke(app, ["paper", "--out", str(taken)]).exit_code == 2

@@ -1,0 +1,88 @@
+"""Walking a number of steps, and how large steps suit a robot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import heelstrike as hs
+from heelstrike.analysis import walking_steps
+from heelstrike.experiments.walk import BRAVO7, StepSize, typical_step, walk
+from heelstrike.robot import builtin_robots
+
+
+def test_step_of_a_robot_twice_as_large(bravo7: hs.Robot) -> None:
+    # Dynamic similarity: lengths scale by 2, times by the square root of 2 (Froude).
+    model = bravo7.model
+    large = replace(
+        bravo7,
+        name="large",
+        model=model._replace(
+            offset=2.0 * model.offset,
+            center_of_mass=2.0 * model.center_of_mass,
+            contact_position=2.0 * model.contact_position,
+            reference=np.where(np.arange(bravo7.nq) < 2, 2.0, 1.0) * model.reference,
+        ),
+    )
+    step = typical_step(large)
+    assert step.length == pytest.approx(2.0 * BRAVO7.length, abs=0.006)
+    assert step.duration == pytest.approx(np.sqrt(2.0) * BRAVO7.duration, abs=0.006)
+    assert step.clearance == pytest.approx(2.0 * BRAVO7.clearance, abs=0.0006)
+
+
+def test_the_rule_gives_bravo7_its_own_step(bravo7: hs.Robot) -> None:
+    assert typical_step(replace(bravo7, name="another")) == typical_step(bravo7) == BRAVO7
+
+
+def test_no_step_suits_a_robot_without_feet(bravo7: hs.Robot) -> None:
+    model = bravo7.model
+    footless = replace(
+        bravo7,
+        name="footless",
+        model=model._replace(
+            contact_link=model.contact_link[:0],
+            contact_position=model.contact_position[:0],
+            contact_radius=model.contact_radius[:0],
+        ),
+    )
+    with pytest.raises(hs.GaitError, match="'footless' has no contact points"):
+        typical_step(footless)
+
+
+@pytest.mark.parametrize("name", builtin_robots())
+def test_every_built_in_robot_walks_its_own_step(name: str) -> None:
+    robot = hs.load_robot(name)
+    size = typical_step(robot)
+    assert isinstance(size, StepSize)
+    gait = hs.optimize_gait(
+        robot,
+        step_length=size.length,
+        step_duration=size.duration,
+        clearance=size.clearance,
+    )
+    run = walk(robot, gait, steps=20)
+    assert run.completed, run.message
+    assert len(walking_steps(run)) == 20
+
+
+@pytest.mark.parametrize("steps", [1, 2, 7])
+def test_as_many_steps_as_asked_for(bravo7: hs.Robot, gait: hs.Gait, steps: int) -> None:
+    reported: list[float] = []
+    run = walk(bravo7, gait, steps=steps, progress=reported.append)
+    assert len(walking_steps(run)) == steps
+    assert reported == sorted(reported)
+    assert reported[-1] == pytest.approx(1.0)
+
+
+def test_no_steps_are_no_walk(bravo7: hs.Robot, gait: hs.Gait) -> None:
+    with pytest.raises(hs.SimulationError, match="at least one step, got 0"):
+        walk(bravo7, gait, steps=0)
+
+
+def test_options_reach_the_simulation(bravo7: hs.Robot, gait: hs.Gait) -> None:
+    ground = hs.Ground(friction=0.6)
+    run = walk(bravo7, gait, steps=1, method=hs.TimeStepping(step=5e-4), ground=ground)
+    assert run.ground is ground
+    assert run.time[1] == pytest.approx(5e-4)
