@@ -75,7 +75,7 @@ def test_slow_motion_has_more_frames(tmp_path: Path) -> None:
 
 
 def test_drawing_is_fast() -> None:
-    """14 s of walking at 30 frames a second in a few seconds: under 20 ms a frame, drawing alone."""
+    """14 s of walking at 30 frames a second in a few seconds: under 20 ms a frame."""
     with styled():
         film = Film(walking.walk(steps=2), (960, 540), 30.0, 1.0)
         film.draw(0)

@@ -19,6 +19,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
+from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.queries import link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.view.style import (
@@ -33,11 +34,13 @@ from heelstrike.view.style import (
 )
 
 Floats = NDArray[np.float64]
+Bone = tuple[int, Floats, int, Floats, float]  # link, place, link, place, width
 
 SAME_PLACE = 1e-6  # metres
 DISC_CORNERS = 16
 THICKEST = 15.0  # points, of a bone that has the whole mass
 THINNEST = 2.5
+DISC_WIDTH = 1.2
 LEGS_APART = 0.3  # rad that each leg of a portrait is turned at its root
 
 
@@ -105,7 +108,7 @@ def skeleton(robot: Robot) -> Skeleton:
     reference = link_poses(robot, model.reference).origin
     leg = legs(robot)
     side = _sides(robot)
-    bones: list[tuple[int, Floats, int, Floats, float]] = []
+    bones: list[Bone] = []
     share = np.cbrt(model.mass / max(robot.total_mass, 1e-12))
     width = np.maximum(THINNEST, THICKEST * share)
     nowhere = np.zeros(2)
@@ -117,13 +120,19 @@ def skeleton(robot: Robot) -> Skeleton:
             if np.hypot(*(reference[child] - reference[link])) > SAME_PLACE:
                 bones.append((link, nowhere, int(child), nowhere, width[link]))
         contacts = np.flatnonzero(model.contact_link == link)
-        for start, end in _outline(model.contact_position[contacts], bool(len(bones) > before)):
+        points = model.contact_position[contacts]
+        if len(bones) == before:
+            lines = _outline(points)
+        else:
+            ends = np.array([nowhere, *(_local_end(bone, reference) for bone in bones[before:])])
+            lines = [(nowhere, p) for p in points if np.hypot(*(ends - p).T).min() > SAME_PLACE]
+        for start, end in lines:
             bones.append((link, start, link, end, width[link]))
         for contact in contacts:
             radius = float(model.contact_radius[contact])
             if radius > SAME_PLACE:
                 for start, end in _disc(model.contact_position[contact], radius):
-                    bones.append((link, start, link, end, THINNEST))
+                    bones.append((link, start, link, end, DISC_WIDTH))
         center = model.center_of_mass[link]
         if len(bones) == before and np.hypot(*center) > SAME_PLACE:
             bones.append((link, nowhere, link, 2.0 * center, width[link]))
@@ -138,9 +147,14 @@ def skeleton(robot: Robot) -> Skeleton:
     )
 
 
-def _outline(points: Floats, carries: bool) -> list[tuple[Floats, Floats]]:
-    """Closed line from a link's origin through its contact points; none if it is a bone already."""
-    if carries or not len(points):
+def _local_end(bone: Bone, reference: Floats) -> Floats:
+    """Far end of a bone to the next link, in the frame of its own link."""
+    return np.asarray(reference[bone[2]] - reference[bone[0]])
+
+
+def _outline(points: Floats) -> list[tuple[Floats, Floats]]:
+    """Closed line from a link's origin through its contact points, or a line to the only one."""
+    if not len(points):
         return []
     corners = [np.zeros(2), *points]
     if len(points) > 1:
@@ -302,9 +316,11 @@ def _legs_apart(robot: Robot) -> Floats:
         first, last = chain[0], foot.link
         forward = index < int(robot.mirror.foot[index])
         turn = -LEGS_APART if forward else LEGS_APART
-        for joint, angle in ((first, turn), (last, -turn)):
-            moved = q[joint] + angle * model.axis[joint, 0]
-            q[joint] = np.clip(moved, model.lower[joint], model.upper[joint])
+        for joint in (first, last):
+            sense = model.axis[joint, 0]
+            moved = np.clip(q[joint] + turn * sense, model.lower[joint], model.upper[joint])
+            turn = -(moved - q[joint]) * sense  # what the hip turned, the ankle turns back
+            q[joint] = moved
     return q
 
 
@@ -316,6 +332,14 @@ def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:
     center = origin[model.contact_link] + np.column_stack((c * x + s * z, c * z - s * x))
     center[:, 1] -= model.contact_radius
     return center
+
+
+def ground_outline(ground: Ground, left: float, right: float) -> Floats:
+    """Corners (x, z) of the surface of the ground from one x to another, (n, 2), in m."""
+    corners = ground.model().vertices
+    inside = corners[(corners[:, 0] > left) & (corners[:, 0] < right)]
+    ends = np.array([[x, float(ground.height(x))] for x in (left, right)])
+    return np.concatenate((ends[:1], inside, ends[1:]))
 
 
 def extent(segments: Floats) -> tuple[Floats, Floats]:

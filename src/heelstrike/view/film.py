@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.motion import run_motion
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows
-from heelstrike.view.drawing import extent, leg_labels, skeleton
+from heelstrike.view.drawing import extent, ground_outline, leg_labels, skeleton
 from heelstrike.view.style import (
     FORCE_COLOR,
     GREY,
@@ -36,7 +36,6 @@ Floats = NDArray[np.float64]
 DPI = 100
 FOLLOWS_WITHIN = 0.6
 """Seconds over which the camera evens out the motion of the centre of mass."""
-POLYLINE = 120  # points of the ground that are drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,13 +223,8 @@ class Film:
 
     def _draw_ground(self, camera: Floats) -> None:
         left, right = self._x
-        corners = self._ground.model().vertices[:, 0] - camera[0]
-        x = np.union1d(
-            np.linspace(left, right, POLYLINE), corners[(corners > left) & (corners < right)]
-        )
-        z = np.asarray(self._ground.height(x + camera[0])) - camera[1]
+        outline = ground_outline(self._ground, left + camera[0], right + camera[0]) - camera
         below = self._z[0] - 1.0
-        outline = np.column_stack((x, z))
         self._soil.set_xy(np.concatenate((outline, [[right, below], [left, below]])))
         marks = np.arange(np.ceil(2.0 * (left + camera[0])), 2.0 * (right + camera[0])) / 2.0
         tall = np.where(marks == np.round(marks), 0.03, 0.015) * self._size

@@ -14,7 +14,7 @@ from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.support import walking_steps
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows
-from heelstrike.view.drawing import extent, leg_labels, skeleton
+from heelstrike.view.drawing import extent, ground_outline, leg_labels, skeleton
 from heelstrike.view.impacts import impact_rows
 from heelstrike.view.style import FORCE_COLOR, PALE, figure_title, new_figure
 
@@ -33,8 +33,8 @@ def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa:
     at = _usual_rows(run, times)
     segments = bones.segments(motion.link_origin[at], motion.link_angle[at])
     center = motion.center_of_mass[at, 0]
-    ground = np.asarray(run.ground.height(center))
-    origin = np.column_stack((center, ground))
+    height = float(run.ground.height(center[POSES // 2]))
+    origin = np.column_stack((center, np.full(POSES, height)))
     low, high = extent(segments - origin[:, None, None])
     size = max(float(high[1]), 0.5 * float((high - low).max()), 1e-3)
     spacing = max(float(high[0] - low[0]), 0.3 * size) + 0.12 * size
@@ -53,10 +53,13 @@ def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa:
             )
         )
         arrows.append((run.contact_point[row] + shift, run.world_force[row]))
+        surface = ground_outline(run.ground, center[i] - 0.5 * spacing, center[i] + 0.5 * spacing)
+        below = surface - [0.0, 0.02 * size]
+        axes.fill(*(np.concatenate((surface, below[::-1])) + shift).T, color=PALE, zorder=0)
         axes.annotate(
             f"{run.time[row]:.2f} s",
-            (i * spacing, 0.0),
-            xytext=(0.0, -8.0),
+            (i * spacing, float(run.ground.height(center[i])) - height),
+            xytext=(0.0, -10.0),
             textcoords="offset points",
             ha="center",
             va="top",
@@ -64,13 +67,9 @@ def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa:
     if run.robot.nc:
         foot, force = (np.concatenate(parts) for parts in zip(*arrows, strict=True))
         Arrows(axes, size, run.robot.weight, width=1.6).show(foot, force)
-    left, right = low[0] - 0.15 * size, (POSES - 1) * spacing + high[0] + 0.15 * size
-    step = np.linspace(left, right, 200)
-    if np.ptp(np.asarray(run.ground.height(np.linspace(center[0], center[-1], 50)))) < 1e-9:
-        axes.fill_between(step, -0.02 * size, 0.0, color=PALE, zorder=0)
     axes.set(
-        xlim=(left, right),
-        ylim=(min(-0.16 * size, float(low[1]) - 0.05 * size), high[1] + 0.05 * size),
+        xlim=(-0.5 * spacing, (POSES - 0.5) * spacing),
+        ylim=(float(low[1]) - 0.14 * size, float(high[1]) + 0.05 * size),
         aspect="equal",
     )
     axes.set_axis_off()
