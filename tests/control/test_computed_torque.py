@@ -88,6 +88,36 @@ def test_touchdown_exchanges_the_feet_and_restarts_the_phase() -> None:
     np.testing.assert_allclose(torque, expected(1 - gait.stance_foot, 0.05, True), atol=1e-8)
 
 
+def test_velocities_count_again_once_the_foot_has_stopped() -> None:
+    """Between first touch and rest the velocity feedback pauses; a slow foot ends the pause."""
+    robot, gait = walking.bravo7(), walking.gait()
+    controller = hs.ComputedTorque(robot, gait)
+    swing = robot.feet[1 - gait.stance_foot]
+    touching = nothing_touches()
+    touching.force[swing.contacts[0], 0] = 100.0
+    q = gait.initial_state.q
+    falling = np.zeros(robot.nv)
+    falling[1] = -0.1  # the whole robot comes down, and both feet with it
+    driven = robot.model.actuator_joint
+    a = gait.mirrored_coefficients(robot)
+    expected = as_the_paper_writes_it(
+        robot, swing.link, q, falling, 2 * a[2] + 400.0 * (a[0] - q[driven])
+    )
+    torque = controller.torque(0.6, hs.State(q, falling), touching)
+    np.testing.assert_allclose(torque, expected, atol=1e-8)
+    rest = 0.0 * falling
+    t = 1e-3
+    wanted = (
+        2 * a[2]
+        + 6 * a[3] * t
+        + 40.0 * (a[1] + t * (2 * a[2] + 3 * t * a[3]))
+        + 400.0 * (a[0] + t * (a[1] + t * (a[2] + t * a[3])) - q[driven])
+    )
+    torque = controller.torque(0.6 + t, hs.State(q, rest), touching)
+    expected = as_the_paper_writes_it(robot, swing.link, q, rest, wanted)
+    np.testing.assert_allclose(torque, expected, atol=1e-8)
+
+
 def test_a_late_step_goes_on_for_a_tenth_and_then_rests() -> None:
     """Eq. 41 says zero after T, which would throw the joints to the straight posture."""
     robot, gait = walking.bravo7(), walking.gait()

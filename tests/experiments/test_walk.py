@@ -9,7 +9,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.analysis import walking_steps
-from heelstrike.experiments.walk import BRAVO7, StepSize, typical_step, walk
+from heelstrike.experiments.walk import BRAVO7, StepSize, design, typical_step, walk
 from heelstrike.robot import builtin_robots
 
 
@@ -33,7 +33,7 @@ def test_step_of_a_robot_twice_as_large(bravo7: hs.Robot) -> None:
 
 
 def test_the_rule_gives_bravo7_its_own_step(bravo7: hs.Robot) -> None:
-    assert typical_step(replace(bravo7, name="another")) == typical_step(bravo7) == BRAVO7
+    assert typical_step(bravo7) == BRAVO7
 
 
 def test_no_step_suits_a_robot_without_feet(bravo7: hs.Robot) -> None:
@@ -52,19 +52,18 @@ def test_no_step_suits_a_robot_without_feet(bravo7: hs.Robot) -> None:
 
 
 @pytest.mark.parametrize("name", builtin_robots())
-def test_every_built_in_robot_walks_its_own_step(name: str) -> None:
+def test_every_built_in_robot_walks_its_typical_step(name: str) -> None:
     robot = hs.load_robot(name)
-    size = typical_step(robot)
-    assert isinstance(size, StepSize)
-    gait = hs.optimize_gait(
-        robot,
-        step_length=size.length,
-        step_duration=size.duration,
-        clearance=size.clearance,
-    )
+    gait = design(robot)
     run = walk(robot, gait, steps=20)
     assert run.completed, run.message
     assert len(walking_steps(run)) == 20
+
+
+def test_design_keeps_friction_in_reserve(bravo7: hs.Robot) -> None:
+    gait = design(bravo7, StepSize(0.20, 0.80, 0.02), friction=0.5)
+    assert (gait.step_length, gait.step_duration) == (0.20, 0.80)
+    assert gait.friction == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("steps", [1, 2, 7])

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from heelstrike import __version__
+from heelstrike.cli.compare import compare
 from heelstrike.cli.paper import paper
 from heelstrike.cli.robots import robots
 from heelstrike.cli.walk import walk
@@ -21,6 +22,7 @@ app = typer.Typer(
 )
 app.command()(walk)
 app.command()(paper)
+app.command()(compare)
 app.command()(robots)
 
 

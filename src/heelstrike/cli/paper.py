@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from heelstrike.cli.terminal import Debug, messages, output, spoken, stage
+from heelstrike.cli.terminal import Debug, output, spoken, stage, tell
 
 
 @spoken
@@ -33,4 +33,4 @@ def paper(
     for claim in report.claims:
         table.add_row(claim.source, claim.measured, claim.verdict.value)
     output().print(table)
-    messages().print(f"{report.page}: the claims in full, with figures")
+    tell(f"{report.page}: the claims in full, with figures")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.table import Table
 
-from heelstrike.cli.terminal import Debug, messages, output, spoken
+from heelstrike.cli.terminal import Debug, output, spoken, tell
 
 if TYPE_CHECKING:
     from heelstrike.robot import Robot
@@ -50,7 +50,7 @@ def robots(
         from heelstrike.view.drawing import robot_picture
 
         robot_picture(robot, picture)
-        messages().print(f"drawn into {picture}")
+        tell(f"drawn into {picture}")
     if as_json:
         typer.echo(json.dumps(_facts(robot), indent=2))
     else:

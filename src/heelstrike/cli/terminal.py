@@ -55,6 +55,11 @@ def messages() -> Console:
     return Console(stderr=True, highlight=False)
 
 
+def tell(message: str) -> None:
+    """Print something worth knowing that is not a result."""
+    messages().print(Text(message), soft_wrap=True)
+
+
 def complain(message: str) -> None:
     """Print an error."""
     _print_labelled("error", "bold red", message)

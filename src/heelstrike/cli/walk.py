@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from heelstrike.cli.terminal import FAILED, Debug, complain, messages, output, spoken, stage
+from heelstrike.cli.terminal import FAILED, Debug, complain, output, spoken, stage, tell
 
 if TYPE_CHECKING:
     from heelstrike.gait import Gait
@@ -123,7 +123,7 @@ def walk(
     else:
         output().print(summary)
         written = ", ".join(each.path.name for each in saved if each.error is None)
-        messages().print(f"in {out}: gait.json, {written}")
+        tell(f"in {out}: gait.json, {written}")
     for each in saved:
         if each.error is not None:
             complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
@@ -152,8 +152,8 @@ def _gait(
     clearance: float | None,
     friction: float,
 ) -> Gait:
-    from heelstrike.experiments.walk import typical_step
-    from heelstrike.gait import load_gait, optimize_gait
+    from heelstrike.experiments.walk import design, typical_step
+    from heelstrike.gait import load_gait
 
     asked = {"length": step_length, "duration": step_duration, "clearance": clearance}
     given = {name: value for name, value in asked.items() if value is not None}
@@ -167,14 +167,7 @@ def _gait(
         return load_gait(path, robot)
     size = replace(typical_step(robot), **given)
     with stage(f"designing a gait of {size.length:g} m in {size.duration:g} s") as designing:
-        gait = optimize_gait(
-            robot,
-            step_length=size.length,
-            step_duration=size.duration,
-            clearance=size.clearance,
-            friction=friction,
-            progress=designing.reached,
-        )
+        gait = design(robot, size, friction=friction, progress=designing.reached)
         designing.outcome = (
             f"gait: {gait.step_length:.3g} m in {gait.step_duration:.3g} s, "
             f"cost {gait.cost:.4g} N²m²s"

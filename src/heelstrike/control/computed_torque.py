@@ -33,16 +33,21 @@ EARLIEST = 0  # a touchdown counts only after this time in a step, s
 LATEST = 1  # the reference goes on along its polynomials until this time in a step, s
 ENCODER_PERIOD = 2  # time between encoder samples, s; negative: exact measurement
 ENCODER_RESOLUTION = 3  # smallest difference of an encoder's angles, rad; zero: exact
-PITCH = 4  # coordinate and axis sign of the trunk's pitch
-PITCH_SIGN = 5
-HEADER = 6
+LANDING = 4  # a foot that touches without coming flat counts as landed after this time, s
+PITCH = 5  # coordinate and axis sign of the trunk's pitch
+PITCH_SIGN = 6
+HEADER = 7
+
+# A point of the swing foot that comes down more slowly than this (m/s) has landed.
+LANDED_SPEED = 1e-3
 
 # Places in the memory: a header, then encoder samples and scratch vectors.
 STANCE = 0
 START = 1
 SAMPLES = 2
 SAMPLED = 3
-MEMORY_HEADER = 4
+LANDED = 4
+MEMORY_HEADER = 5
 SAMPLES_KEPT = 4
 
 
@@ -140,6 +145,17 @@ def foot_bias(work: Workspace, link: int) -> tuple[float, float, float]:
 
 
 @kernel
+def approaching_speed(work: Workspace, contacts: Contacts, link: int, contact: int) -> float:
+    """Speed at which a contact point of a link comes down on the ground."""
+    x = contacts.position[contact, 0] - work.pivot[0]
+    z = contacts.position[contact, 1] - work.pivot[1]
+    w = work.velocity[link, 0]
+    vx = work.velocity[link, 1] + w * z
+    vz = work.velocity[link, 2] - w * x
+    return -(vx * contacts.normal[contact, 0] + vz * contacts.normal[contact, 1])
+
+
+@kernel
 def restart_at_touchdown(
     t: float, contacts: Contacts, parameters: Floats, memory: Floats, side: Floats
 ) -> None:
@@ -151,9 +167,39 @@ def restart_at_touchdown(
         if side[i] == swing and contacts.force[i, 0] > 0.0:
             memory[STANCE] = swing
             memory[START] = t
+            memory[LANDED] = 0.0
             # Velocities jump at the impact: no polynomial may reach across it.
             memory[SAMPLES] = 0.0
             return
+
+
+@kernel
+def has_landed(
+    t: float,
+    contacts: Contacts,
+    work: Workspace,
+    link: int,
+    parameters: Floats,
+    memory: Floats,
+    side: Floats,
+) -> bool:
+    """Whether the stance foot, on `link`, is past the impact that made it the stance foot.
+
+    Heel and toe rarely meet the ground at the same instant, and time stepping spreads an impact
+    over two steps. In between, velocities are neither those before the impact nor those after, and
+    differ from the reference by as much as the impact itself. A foot that has touched without
+    coming flat counts as landed after a while.
+    """
+    if memory[LANDED] == 0.0:
+        landed = t - memory[START] > parameters[LANDING]
+        if not landed:
+            landed = True
+            for i in range(side.shape[0]):
+                if side[i] == memory[STANCE]:
+                    speed = approaching_speed(work, contacts, link, i)
+                    landed = landed and speed < LANDED_SPEED
+        memory[LANDED] = 1.0 if landed else 0.0
+    return memory[LANDED] == 1.0
 
 
 @kernel
@@ -230,6 +276,7 @@ def computed_torque(
     restart_at_touchdown(t, contacts, parameters, memory, side)
     stance = int(memory[STANCE])
     link = int(links[stance])
+    landed = has_landed(t, contacts, tree, link, parameters, memory, side)
     work = tree
     for j in range(nv):
         measured_q[j] = q[j]
@@ -269,11 +316,9 @@ def computed_torque(
                 )
             else:
                 measured_v[joint] = velocity
-        acceleration[joint] = (
-            feedforward
-            + damping[i] * (velocity - measured_v[joint])
-            + stiffness[i] * (position - measured_q[joint])
-        )
+        acceleration[joint] = feedforward + stiffness[i] * (position - measured_q[joint])
+        if landed:
+            acceleration[joint] += damping[i] * (velocity - measured_v[joint])
 
     # Unactuated coordinates of the robot on its stance foot (eq. 29, 34).
     foot_columns(model, work, link, columns)
@@ -318,7 +363,8 @@ class ComputedTorque:
     """Follow a gait by computed torque, on either foot, step after step.
 
     The phase of the gait restarts, and left and right change places, when the swing foot meets the
-    ground in the second half of a step. A step that lasts longer than planned goes on along its
+    ground in the second half of a step; until that foot has stopped, velocities are not fed back. A
+    step that lasts longer than planned goes on along its
     polynomials for a tenth of its duration and then holds still.
 
     Parameters
@@ -390,6 +436,7 @@ class ComputedTorque:
         nv, nu = self.robot.nv, self.robot.nu
         memory = np.zeros(MEMORY_HEADER + SAMPLES_KEPT * nu + 8 * nv)
         memory[STANCE] = self.gait.stance_foot
+        memory[LANDED] = 1.0
         return memory
 
     def _packed_parameters(self) -> NDArray[np.float64]:
@@ -425,6 +472,7 @@ class ComputedTorque:
         header[LATEST] = 1.1 * gait.step_duration
         header[ENCODER_PERIOD] = -1.0 if self.encoder is None else self.encoder.period
         header[ENCODER_RESOLUTION] = 0.0 if self.encoder is None else self.encoder.resolution
+        header[LANDING] = 0.02 * gait.step_duration
         header[PITCH] = pitch
         header[PITCH_SIGN] = model.axis[pitch, 0]
         return np.concatenate(

@@ -1,4 +1,4 @@
-"""The same robot and controller under several ways through time: how far do they differ?"""
+"""The same robot and controller under several ways through time, and how far they differ."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import numpy as np
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque, Encoder
 from heelstrike.experiments.refinement import Convergence, RefinedWalk, converge, refine
-from heelstrike.experiments.walk import typical_step, walk
+from heelstrike.experiments.walk import design, walk
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
 from heelstrike.sim import Run, TimeStepping, simulate
@@ -130,12 +130,5 @@ def _drop(robot: Robot, ground: Ground, method: TimeStepping) -> Run:
 
 def _other_robot() -> Run:
     robot = load_robot("spring_flamingo")
-    size = typical_step(robot)
-    gait = optimize_gait(
-        robot,
-        step_length=size.length,
-        step_duration=size.duration,
-        clearance=size.clearance,
-        friction=FRICTION,
-    )
+    gait = design(robot, friction=FRICTION)
     return walk(robot, gait, steps=STEPS, ground=Ground(friction=FRICTION))

@@ -11,7 +11,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.dynamics import center_of_mass, contact_positions
 from heelstrike.errors import GaitError, SimulationError
-from heelstrike.gait import Gait
+from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Controller, Run, simulate
 from heelstrike.sim.engine import Method
@@ -44,22 +44,14 @@ class StepSize:
 
 
 BRAVO7 = StepSize(0.30, 0.70, 0.03)
-
-OWN_STEPS = {
-    "bravo7": BRAVO7,
-    # One cubic polynomial a joint lifts this robot's foot, whose heel is close behind the ankle and
-    # whose ankle is at the height of the sole, no higher than this.
-    "spring_flamingo": StepSize(0.27, 0.67, 0.01),
-}
-"""Robots whose step is not left to the rule of :func:`typical_step`."""
+"""The step from which all others are scaled."""
 
 
 def typical_step(robot: Robot) -> StepSize:
     """Size of a step that suits a robot.
 
-    For robots without a step of their own it is dynamically similar to bravo7's 0.30 m in 0.70 s:
-    lengths scale with the height of the centre of mass above the feet in the reference
-    configuration, times with its square root.
+    Dynamically similar to bravo7's 0.30 m in 0.70 s: lengths scale with the height of the centre of
+    mass above the feet in the reference configuration, times with its square root.
 
     Raises
     ------
@@ -73,8 +65,6 @@ def typical_step(robot: Robot) -> StepSize:
     >>> typical_step(hs.load_robot("bravo7"))
     StepSize(length=0.3, duration=0.7, clearance=0.03)
     """
-    if robot.name in OWN_STEPS:
-        return OWN_STEPS[robot.name]
     standing = robot.model.reference
     height = 0.0
     if robot.nc:
@@ -90,6 +80,49 @@ def typical_step(robot: Robot) -> StepSize:
         length=round(BRAVO7.length * scale, 2),
         duration=round(BRAVO7.duration * float(np.sqrt(scale)), 2),
         clearance=round(BRAVO7.clearance * scale, 3),
+    )
+
+
+FRICTION_RESERVE = 0.2
+"""Share of the ground's friction that a gait designed for a walk leaves unused: an impact at the
+edge of the cone would slip a little in every time step that resolves it."""
+
+
+def design(
+    robot: Robot,
+    size: StepSize | None = None,
+    *,
+    friction: float = 0.75,
+    progress: Callable[[float], None] | None = None,
+) -> Gait:
+    """Design the gait of a walk.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    size : StepSize, optional
+        Size of its steps; :func:`typical_step` by default.
+    friction : float
+        Friction coefficient of the ground; a fifth of it is kept in reserve.
+    progress : callable, optional
+        Called now and then with the fraction of the work that is done.
+
+    Raises
+    ------
+    GaitError
+        If the robot cannot walk this way or the request makes no sense.
+    InfeasibleGaitError
+        If there is no such gait.
+    """
+    size = typical_step(robot) if size is None else size
+    return optimize_gait(
+        robot,
+        step_length=size.length,
+        step_duration=size.duration,
+        clearance=size.clearance,
+        friction=(1.0 - FRICTION_RESERVE) * friction,
+        progress=progress,
     )
 
 

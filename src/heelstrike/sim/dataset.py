@@ -11,7 +11,6 @@ import contextlib
 import enum
 import math
 import os
-import tempfile
 from dataclasses import MISSING, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -235,11 +234,8 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
         for name in dataset.variables
         if dataset[name].dtype.kind == "f"
     }
-    try:
-        handle, name = tempfile.mkstemp(dir=target.parent, prefix=target.name, suffix=".part")
-        os.close(handle)
-    except OSError as error:
-        raise RunFileError(f"cannot write {target}: {error.strerror or error}") from error
+    # Written beside the target first, so that a failure leaves an older file alone.
+    name = str(target.with_name(f".{target.name}.{os.getpid()}.part"))
     try:
         dataset.to_netcdf(name, mode="w", engine="h5netcdf", encoding=encoding)
         robot_to_dataset(run.robot).to_netcdf(name, mode="a", engine="h5netcdf", group=ROBOT_GROUP)

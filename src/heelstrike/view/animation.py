@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -69,11 +68,8 @@ def animate(
         fps = 100.0 / max(2, round(100.0 / fps))  # the format counts hundredths of a second
     with styled():
         film = Film(run, (width, height), fps, speed)
-        try:
-            handle, name = tempfile.mkstemp(dir=target.parent, prefix=".part-", suffix=kind)
-            os.close(handle)
-        except OSError as error:
-            raise ViewError(f"cannot write {target}: {error.strerror or error}") from error
+        # Written beside the target first, so that a failure leaves an older film alone.
+        name = str(target.with_name(f".part-{os.getpid()}-{target.name}"))
         try:
             write = _write_mp4 if kind == ".mp4" else _write_gif
             write(film, name, fps)
