@@ -24,6 +24,11 @@ class ClearanceProfile(enum.Enum):
     PARABOLA = "parabola"
     SMOOTH = "smooth"
 
+    @property
+    def corners(self) -> tuple[float, ...]:
+        """Phases at which the curvature of the profile jumps."""
+        return (ROUNDED, 1.0 - ROUNDED) if self is ClearanceProfile.PARABOLA else ()
+
     def height(self, phase: ArrayLike) -> NDArray[np.float64]:
         """Share of the greatest height at phases, (...), from 0 to 1.
 

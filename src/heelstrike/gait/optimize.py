@@ -7,26 +7,15 @@ from collections.abc import Callable
 from itertools import islice
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from heelstrike.errors import GaitError, InfeasibleGaitError
+from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.gait import Gait, actuated_joints, fingerprint
-from heelstrike.gait.margins import Margins
+from heelstrike.gait.gait import Gait
 from heelstrike.gait.request import checked_request
 from heelstrike.robot.robot import Robot
-from heelstrike.robot.state import State
 
 if TYPE_CHECKING:
     from heelstrike.gait.program import Program, Solution
-
-Floats = NDArray[np.float64]
-
-FINER = 10
-"""Constraints are checked on a grid this many times finer than the optimiser's."""
-ROUNDS = 8
-"""Times that phases are added where a constraint is violated between the nodes of the grid."""
+    from heelstrike.gait.transcription import Transcription
 
 
 def optimize_gait(
@@ -54,9 +43,11 @@ def optimize_gait(
     step are not both fixed, they are unknowns too and the cost *per metre* is minimised: the cost
     alone would be least for a robot that stands still.
 
-    The constraints hold at all times, not only at the nodes of a grid: they are checked between
-    the nodes, and phases are added where they fail, until none is violated by more than 1e-6
-    (m, rad; relative to the weight or the torque limit for forces).
+    The constraints hold at all times, not only at the nodes of a grid: they are checked on a grid
+    ten times finer and at the maxima between its points, and phases are added where they fail,
+    until none does. A millionth (m, rad; relative to weight or torque limit for forces) is kept in
+    reserve for that. At the impact the rear foot may have a velocity of 1e-6 m/s into the ground.
+    Only the feet are kept off the ground, not knees or hands.
 
     Parameters
     ----------
@@ -131,34 +122,46 @@ def optimize_gait(
         starts=starts,
     )
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
-    from heelstrike.gait.program import Program, lobatto
     from heelstrike.gait.transcription import Transcription
 
-    report = progress or _silent
+    report = _Forward(progress)
     transcription = Transcription(request)
-    nodes, weights = lobatto(request.intervals)
-    *others, last = (
-        Program(transcription, nodes, weights, profile=profile) for profile in request.profiles
-    )
-    for program in others:
+    *others, last = request.profiles
+    for profile in others:
         try:
-            return _designed(program, report)
+            return _designed(transcription, profile, report)
         except InfeasibleGaitError:
             continue  # the last profile asks least of the swing foot
-    return _designed(last, report)
+    return _designed(transcription, last, report)
 
 
-def _designed(program: Program, report: Callable[[float], None]) -> Gait:
+class _Forward:
+    """Progress that never goes back, also when the work turns out to be more."""
+
+    def __init__(self, progress: Callable[[float], None] | None) -> None:
+        self._progress = progress
+        self._furthest = 0.0
+
+    def __call__(self, fraction: float) -> None:
+        self._furthest = max(self._furthest, fraction)
+        if self._progress is not None:
+            self._progress(self._furthest)
+
+
+def _designed(
+    transcription: Transcription, profile: ClearanceProfile, report: Callable[[float], None]
+) -> Gait:
+    from heelstrike.gait.program import Program, lobatto
+    from heelstrike.gait.refinement import held_between_nodes
+    from heelstrike.gait.result import designed_gait
+
+    nodes, weights = lobatto(transcription.request.intervals)
+    program = Program(transcription, nodes, weights, profile=profile)
     report(0.05)
     best = _best_of_starts(program, report)
-    unknowns = _hold_between_nodes(program, best)
+    unknowns = held_between_nodes(program, best)
     report(1.0)
-    return _gait(program, unknowns)
-
-
-def _silent(fraction: float) -> None:
-    """Report to nobody."""
-    del fraction
+    return designed_gait(program, unknowns)
 
 
 def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:
@@ -177,177 +180,9 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
         report(0.05 + 0.75 * len(solutions) / (len(solutions) + len(guesses)))
     converged = [solution for solution in solutions if solution.converged]
     if not converged:
-        raise GaitError(
-            f"robot {request.robot.name!r}: the optimiser found gaits with {request}, but "
-            f"did not converge to the best ({solutions[0].status}). Try more starts or intervals."
+        raise InfeasibleGaitError(
+            f"robot {request.robot.name!r}: gaits with {request} exist only just: points that "
+            f"satisfy all constraints were found, but no optimum ({solutions[-1].status}). Ask "
+            "for a shorter or slower step or a lower clearance of the swing foot."
         )
     return min(converged, key=lambda solution: solution.objective)
-
-
-def _hold_between_nodes(program: Program, solution: Solution) -> Floats:
-    """Add phases where constraints fail between the nodes, until they hold everywhere."""
-    from heelstrike.gait.infeasible import nearest_to_feasible
-
-    fine = _subdivided(program.phases, FINER)
-    for _ in range(ROUNDS):
-        unknowns = _polished(program, solution.unknowns)
-        missed = _missed(program, unknowns, fine)
-        if not missed.size:
-            return unknowns
-        program = program.refined(missed)
-        solution = program.solve(unknowns)
-        if not solution.converged:
-            solution = program.solve(nearest_to_feasible(program))
-        if not solution.converged:
-            break
-    request = program.transcription.request
-    raise InfeasibleGaitError(
-        f"robot {request.robot.name!r}: a gait with {request} satisfies the constraints at "
-        f"{request.intervals + 1} phases of a step but not between them ({solution.status}). Try "
-        "more intervals, or a slower step."
-    )
-
-
-def _subdivided(nodes: Floats, parts: int) -> Floats:
-    """Grid with every interval cut into equal parts."""
-    share = np.arange(parts) / parts
-    inner = nodes[:-1, None] + np.diff(nodes)[:, None] * share
-    return np.append(inner.ravel(), nodes[-1])
-
-
-def _missed(program: Program, unknowns: Floats, fine: Floats) -> Floats:
-    """Phases off the grid where a constraint along the path is violated most, one a lapse."""
-    path = program.transcription.path
-    _, values = (np.array(part) for part in path.value.map(fine.size)(unknowns, fine[None, :]))
-    lower, upper = program.path_bounds(fine)
-    excess = np.maximum(lower - values, values - upper)
-    missed = set()
-    for row in excess:
-        for k in np.flatnonzero(row > 0.0).tolist():
-            left, right = max(k - 1, 0), min(k + 1, fine.size - 1)
-            if row[k] >= row[left] and row[k] >= row[right]:
-                missed.add(_vertex(fine[left : right + 1], row[left : right + 1]))
-    return np.array(sorted(missed))
-
-
-def _vertex(phases: Floats, excess: Floats) -> float:
-    """Place of the maximum of the parabola through three points whose middle is the highest."""
-    if phases.size < 3 or not np.all(np.isfinite(excess)):
-        return float(phases[np.argmax(excess)])
-    (a, b, c), (fa, fb, fc) = phases, excess
-    rise, fall = (fb - fa) / (b - a), (fc - fb) / (c - b)
-    bend = (fall - rise) / (c - a)
-    if not bend < 0.0:
-        return float(b)
-    return float(np.clip(0.5 * (a + b) - 0.5 * rise / bend, a, c))
-
-
-def _polished(program: Program, unknowns: Floats) -> Floats:
-    """Satisfy the equations at touchdown to rounding, by the least change of the unknowns."""
-    touchdown = program.transcription.touchdown
-    request = program.transcription.request
-    equations = [k for k, row in enumerate(touchdown.rows) if row.lower == row.upper]
-    target = np.array([touchdown.rows[k].lower for k in equations])
-    free = np.ones(unknowns.size, dtype=bool)
-    free[-2] = request.duration_bounds[0] < request.duration_bounds[1]
-    free[-1] = request.length_bounds[0] < request.length_bounds[1]
-    polished = unknowns.copy()
-    for _ in range(3):
-        value, jacobian = (np.array(part) for part in touchdown.jacobian(polished))
-        residual = target - value.ravel()[equations]
-        polished[free] += np.linalg.lstsq(jacobian[equations][:, free], residual, rcond=None)[0]
-    return polished
-
-
-def _gait(program: Program, unknowns: Floats) -> Gait:
-    transcription = program.transcription
-    request, robot = transcription.request, transcription.request.robot
-    mirror = robot.mirror
-    assert mirror is not None
-    joint = robot.model.actuator_joint
-    actuator_of = {int(j): k for k, j in enumerate(joint)}
-    end, end_velocity, start_velocity = np.split(unknowns[:-2], 3)
-    duration, length = (float(value) for value in unknowns[-2:])
-    reference, sign = robot.model.reference, mirror.sign
-    offset = reference - sign * reference[mirror.joint]
-    order = joint - 3
-    counterpart = np.array([actuator_of[int(mirror.joint[j])] for j in joint])
-    mirror_sign, mirror_offset = sign[joint], offset[joint]
-    end = end[order]
-    q, v = (np.array(part).ravel() for part in transcription.start(unknowns))
-    impulse_x, impulse_z, impulse_moment = np.array(transcription.landing(unknowns)[0]).ravel()
-    impulse = [impulse_z, impulse_x, impulse_moment] if request.impact else [0.0, 0.0, 0.0]
-    costs, _ = transcription.path.value.map(program.phases.size)(unknowns, program.phases[None, :])
-    cost = float(np.array(costs).ravel() @ program.weights)
-    return Gait(
-        robot=robot.name,
-        fingerprint=fingerprint(robot),
-        joint_names=actuated_joints(robot),
-        step_length=length,
-        step_duration=duration,
-        start_position=mirror_sign * end[counterpart] + mirror_offset,
-        end_position=end,
-        start_velocity=start_velocity[order],
-        end_velocity=end_velocity[order],
-        mirror_joint=counterpart,
-        mirror_sign=mirror_sign,
-        mirror_offset=mirror_offset,
-        stance_foot=request.stance.foot,
-        initial_state=State(q, v),
-        cost=cost * length if request.free_step else cost,
-        friction=request.friction,
-        clearance=request.clearance,
-        clearance_profile=program.profile,
-        touchdown_impulse=np.array(impulse),
-        margins=_margins(program, unknowns),
-    )
-
-
-def _margins(program: Program, unknowns: Floats) -> Margins:
-    """Worst values on the fine grid, from the motion itself."""
-    from heelstrike.gait.transcription import Group
-
-    transcription = program.transcription
-    request, robot = transcription.request, transcription.request.robot
-    model = robot.model
-    fine = _subdivided(program.phases[program.weights > 0.0], FINER)
-    wrench, torque, heights, position = (
-        np.array(part) for part in transcription.motion.map(fine.size)(unknowns, fine[None, :])
-    )
-    force_x, force_z, moment = wrench
-    half = request.stance.half_length
-    actuator = np.argsort(model.actuator_joint)
-    limits = np.minimum(
-        model.torque_upper[actuator, None] - torque, torque - model.torque_lower[actuator, None]
-    )
-    ranges = np.minimum(model.upper[3:, None] - position, position - model.lower[3:, None])
-    profile = program.clearance(fine)
-    off_ground = np.isfinite(profile)
-    impulse, landing, lift = (np.array(part).ravel() for part in transcription.landing(unknowns))
-    touchdown = np.array(transcription.touchdown.value(unknowns)[1]).ravel()
-    periodic = [row.group in (Group.IMPACT, Group.PERIODIC) for row in transcription.touchdown.rows]
-    return Margins(
-        normal_force=float(force_z.min()),
-        friction_use=_use(force_x, force_z, request.friction),
-        zero_moment_point=float((half - np.abs(moment / force_z)).min()),
-        clearance=float((heights - profile)[:, off_ground].min()),
-        joint_range=float(ranges.min()),
-        torque=float(limits.min()),
-        peak_torque=float(np.abs(torque).max()),
-        impulse=float(impulse[1]) if request.impact else 0.0,
-        impulse_friction_use=(
-            _use(impulse[:1], impulse[1:2], request.friction) if request.impact else 0.0
-        ),
-        impulse_center=half - abs(float(impulse[2] / impulse[1])) if request.impact else half,
-        landing_velocity=float(landing.max()),
-        lift_velocity=float(lift.min()),
-        touchdown_error=float(np.abs(touchdown[:3]).max()),
-        impact_error=float(np.abs(touchdown[periodic]).max()),
-    )
-
-
-def _use(tangential: Floats, normal: Floats, friction: float) -> float:
-    """Largest share of the friction cone in use."""
-    if friction == 0.0:
-        return 0.0 if not np.any(tangential) else math.inf
-    return float((np.abs(tangential) / (friction * normal)).max())

@@ -1,0 +1,186 @@
+"""Gaits as files: what is saved comes back, and nothing else gets in."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import heelstrike as hs
+from heelstrike.errors import GaitError
+
+
+@pytest.fixture
+def saved(gait: hs.Gait, tmp_path: Path) -> Path:
+    path = tmp_path / "gait.json"
+    gait.save(path)
+    return path
+
+
+def test_round_trip_keeps_every_digit(gait: hs.Gait, bravo7: hs.Robot, saved: Path) -> None:
+    loaded = hs.load_gait(saved, bravo7)
+    for field in dataclasses.fields(gait):
+        there, here = getattr(gait, field.name), getattr(loaded, field.name)
+        if isinstance(there, hs.State):
+            np.testing.assert_array_equal(there.q, here.q)
+            np.testing.assert_array_equal(there.v, here.v)
+        elif isinstance(there, np.ndarray):
+            assert there.dtype == here.dtype
+            np.testing.assert_array_equal(there, here)
+        else:
+            assert there == here
+    np.testing.assert_array_equal(loaded.coefficients, gait.coefficients)
+
+
+def test_saving_again_gives_the_same_file(saved: Path, tmp_path: Path) -> None:
+    again = tmp_path / "again.json"
+    hs.load_gait(str(saved)).save(str(again))
+    assert again.read_bytes() == saved.read_bytes()
+
+
+def test_the_file_is_for_reading(gait: hs.Gait, saved: Path) -> None:
+    data = json.loads(saved.read_text(encoding="utf-8"))
+    assert data["format"] == "heelstrike gait"
+    assert data["version"] == 1
+    assert data["step_length_m"] == 0.3
+    assert data["joints"] == list(gait.joint_names)
+    assert len(data["initial_position"]) == 9
+    assert saved.stat().st_size < 5000
+
+
+def test_a_robot_without_limits_has_no_margin_to_them(gait: hs.Gait, tmp_path: Path) -> None:
+    unlimited = dataclasses.replace(gait.margins, torque=np.inf, joint_range=np.inf)
+    path = tmp_path / "gait.json"
+    dataclasses.replace(gait, margins=unlimited).save(path)
+    assert "Infinity" not in path.read_text(encoding="utf-8")
+    assert hs.load_gait(path).margins == unlimited
+
+
+def test_the_wrong_robot_is_refused(
+    saved: Path, bravo7: hs.Robot, spring_flamingo: hs.Robot
+) -> None:
+    with pytest.raises(GaitError, match=r"gait\.json: is a gait of robot 'bravo7'"):
+        hs.load_gait(saved, spring_flamingo)
+    heavier = bravo7.model._replace(mass=1.1 * bravo7.model.mass)
+    with pytest.raises(GaitError, match="another version of robot 'bravo7'"):
+        hs.load_gait(saved, dataclasses.replace(bravo7, model=heavier))
+    reordered = bravo7.model._replace(actuator_joint=bravo7.model.actuator_joint[::-1].copy())
+    with pytest.raises(GaitError, match="has actuators at"):
+        hs.load_gait(saved, dataclasses.replace(bravo7, model=reordered))
+
+
+def delete(key: str) -> Callable[[dict[str, Any]], object]:
+    return lambda data: data.pop(key)
+
+
+def put(key: str, value: Any) -> Callable[[dict[str, Any]], object]:
+    return lambda data: data.update({key: value})
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (delete("format"), "not a gait file"),
+        (put("format", "heelstrike run"), "not a gait file"),
+        (put("version", 2), "newer heelstrike"),
+        (put("version", True), "newer heelstrike"),
+        (delete("cost_N2m2s"), '"cost_N2m2s" is missing'),
+        (delete("start_position_rad"), '"start_position_rad" is missing'),
+        (delete("margins"), '"margins" is missing'),
+        (put("margins", []), '"margins" must be an object'),
+        (put("margins", {}), "is missing"),
+        (put("start_position_rad", [0.0] * 5), "a list of 6 numbers"),
+        (put("start_position_rad", [[0.0] * 6]), "a list of 6 numbers"),
+        (put("start_position_rad", ["0"] * 6), "must be a number"),
+        (put("start_position_rad", [True] * 6), "must be a number"),
+        (put("start_position_rad", 0.0), "a list of 6 numbers"),
+        (put("step_length_m", None), "must be a number"),
+        (put("step_length_m", -0.3), "not negative"),
+        (put("step_duration_s", 0), "must be positive"),
+        (put("step_duration_s", 1e300), "which no gait has"),
+        (put("step_duration_s", 10**400), "which no gait has"),
+        (put("stance_foot", 0.5), "whole numbers"),
+        (put("stance_foot", 7), "stance_foot must be 0 or 1"),
+        (put("joints", []), "different names"),
+        (put("joints", ["a", "a"]), "different names"),
+        (put("joints", ["a", 1]), "different names"),
+        (put("robot", 3), "must be a text"),
+        (put("mirror_joint", [0] * 6), "permutation"),
+        (put("mirror_sign", [0.5] * 6), "mirror_sign"),
+        (put("clearance_profile", "triangle"), '"parabola", "smooth"'),
+        (put("initial_position", [0.0] * 6), "a list of 9 numbers"),
+    ],
+)
+def test_spoilt_entries_are_named(
+    saved: Path, spoil: Callable[[dict[str, Any]], object], message: str
+) -> None:
+    data = json.loads(saved.read_text(encoding="utf-8"))
+    spoil(data)
+    saved.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(GaitError) as caught:
+        hs.load_gait(saved)
+    assert str(saved) in str(caught.value)
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not valid JSON"),
+        (b"{", "line 1"),
+        (b"step_length: 0.3", "not valid JSON"),
+        (b"[]", "not a gait file"),
+        (b"null", "not a gait file"),
+        (b'"heelstrike gait"', "not a gait file"),
+        (b'{"step_length_m": NaN}', "contains NaN"),
+        (b'{"step_length_m": -Infinity}', "contains -Infinity"),
+        (b"\x80\x04\x95\x00\xff\xfe", "not a text file"),
+        (b"\x89HDF\r\n\x1a\n", "not a text file"),
+        (b"[" * 200_000, "not a gait file"),
+        (b'{"format": ' + b"9" * 10_000 + b"}", "not a gait file"),
+        (b" " * (2**20 + 1), "larger than 1 MB"),
+    ],
+    ids=lambda value: repr(value[:20]),
+)
+def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -> None:
+    path = tmp_path / "other.json"
+    path.write_bytes(content)
+    with pytest.raises(GaitError) as caught:
+        hs.load_gait(path)
+    assert str(path) in str(caught.value)
+    assert message in str(caught.value)
+
+
+def test_paths_that_are_no_files(tmp_path: Path) -> None:
+    with pytest.raises(GaitError, match="is a directory"):
+        hs.load_gait(tmp_path)
+    with pytest.raises(GaitError, match="no such file"):
+        hs.load_gait(tmp_path / "nothing.json")
+    with pytest.raises(GaitError, match=r"not a path to a file|no such file"):
+        hs.load_gait("gait\0.json")
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150)
+@given(st.data())
+def test_mutated_files_load_or_are_refused_in_words(saved: Path, data: st.DataObject) -> None:
+    text = saved.read_text(encoding="utf-8")
+    place = data.draw(st.integers(0, len(text) - 1))
+    length = data.draw(st.integers(0, 30))
+    mutated = text[:place] + data.draw(st.text(max_size=8)) + text[place + length :]
+    path = saved.with_name("mutated.json")
+    path.write_text(mutated, encoding="utf-8", errors="replace")
+    try:
+        loaded = hs.load_gait(path)
+    except GaitError as error:
+        message = str(error)
+    else:
+        message = str(path)
+        assert np.all(np.isfinite(loaded.coefficients))
+    assert str(path) in message
