@@ -7,18 +7,59 @@ nothing and touches no Python object. The same source is compiled by Numba and, 
 
 from __future__ import annotations
 
+import hashlib
 import types
 from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import njit
+from numba.core.caching import FunctionCache
 from numba.core.registry import CPUDispatcher
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy"}
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+
+# Packages whose sources end up in machine code.
+_COMPILED = ("robot", "dynamics", "contact", "sim", "control", "analysis")
+
+
+@lru_cache(maxsize=1)
+def _sources() -> str:
+    """Fingerprint of all sources that kernels are made of."""
+    home = Path(__file__).parent
+    files = [Path(__file__)]
+    for package in _COMPILED:
+        files += sorted((home / package).rglob("*.py"))
+    digest = hashlib.sha256()
+    for file in files:
+        digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+class _PackageCache(FunctionCache):
+    """Machine code on disk that is good for exactly these sources.
+
+    Numba looks at the file of a kernel only, and would go on using yesterday's machine code of a
+    kernel whose callee in another file has changed.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        index = self._cache_file
+        index._source_stamp = (_sources(), index._source_stamp)
+
+
+def _kept_on_disk(compiled: Any) -> Any:
+    try:
+        compiled._cache = _PackageCache(compiled.py_func)
+    except AttributeError:  # a Numba that keeps its books differently
+        compiled.enable_caching()
+    return compiled
 
 
 def kernel(function: Function) -> Function:
@@ -26,7 +67,7 @@ def kernel(function: Function) -> Function:
 
     Division by zero follows IEEE 754 instead of raising, and the GIL is released.
     """
-    compiled: Function = njit(**_OPTIONS)(function)
+    compiled: Function = _kept_on_disk(njit(**_OPTIONS)(function))
     return compiled
 
 
@@ -37,7 +78,7 @@ def inner_kernel(function: Function) -> Function:
     more arrays it takes; in return Python cannot call it.
     """
     options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    compiled: Function = njit(**options)(function)
+    compiled: Function = _kept_on_disk(njit(**options)(function))
     return compiled
 
 
@@ -54,8 +95,11 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
         Whether its address is needed, to pass it as an argument to other kernels.
     """
     options = _OPTIONS | {"no_cfunc_wrapper": not address}
-    compiled: Function = njit(signature, **options)(function)
-    return compiled
+    compiled = _kept_on_disk(njit(**options)(function))
+    compiled.compile(signature)
+    compiled.disable_compile()
+    result: Function = compiled
+    return result
 
 
 def type_of(value: Any) -> Any:

@@ -1,0 +1,83 @@
+"""Kernels: their cache knows all sources, and their plain twins need no compiler."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import heelstrike
+from heelstrike import compilation
+from heelstrike.compilation import kernel, uncompiled
+
+SOURCE = Path(heelstrike.__file__).parent
+
+PROBE = """
+import numpy as np
+from heelstrike.robot import load_robot
+from heelstrike.dynamics import kernels
+from heelstrike.dynamics.workspace import workspace
+robot = load_robot("bravo7")
+work = workspace(robot.nv)
+kernels.forward_kinematics(robot.model, robot.model.reference, work)
+kernels.link_velocities(robot.model, np.zeros(robot.nv), work)
+force = np.zeros(robot.nv)
+kernels.bias_force(robot.model, work, force)
+print(force[1])
+"""
+
+
+def probe(home: Path) -> float:
+    """Weight of bravo7 by the package in `home`, in a fresh process."""
+    answer = subprocess.run(
+        [sys.executable, "-c", PROBE],
+        env={**os.environ, "PYTHONPATH": str(home), "NUMBA_CACHE_DIR": str(home / "cache")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return float(answer.stdout)
+
+
+def test_a_change_in_another_file_is_not_missed(tmp_path: Path) -> None:
+    """`bias_force` calls a kernel that reads `model.py`'s neighbour: change the callee's file."""
+    shutil.copytree(SOURCE, tmp_path / "heelstrike", ignore=shutil.ignore_patterns("__pycache__"))
+    kernels = tmp_path / "heelstrike" / "dynamics" / "kernels.py"
+    callee = tmp_path / "heelstrike" / "dynamics" / "doubled.py"
+    callee.write_text(
+        "from heelstrike.compilation import kernel\n\n@kernel\ndef factor(x):\n    return 1.0\n"
+    )
+    text = kernels.read_text()
+    text = text.replace(
+        "    inverse_dynamics(model, work.zero, work, force)\n",
+        "    inverse_dynamics(model, work.zero, work, force)\n    force[1] *= factor(1.0)\n",
+    ).replace(
+        "from math import", "from heelstrike.dynamics.doubled import factor\nfrom math import"
+    )
+    kernels.write_text(text)
+    before = probe(tmp_path)
+    callee.write_text(callee.read_text().replace("return 1.0", "return 2.0"))
+    assert probe(tmp_path) == 2.0 * before
+
+
+def test_twins_replace_names_in_all_that_they_call() -> None:
+    @kernel
+    def inner(x: float) -> float:
+        return np.floor(x)
+
+    # The twin of a kernel is an ordinary function.
+    assert uncompiled(inner)(1.5) == 1.0
+    assert not hasattr(uncompiled(inner), "py_func")
+
+
+def test_the_fingerprint_covers_every_compiled_package() -> None:
+    """No package outside the list defines kernels."""
+    for file in SOURCE.rglob("*.py"):
+        package = file.relative_to(SOURCE).parts[0]
+        text = file.read_text()
+        if package != "compilation.py" and ("kernel\ndef " in text or "compiled_for(" in text):
+            assert package in compilation._COMPILED, file
