@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import ComputedTorque as ComputedTorque
+    from heelstrike.control import Encoder as Encoder
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -38,13 +39,21 @@ if TYPE_CHECKING:
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
+    from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
+    from heelstrike.robot import RobotWarning as RobotWarning
     from heelstrike.robot import State as State
+    from heelstrike.robot import builtin_robots as builtin_robots
     from heelstrike.robot import load_robot as load_robot
+    from heelstrike.sim import Compliant as Compliant
+    from heelstrike.sim import EventDriven as EventDriven
+    from heelstrike.sim import HuntCrossley as HuntCrossley
+    from heelstrike.sim import KelvinVoigt as KelvinVoigt
     from heelstrike.sim import Run as Run
+    from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import TimeStepping as TimeStepping
     from heelstrike.sim import load_run as load_run
     from heelstrike.sim import simulate as simulate
@@ -54,6 +63,15 @@ __version__ = "0.1.0"
 # Public name -> the package that defines it. The imports above repeat this for type checkers,
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
+    "compare": "heelstrike.experiments.comparison",
+    "builtin_robots": "heelstrike.robot",
+    "RobotWarning": "heelstrike.robot",
+    "Encoder": "heelstrike.control",
+    "Scheme": "heelstrike.sim",
+    "KelvinVoigt": "heelstrike.sim",
+    "HuntCrossley": "heelstrike.sim",
+    "EventDriven": "heelstrike.sim",
+    "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",

@@ -24,6 +24,8 @@ class Method(StrEnum):
     """Ways through time; each stands for a class of :mod:`heelstrike.sim`."""
 
     TIME_STEPPING = "time-stepping"
+    EVENT_DRIVEN = "event-driven"
+    COMPLIANT = "compliant"
 
 
 class Scheme(StrEnum):
@@ -71,7 +73,9 @@ def walk(
     scheme: Annotated[
         Scheme, typer.Option(help="Discretisation of time stepping.")
     ] = Scheme.GAP_LINEARISED,
-    step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
+    step: Annotated[
+        float, typer.Option(help="Time step h in s; of the record, for the other methods.")
+    ] = 1e-3,
     friction: Annotated[float, typer.Option(help="Friction coefficient of the ground.")] = 0.75,
     out: Annotated[
         Path,
@@ -142,6 +146,10 @@ def _time_method(method: Method, step: float, scheme: Scheme) -> TimeMethod:
     match method:
         case Method.TIME_STEPPING:
             return sim.TimeStepping(step=step, scheme=sim.Scheme[scheme.name])
+        case Method.EVENT_DRIVEN:
+            return sim.EventDriven(output_period=step)
+        case Method.COMPLIANT:
+            return sim.Compliant(step=step)
 
 
 def _gait(

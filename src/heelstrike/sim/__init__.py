@@ -1,19 +1,33 @@
 """simulate(), the ways through time, and the run they leave behind."""
 
+from heelstrike.sim.compliant import Compliant
+from heelstrike.sim.contact_law import (
+    BristleFriction,
+    HuntCrossley,
+    KelvinVoigt,
+    RegularisedFriction,
+)
 from heelstrike.sim.controller import CompiledController, Contacts, Controller, controller_kernel
 from heelstrike.sim.dataset import load_run
+from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.simulation import simulate
 from heelstrike.sim.status import EventKind, RunStatus, Scheme
 from heelstrike.sim.time_stepping import TimeStepping
 
 __all__ = [
+    "BristleFriction",
     "Certificates",
     "CompiledController",
+    "Compliant",
     "Contacts",
     "Controller",
     "Event",
+    "EventDriven",
     "EventKind",
+    "HuntCrossley",
+    "KelvinVoigt",
+    "RegularisedFriction",
     "Run",
     "RunStatus",
     "Scheme",

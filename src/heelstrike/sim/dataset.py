@@ -11,7 +11,7 @@ import contextlib
 import enum
 import math
 import os
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,14 @@ from numpy.typing import NDArray
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError, RunFileError
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.compliant import Compliant
+from heelstrike.sim.contact_law import (
+    BristleFriction,
+    HuntCrossley,
+    KelvinVoigt,
+    RegularisedFriction,
+)
+from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.robot_dataset import robot_from_dataset, robot_to_dataset
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.status import EventKind, RunStatus
@@ -61,7 +69,11 @@ _LABELS = {
     "component": ["normal", "tangent"],
     "condition": ["complementarity", "cone", "non-penetration"],
 }
-_METHODS = {"TimeStepping": TimeStepping}
+_METHODS = {kind.__name__: kind for kind in (TimeStepping, EventDriven, Compliant)}
+_LAWS = {
+    kind.__name__: kind
+    for kind in (HuntCrossley, KelvinVoigt, RegularisedFriction, BristleFriction)
+}
 NONE = "none"
 """How a setting that is None is written, for NetCDF has no such attribute."""
 _COUNTS = ("solves", "shortcuts", "fallbacks", "failures")
@@ -175,12 +187,15 @@ def _attributes(run: Run) -> dict[str, Any]:
 
 
 def _settings(prefix: str, thing: Any) -> dict[str, str | int | float]:
-    """Fields of a frozen dataclass as attributes, enums by their name."""
-    return {f"{prefix}_{name}": _plain(getattr(thing, name)) for name in _field_names(type(thing))}
-
-
-def _field_names(kind: Any) -> list[str]:
-    return [field.name for field in fields(kind)]
+    """Fields of a frozen dataclass as attributes: enums by name, dataclasses with their own."""
+    settings: dict[str, str | int | float] = {}
+    for field in fields(thing):
+        name, value = f"{prefix}_{field.name}", getattr(thing, field.name)
+        if is_dataclass(value):
+            settings |= {name: type(value).__name__, **_settings(name, value)}
+        else:
+            settings[name] = _plain(value)
+    return settings
 
 
 def _plain(value: Any) -> str | int | float:
@@ -489,6 +504,8 @@ class _Attributes:
                 continue  # a setting that did not exist when the file was written
             if self.values.get(name) == NONE:
                 values[field.name] = None
+            elif field.default_factory is not MISSING:
+                values[field.name] = self.rebuilt(name, self.member(name, _LAWS))
             elif isinstance(default, enum.Enum):
                 members = {member.name.lower(): member for member in type(default)}
                 values[field.name] = self.member(name, members)

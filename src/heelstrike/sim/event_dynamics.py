@@ -1,0 +1,448 @@
+"""Motion within a smooth phase: the acceleration when every contact point keeps its mode.
+
+Closed points have no normal acceleration, sticking ones no tangential acceleration either, and
+sliding ones feel friction μ λ_n against the direction of sliding. With the contact forces λ that
+this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of the paper.
+
+Small kernels take the few arrays they need and not whole bundles of them: every array of a bundle
+costs compile time in every kernel that takes it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from heelstrike.compilation import inner_kernel
+from heelstrike.contact.ground import GroundModel
+from heelstrike.dynamics.kernels import (
+    bias_force,
+    factorize,
+    forward_kinematics,
+    link_velocities,
+    mass_matrix,
+    passive_force,
+    point_bias_acceleration,
+    solve_factorized,
+)
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contact_geometry import assemble_delassus, contact_rows, locate_contacts
+from heelstrike.sim.controller import Contacts
+from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
+from heelstrike.sim.memory import Memory
+
+RANK_TOLERANCE = 1e-11
+"""Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
+
+
+@inner_kernel
+def contact_velocity(
+    link: int, position: Floats, normal: Floats, tree: Workspace
+) -> tuple[float, float]:
+    """Normal and tangential velocity of a point of a link."""
+    x = position[0] - tree.pivot[0]
+    z = position[1] - tree.pivot[1]
+    vx = tree.velocity[link, 1] + tree.velocity[link, 0] * z
+    vz = tree.velocity[link, 2] - tree.velocity[link, 0] * x
+    return normal[0] * vx + normal[1] * vz, normal[1] * vx - normal[0] * vz
+
+
+@inner_kernel
+def tangential_place(position: Floats, normal: Floats, radius: float, angle: float) -> float:
+    """Where a contact point is along the ground, less the length that its disc has rolled."""
+    return normal[1] * position[0] - normal[0] * position[1] - radius * angle
+
+
+@inner_kernel
+def solve_system(size: int, system: Floats, column: Integers, unknown: Floats) -> int:
+    """Solve linear equations, their right-hand side in the last column, by complete pivoting.
+
+    Returns the rank; unknowns that the equations leave free are zero.
+    """
+    largest = 0.0
+    for i in range(size):
+        column[i] = i
+        unknown[i] = 0.0
+        for j in range(size):
+            largest = max(largest, abs(system[i, j]))
+    rank = size
+    for k in range(size):
+        best = RANK_TOLERANCE * largest
+        row = -1
+        place = -1
+        for i in range(k, size):
+            for j in range(k, size):
+                if abs(system[i, j]) > best:
+                    best = abs(system[i, j])
+                    row = i
+                    place = j
+        if row < 0:
+            rank = k
+            break
+        if row != k:
+            for j in range(size + 1):
+                system[k, j], system[row, j] = system[row, j], system[k, j]
+        if place != k:
+            column[k], column[place] = column[place], column[k]
+            for i in range(size):
+                system[i, k], system[i, place] = system[i, place], system[i, k]
+        for i in range(k + 1, size):
+            ratio = system[i, k] / system[k, k]
+            if ratio != 0.0:
+                for j in range(k + 1, size + 1):
+                    system[i, j] -= ratio * system[k, j]
+    for k in range(rank - 1, -1, -1):
+        total = system[k, size]
+        for j in range(k + 1, rank):
+            total -= system[k, j] * unknown[column[j]]
+        unknown[column[k]] = total / system[k, k]
+    return rank
+
+
+@inner_kernel
+def list_unknowns(
+    count: int,
+    candidate: Integers,
+    carrier: Integers,
+    holder: Integers,
+    slide: Integers,
+    friction: Floats,
+    row: Integers,
+    lean: Floats,
+) -> int:
+    """List the Jacobian rows along which closed points are held, and friction per normal force."""
+    size = 0
+    for place in range(count):
+        contact = candidate[place]
+        if carrier[contact] == 1:
+            row[size] = 2 * place
+            lean[size] = -slide[contact] * friction[contact]
+            size += 1
+        if holder[contact] == 1:
+            row[size] = 2 * place + 1
+            lean[size] = 0.0
+            size += 1
+    return size
+
+
+@inner_kernel
+def constraint_matrix(
+    size: int, row: Integers, lean: Floats, friction: float, delassus: Floats, system: Floats
+) -> None:
+    """Write the matrix of the equations of the contact forces, with friction (1) or without (0)."""
+    for i in range(size):
+        for j in range(size):
+            entry = delassus[row[i], row[j]]
+            if lean[j] != 0.0:
+                entry += friction * lean[j] * delassus[row[i], row[j] + 1]
+            system[i, j] = entry
+
+
+@inner_kernel
+def free_contact_acceleration(
+    place: int,
+    link: int,
+    position: Floats,
+    normal: Floats,
+    radius: float,
+    jacobian: Floats,
+    tree: Workspace,
+    acceleration: Floats,
+    scratch: Floats,
+    free: Floats,
+) -> None:
+    """Acceleration b = J v̇ + J̇ v of a contact point in the candidates' `place`.
+
+    It is that of the gap and of the sliding velocity: for a rolling disc the acceleration of its
+    centre and not of the material point that touches the ground.
+    """
+    scratch[0, 0] = position[0] + radius * normal[0]
+    scratch[0, 1] = position[1] + radius * normal[1]
+    point_bias_acceleration(tree, link, scratch[0], scratch[1])
+    ax = scratch[1, 0]
+    az = scratch[1, 1]
+    along_normal = normal[0] * ax + normal[1] * az
+    along_tangent = normal[1] * ax - normal[0] * az - radius * scratch[1, 2]
+    for j in range(acceleration.shape[0]):
+        along_normal += jacobian[2 * place, j] * acceleration[j]
+        along_tangent += jacobian[2 * place + 1, j] * acceleration[j]
+    free[2 * place] = along_normal
+    free[2 * place + 1] = along_tangent
+
+
+@inner_kernel
+def add_contact_force(
+    count: int,
+    model: Model,
+    jacobian: Floats,
+    factor: Floats,
+    impulse: Floats,
+    force: Floats,
+    change: Floats,
+) -> None:
+    """Add A⁻¹ Jᵀ λ to an acceleration or, for impulses, to a velocity; `force` is scratch."""
+    nv = change.shape[0]
+    for j in range(nv):
+        total = 0.0
+        for row in range(2 * count):
+            total += jacobian[row, j] * impulse[row]
+        force[j] = total
+    solve_factorized(model, factor, force)
+    for j in range(nv):
+        change[j] += force[j]
+
+
+@inner_kernel
+def share_forces(
+    count: int,
+    candidate: Integers,
+    impulse: Floats,
+    friction: Floats,
+    group: Integers,
+    holder: Integers,
+    force: Floats,
+) -> None:
+    """Write the force of every contact point, that of a group split like its normal forces."""
+    for contact in range(force.shape[0]):
+        force[contact, 0] = 0.0
+        force[contact, 1] = 0.0
+    for place in range(count):
+        force[candidate[place], 0] = impulse[2 * place]
+        force[candidate[place], 1] = impulse[2 * place + 1]
+    for place in range(count):
+        leader = candidate[place]
+        if holder[leader] == 0:
+            continue
+        tangential = force[leader, 1]
+        limit = 0.0
+        for other in range(place, count):
+            if group[candidate[other]] == leader:
+                limit += friction[candidate[other]] * impulse[2 * other]
+        if limit > 0.0:
+            for other in range(place, count):
+                contact = candidate[other]
+                if group[contact] == leader:
+                    force[contact, 1] = friction[contact] * impulse[2 * other] / limit * tangential
+
+
+@inner_kernel
+def watch_geometry(
+    link: Integers,
+    contacts: Contacts,
+    tree: Workspace,
+    closed: Integers,
+    slide: Integers,
+    group: Integers,
+    value: Floats,
+    rate: Floats,
+) -> None:
+    """Event functions that need no forces: gaps of open points, speeds of sliding ones."""
+    for contact in range(closed.shape[0]):
+        normal, tangent = contact_velocity(
+            link[contact], contacts.position[contact], contacts.normal[contact], tree
+        )
+        value[2 * contact + 1] = 1.0
+        if closed[contact] == 0:
+            value[2 * contact] = contacts.gap[contact]
+            rate[2 * contact] = normal
+        elif slide[contact] != 0 and group[contact] == contact:
+            value[2 * contact + 1] = slide[contact] * tangent
+
+
+@inner_kernel
+def watch_forces(
+    count: int,
+    candidate: Integers,
+    phase: Phase,
+    friction: Floats,
+    delassus: Floats,
+    free: Floats,
+    impulse: Floats,
+) -> None:
+    """Event functions of closed points: normal forces, and what is left to the friction limit."""
+    for place in range(count):
+        contact = candidate[place]
+        phase.value[2 * contact] = 1.0
+        if phase.carrier[contact] == 1:
+            phase.value[2 * contact] = impulse[2 * place]
+        if phase.holder[contact] == 1:
+            limit = 0.0
+            for other in range(count):
+                if phase.group[candidate[other]] == contact:
+                    limit += friction[candidate[other]] * impulse[2 * other]
+            phase.value[2 * contact + 1] = limit - abs(impulse[2 * place + 1])
+        elif phase.slide[contact] != 0 and phase.group[contact] == contact:
+            acceleration = free[2 * place + 1]
+            for column in range(2 * count):
+                acceleration += delassus[2 * place + 1, column] * impulse[column]
+            phase.rate[2 * contact + 1] = phase.slide[contact] * acceleration
+
+
+@inner_kernel
+def free_acceleration(model: Model, memory: Memory, state: Floats) -> None:
+    """Acceleration without contact, A⁻¹ (B Γ + passive − H), into ``memory.rate``."""
+    nv = model.parent.shape[0]
+    mass_matrix(model, memory.tree, memory.mass_matrix)
+    factorize(model, memory.mass_matrix, memory.factor)
+    bias_force(model, memory.tree, memory.rate)
+    passive_force(model, state[:nv], state[nv:], memory.force)
+    for i in range(model.actuator_joint.shape[0]):
+        memory.force[model.actuator_joint[i]] += memory.torque[i]
+    for i in range(nv):
+        memory.rate[i] = memory.force[i] - memory.rate[i]
+    solve_factorized(model, memory.factor, memory.rate)
+
+
+@inner_kernel
+def gather_closed(model: Model, memory: Memory, closed: Integers) -> int:
+    """Jacobian rows and Delassus matrix of the closed contact points; return their number."""
+    count = 0
+    for contact in range(closed.shape[0]):
+        if closed[contact] == 1:
+            contact_rows(model, memory, contact, count)
+            memory.candidate[count] = contact
+            count += 1
+    if count > 0:
+        assemble_delassus(model, memory, count)
+    return count
+
+
+@inner_kernel
+def evaluate(
+    controller: Any,
+    model: Model,
+    ground: GroundModel,
+    parameters: Floats,
+    kept: Floats,
+    spare: Floats,
+    memory: Memory,
+    phase: Phase,
+    time: float,
+    state: Floats,
+    slope: Floats,
+    forces: bool,
+) -> None:
+    """Everything about a state (q, v) that the integration may visit.
+
+    Pose and contact geometry; then, if `forces` are asked for, torque, slope (v, v̇), contact forces
+    and all event functions. A continuous controller is asked without letting it remember.
+    """
+    nv = model.parent.shape[0]
+    contacts = memory.contacts
+    forward_kinematics(model, state[:nv], memory.tree)
+    link_velocities(model, state[nv:], memory.tree)
+    locate_contacts(model, ground, memory)
+    watch_geometry(
+        model.contact_link, contacts, memory.tree, phase.closed, phase.slide, phase.group,
+        phase.value, phase.rate,
+    )  # fmt: skip
+    if not forces:
+        return
+    if phase.clock[SAMPLE_PERIOD] == 0.0:
+        for i in range(kept.shape[0]):
+            spare[i] = kept[i]
+        controller(
+            time, state[:nv], state[nv:], contacts, model, memory.tree, memory.scratch, parameters,
+            spare, memory.torque,
+        )  # fmt: skip
+        for i in range(model.actuator_joint.shape[0]):
+            memory.torque[i] = min(
+                max(memory.torque[i], model.torque_lower[i]), model.torque_upper[i]
+            )
+    free_acceleration(model, memory, state)
+    count = gather_closed(model, memory, phase.closed)
+    phase.count[CLOSED] = count
+    for place in range(count):
+        contact = memory.candidate[place]
+        free_contact_acceleration(
+            place, model.contact_link[contact], contacts.position[contact],
+            contacts.normal[contact], model.contact_radius[contact], memory.jacobian, memory.tree,
+            memory.rate, phase.scratch, memory.free,
+        )  # fmt: skip
+        memory.impulse[2 * place] = 0.0
+        memory.impulse[2 * place + 1] = 0.0
+    if count > 0:
+        size = list_unknowns(
+            count, memory.candidate, phase.carrier, phase.holder, phase.slide, memory.friction,
+            phase.row, phase.lean,
+        )  # fmt: skip
+        constraint_matrix(size, phase.row, phase.lean, 1.0, memory.delassus, phase.system)
+        for i in range(size):
+            phase.system[i, size] = -memory.free[phase.row[i]]
+        rank = solve_system(size, phase.system, phase.column, phase.unknown)
+        phase.count[DEFICIENT] = 1 if rank < size else 0
+        for i in range(size):
+            memory.impulse[phase.row[i]] += phase.unknown[i]
+            if phase.lean[i] != 0.0:
+                memory.impulse[phase.row[i] + 1] += phase.lean[i] * phase.unknown[i]
+        add_contact_force(
+            count, model, memory.jacobian, memory.factor, memory.impulse, memory.force, memory.rate
+        )
+    share_forces(
+        count, memory.candidate, memory.impulse, memory.friction, phase.group, phase.holder,
+        phase.force,
+    )  # fmt: skip
+    watch_forces(
+        count, memory.candidate, phase, memory.friction, memory.delassus, memory.free,
+        memory.impulse,
+    )  # fmt: skip
+    for i in range(nv):
+        slope[i] = state[nv + i]
+        slope[nv + i] = memory.rate[i]
+
+
+@inner_kernel
+def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> None:
+    """Put a state back on its contact constraints, along the shortest way that the masses allow.
+
+    Closed points return to the ground, sticking ones to where they began to stick, and their
+    velocities along these directions vanish.
+    """
+    nv = model.parent.shape[0]
+    contacts = memory.contacts
+    for attempt in range(5):
+        forward_kinematics(model, state[:nv], memory.tree)
+        link_velocities(model, state[nv:], memory.tree)
+        locate_contacts(model, ground, memory)
+        if attempt == 0:
+            mass_matrix(model, memory.tree, memory.mass_matrix)
+            factorize(model, memory.mass_matrix, memory.factor)
+        count = gather_closed(model, memory, phase.closed)
+        if count == 0:
+            return
+        size = list_unknowns(
+            count, memory.candidate, phase.carrier, phase.holder, phase.slide, memory.friction,
+            phase.row, phase.lean,
+        )  # fmt: skip
+        worst = 0.0
+        for i in range(size):
+            contact = memory.candidate[phase.row[i] // 2]
+            error = 0.0
+            if phase.row[i] % 2 == 0:
+                error = contacts.gap[contact]
+            elif phase.stuck[contact] == 1:
+                error = -phase.anchor[contact] + tangential_place(
+                    contacts.position[contact], contacts.normal[contact],
+                    model.contact_radius[contact], memory.tree.angle[model.contact_link[contact]],
+                )  # fmt: skip
+            phase.system[i, size] = -error
+            worst = max(worst, abs(error))
+        positions = worst > 1e-14 and attempt < 4
+        if not positions:
+            for i in range(size):
+                speed = 0.0
+                for j in range(nv):
+                    speed += memory.jacobian[phase.row[i], j] * state[nv + j]
+                phase.system[i, size] = -speed
+        constraint_matrix(size, phase.row, phase.lean, 0.0, memory.delassus, phase.system)
+        solve_system(size, phase.system, phase.column, phase.unknown)
+        for i in range(2 * count):
+            memory.impulse[i] = 0.0
+        for i in range(size):
+            memory.impulse[phase.row[i]] = phase.unknown[i]
+        change = state[:nv] if positions else state[nv:]
+        add_contact_force(
+            count, model, memory.jacobian, memory.factor, memory.impulse, memory.force, change
+        )
+        if not positions:
+            return

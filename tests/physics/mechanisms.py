@@ -1,0 +1,91 @@
+"""Small mechanisms with textbook motion, as robots."""
+
+from __future__ import annotations
+
+from heelstrike.robot import Robot
+from heelstrike.robot.mjcf import read_mjcf
+
+PLANAR = """
+  <joint name="x" type="slide" axis="1 0 0"/>
+  <joint name="z" type="slide" axis="0 0 1"/>
+  <joint name="pitch" type="hinge" axis="0 1 0"/>
+"""
+
+
+def _robot(name: str, body: str, gravity: float = 9.81) -> Robot:
+    return read_mjcf(
+        f"""<mujoco model="{name}">
+          <compiler angle="radian" balanceinertia="false"/>
+          <option gravity="0 0 {-gravity}"/>
+          <worldbody>
+            <geom name="ground" type="plane" size="1 1 1"/>
+            {body}
+          </worldbody>
+        </mujoco>"""
+    )
+
+
+def point(mass: float = 1.0, gravity: float = 9.81) -> Robot:
+    """Point mass with coordinates x, z: a sphere too small to matter."""
+    return _robot(
+        "point",
+        f"""<body name="point">
+          <joint name="x" type="slide" axis="1 0 0"/>
+          <joint name="z" type="slide" axis="0 0 1"/>
+          <inertial pos="0 0 0" mass="{mass}" diaginertia="1 1 1"/>
+          <geom type="sphere" size="1e-12"/>
+        </body>""",
+        gravity,
+    )
+
+
+def block(
+    width: float = 0.1,
+    height: float = 0.1,
+    mass: float = 1.0,
+    inertia: float | None = None,
+    gravity: float = 9.81,
+) -> Robot:
+    """Box with coordinates x, z of its centre and its pitch; a point at each lower corner."""
+    if inertia is None:
+        inertia = mass * (width**2 + height**2) / 12.0
+    return _robot(
+        "block",
+        f"""<body name="block">
+          {PLANAR}
+          <inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>
+          <geom type="box" size="{0.5 * width} 0.5 {0.5 * height}"/>
+        </body>""",
+        gravity,
+    )
+
+
+def disc(
+    radius: float = 0.2, mass: float = 1.0, inertia: float | None = None, gravity: float = 9.81
+) -> Robot:
+    """Homogeneous disc with coordinates x, z of its centre and its pitch."""
+    if inertia is None:
+        inertia = 0.5 * mass * radius**2
+    return _robot(
+        "disc",
+        f"""<body name="disc">
+          {PLANAR}
+          <inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia} {inertia} {inertia}"/>
+          <geom type="sphere" size="{radius}"/>
+        </body>""",
+        gravity,
+    )
+
+
+def rod(length: float = 1.0, mass: float = 1.0, gravity: float = 9.81) -> Robot:
+    """Uniform rod, upright at zero pitch, with a point at its lower end."""
+    inertia = mass * length**2 / 12.0
+    return _robot(
+        "rod",
+        f"""<body name="rod">
+          {PLANAR}
+          <inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia} {inertia} 0.01"/>
+          <geom type="sphere" size="1e-12" pos="0 0 {-0.5 * length}"/>
+        </body>""",
+        gravity,
+    )
