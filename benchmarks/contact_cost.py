@@ -54,13 +54,17 @@ def solve_many(
 
 
 def standing_problems(number: int) -> list[tuple[Any, Any]]:
-    """Return Delassus matrices and free velocities of bravo7 on both feet, vertical legs."""
+    """Return Delassus matrices and free velocities of bravo7 on both feet, knees bent."""
     robot = load_robot("bravo7")
     rng = np.random.default_rng(0)
-    state = robot.reference_state()
+    bend = {"hip": -0.3, "knee": 0.6, "ankle": -0.3}
     problems = []
     for _ in range(number):
-        q = state.q
+        q = robot.reference_state().q
+        factor = rng.uniform(0.5, 1.5)
+        for place, name in enumerate(robot.joint_names):
+            for part, angle in bend.items():
+                q[place] += factor * angle * (part in name)
         v = 1e-3 * rng.standard_normal(robot.nv)
         M = mass_matrix(robot, q)
         J = np.concatenate(

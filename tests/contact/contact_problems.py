@@ -142,13 +142,15 @@ def random_problem(rng: np.random.Generator, contacts: int | None = None) -> Pro
         b = _made(rng, G, J, friction, v)
     return Problem(
         f"{case}{'/ill-scaled' if ill_scaled else ''}{'/tidy' if tidy else ''}",
-        G, b, friction, J, M,
+        G,
+        b,
+        friction,
+        J,
+        M,
     )
 
 
-def _made(
-    rng: np.random.Generator, G: Floats, J: Floats, friction: Floats, v: Floats
-) -> Floats:
+def _made(rng: np.random.Generator, G: Floats, J: Floats, friction: Floats, v: Floats) -> Floats:
     """Return the free term of a problem whose solution is drawn first, degenerate on purpose."""
     count = friction.size
     closed = rng.random(count) < 0.7

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from heelstrike.robot import Robot
 from heelstrike.robot.mjcf import read_mjcf
 
@@ -86,6 +88,53 @@ def rod(length: float = 1.0, mass: float = 1.0, gravity: float = 9.81) -> Robot:
           {PLANAR}
           <inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia} {inertia} 0.01"/>
           <geom type="sphere" size="1e-12" pos="0 0 {-0.5 * length}"/>
+        </body>""",
+        gravity,
+    )
+
+
+def rimless_wheel(spokes: int = 8, inertia: float = 0.0, gravity: float = 9.81) -> Robot:
+    """Hub of 1 kg with massless spokes of 1 m; at zero pitch two of them frame the vertical.
+
+    MuJoCo's parser wants a positive moment of inertia; 0 stands for the smallest that it takes.
+    """
+    inertia = max(inertia, 1e-12)
+    tips = "".join(
+        f'<geom type="sphere" size="1e-12" pos="{np.sin(angle)} 0 {-np.cos(angle)}"/>'
+        for angle in 2.0 * np.pi / spokes * (np.arange(spokes) + 0.5)
+    )
+    return _robot(
+        "rimless_wheel",
+        f"""<body name="wheel">
+          {PLANAR}
+          <inertial pos="0 0 0" mass="1" diaginertia="{inertia} {inertia} {inertia}"/>
+          {tips}
+        </body>""",
+        gravity,
+    )
+
+
+def compass_gait(gravity: float = 9.8) -> Robot:
+    """Two legs of 1 m with 5 kg at their middle and 10 kg at the hip, point masses, point feet.
+
+    Coordinates are the hip's x and z and the two leg angles, positive when the foot is behind.
+    """
+    tiny = "1e-12 1e-12 1e-12"
+    legs = "".join(
+        f"""<body name="{name}">
+          <joint name="{name}" type="hinge" axis="0 1 0"/>
+          <inertial pos="0 0 -0.5" mass="5" diaginertia="{tiny}"/>
+          <geom type="sphere" size="1e-12" pos="0 0 -1"/>
+        </body>"""
+        for name in ("leg_a", "leg_b")
+    )
+    return _robot(
+        "compass_gait",
+        f"""<body name="hip">
+          <joint name="x" type="slide" axis="1 0 0"/>
+          <joint name="z" type="slide" axis="0 0 1"/>
+          <inertial pos="0 0 0" mass="10" diaginertia="{tiny}"/>
+          {legs}
         </body>""",
         gravity,
     )

@@ -17,7 +17,6 @@ from heelstrike.contact.least_norm import split
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.pivoting import pivot
 from heelstrike.contact.workspace import (
-    CONE,
     EQUATION,
     IMPULSE,
     LEAN,
@@ -28,6 +27,8 @@ from heelstrike.contact.workspace import (
     RESIDUAL,
     ROW_LABEL,
     SCALE,
+    SETTINGS,
+    SIZE,
     SKEWED,
     SLOPE,
     SOURCE,
@@ -44,6 +45,10 @@ from heelstrike.contact.workspace import (
 RANK_TOLERANCE = 1e-12
 """Pivots of the unit-diagonal matrix below this count as zero."""
 
+GOOD_PIVOT = 0.03
+"""Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
+matrix is stable in any order, and only its rank needs the large pivots first."""
+
 ROUNDING = 2e-15
 """Pivots of the unit-diagonal matrix below this are rounding."""
 
@@ -58,67 +63,64 @@ SHARP = 1e-13
 
 
 @inner_kernel
-def assemble(count: int, friction: Floats, work: ContactWorkspace) -> int:
+def assemble(count: int, delassus: Floats, friction: Floats, work: ContactWorkspace) -> int:
     """Write the equations of the modes under trial into the tableau; return their number.
 
     At a slipping contact the tangential impulse leans on the normal one and has no equation.
     """
     mode, equation = work.labels[TRIAL_MODE], work.labels[EQUATION]
-    normal, tangent = work.labels[NORMAL], work.labels[TANGENT]
-    slope, cone, lean = work.vectors[SLOPE], work.vectors[CONE], work.vectors[LEAN]
-    scale, weight, offset = work.vectors[SCALE], work.vectors[WEIGHT], work.vectors[OFFSET]
-    matrix, tableau = work.matrix, work.tableau
+    normal, tangent, source = work.labels[NORMAL], work.labels[TANGENT], work.labels[SOURCE]
+    slope, lean, weight = work.vectors[SLOPE], work.vectors[LEAN], work.vectors[WEIGHT]
+    scale, offset, tableau = work.vectors[SCALE], work.vectors[OFFSET], work.tableau
     size = 0
     for contact in range(count):
         if mode[contact] == OPEN:
             continue
         first = normal[contact]
-        across = slope[contact]
         equation[size] = first
-        lean[size] = 0.0
+        weight[size] = scale[first]
+        lean[size] = slope[contact]
         if tangent[contact] >= 0:
             if mode[contact] == STICK:
-                equation[size + 1] = first + 1
-                lean[size + 1] = 0.0
-                weight[size] = scale[first]
-                weight[size + 1] = scale[first + 1]
-                size += 2
-                continue
-            across = friction[contact]
-            lean[size] = cone[contact]
-            if mode[contact] == SLIP_FORWARD:
-                lean[size] = -cone[contact]
-        weight[size] = scale[first] * math.sqrt(1.0 + across * across)
+                size += 1
+                equation[size] = first + 1
+                weight[size] = scale[first + 1]
+                lean[size] = 0.0
+            else:
+                lean[size] = friction[contact]
+                if mode[contact] == SLIP_FORWARD:
+                    lean[size] = -friction[contact]
+        if lean[size] != 0.0:
+            weight[size] *= math.sqrt(1.0 + lean[size] * lean[size])
         size += 1
     for i in range(size):
-        row = equation[i]
-        tableau[i, 0] = offset[row]
+        row = source[equation[i]]
+        row_scale = scale[equation[i]]
+        tableau[i, 0] = offset[equation[i]]
         for j in range(size):
-            tableau[i, j + 1] = matrix[row, equation[j]]
+            column = source[equation[j]]
+            entry = delassus[row, column]
             if lean[j] != 0.0:
-                tableau[i, j + 1] += lean[j] * matrix[row, equation[j] + 1]
+                entry += lean[j] * delassus[row, column + 1]
+            tableau[i, j + 1] = row_scale * entry * scale[equation[j]]
     return size
 
 
 @inner_kernel
-def eliminate(size: int, work: ContactWorkspace) -> int:
+def eliminate(size: int, symmetric: bool, work: ContactWorkspace) -> int:
     """Solve the equations in the tableau as far as their rank allows; return their nullity.
 
     The solution with the free unknowns at zero goes to ``POINT``; ``PIVOT_ROW`` tells which
-    unknowns stayed free. Symmetric equations pivot on the largest diagonal element, others on
-    the largest of all.
+    unknowns stayed free. Symmetric equations pivot on a large diagonal element, others on the
+    largest element of all.
     """
-    pivot_row, taken, slope = work.labels[PIVOT_ROW], work.labels[ROW_LABEL], work.vectors[SLOPE]
-    lean, weight, point = work.vectors[LEAN], work.vectors[WEIGHT], work.vectors[POINT]
-    tableau = work.tableau
-    symmetric = work.settings[SKEWED] == 0.0
+    pivot_row, taken = work.labels[PIVOT_ROW], work.labels[ROW_LABEL]
+    weight, point, tableau = work.vectors[WEIGHT], work.vectors[POINT], work.tableau
     speeds = 0.0
     for i in range(size):
         pivot_row[i] = -1
         taken[i] = 0
         speeds = max(speeds, abs(tableau[i, 0]))
-        contact = work.labels[SOURCE, work.labels[EQUATION, i]] // 2
-        symmetric = symmetric and lean[i] == 0.0 and slope[contact] == 0.0
     nullity = size
     smallest = RANK_TOLERANCE
     while nullity > 0:
@@ -126,12 +128,21 @@ def eliminate(size: int, work: ContactWorkspace) -> int:
         row = size
         column = size
         for i in range(size):
-            if taken[i] == 0:
-                for j in range(i if symmetric else 0, i + 1 if symmetric else size):
-                    if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
-                        largest = abs(tableau[i, j + 1])
-                        row = i
-                        column = j
+            if taken[i] != 0:
+                continue
+            if symmetric:
+                if tableau[i, i + 1] > largest:
+                    largest = tableau[i, i + 1]
+                    row = i
+                    column = i
+                    if largest > GOOD_PIVOT:
+                        break
+                continue
+            for j in range(size):
+                if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
+                    largest = abs(tableau[i, j + 1])
+                    row = i
+                    column = j
         if row < size:
             pivot(tableau, size, size + 1, row, column + 1)
             taken[row] = 1
@@ -194,12 +205,18 @@ def evaluate(
     equation, pivot_row, source = work.labels[EQUATION], work.labels[PIVOT_ROW], work.labels[SOURCE]
     point, weight, scale = work.vectors[POINT], work.vectors[WEIGHT], work.vectors[SCALE]
     impulse, velocity, speed = work.vectors[IMPULSE], work.vectors[VELOCITY], work.vectors[SPEED]
-    size = assemble(count, friction, work)
-    nullity = eliminate(size, work)
-    if nullity > 0:
-        split(count, size, nullity, friction, work)
+    lean, tableau = work.vectors[LEAN], work.tableau
+    size = assemble(count, delassus, friction, work)
+    symmetric = work.vectors[SETTINGS, SKEWED] == 0.0
+    for j in range(size):
+        symmetric = symmetric and lean[j] == 0.0
+    singular = eliminate(size, symmetric, work) > 0
+    held = not symmetric  # whether directions that change a velocity are held back
     worst = math.inf
-    for attempt in range(3):
+    refinements = 0
+    while True:
+        if singular and refinements == 0:
+            held = split(count, size, held, delassus, friction, work)
         expand(count, friction, work)
         worst = certify(
             count,
@@ -210,9 +227,17 @@ def evaluate(
             impulse,
             velocity,
             work.vectors[RESIDUAL],
+            work.vectors[SIZE],
         )
-        if worst < SHARP or not worst < 1e-6 or attempt == 2:
-            break
+        if worst < SHARP or refinements == 2:
+            return worst
+        if not worst < 1e-6:
+            if singular and held:
+                # The slip speed is not unique, and what the elimination left it at does not do.
+                held = not held
+                refinements = 0
+                continue
+            return worst
         for j in range(size):
             speed[j] = scale[equation[j]] * velocity[source[equation[j]]]
         for j in range(size):
@@ -220,47 +245,33 @@ def evaluate(
                 correction = 0.0
                 for k in range(size):
                     if pivot_row[k] >= 0:
-                        correction -= work.tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
+                        correction -= tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
                 point[j] += weight[j] * correction
-    return worst
+        refinements += 1
 
 
 @inner_kernel
-def label(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    impulse: Floats,
-    velocity: Floats,
-    mode: Integers,
-    work: ContactWorkspace,
-) -> bool:
-    """Name every contact's mode from its velocity; return whether an unknown was released.
+def label(count: int, velocity: Floats, mode: Integers, work: ContactWorkspace) -> bool:
+    """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
-    impulse in its cone. Only with all of these admitted is the least-norm split unique.
+    impulse in its cone. Only with all of these admitted is the least-norm split unique. The
+    velocity is judged on the scale that the last certificate left in ``SIZE``.
     """
-    released = False
-    speeds = 0.0
-    for i in range(2 * count):
-        speeds = max(speeds, abs(free[i]))
+    size, tangent = work.vectors[SIZE], work.labels[TANGENT]
+    changed = False
     for contact in range(count):
         row = 2 * contact
-        normal_size = speeds + abs(free[row])
-        tangent_size = speeds + abs(free[row + 1])
-        for j in range(2 * count):
-            normal_size += abs(delassus[row, j] * impulse[j])
-            tangent_size += abs(delassus[row + 1, j] * impulse[j])
         name = STICK
-        if velocity[row] > REST_TOLERANCE * normal_size:
+        if velocity[row] > REST_TOLERANCE * size[row]:
             name = OPEN
-        elif velocity[row + 1] > REST_TOLERANCE * tangent_size:
+        elif velocity[row + 1] > REST_TOLERANCE * size[row + 1]:
             name = SLIP_FORWARD
-        elif velocity[row + 1] < -REST_TOLERANCE * tangent_size:
+        elif velocity[row + 1] < -REST_TOLERANCE * size[row + 1]:
             name = SLIP_BACKWARD
-        if mode[contact] == OPEN:
-            released = released or name != OPEN
-        elif mode[contact] != STICK and work.labels[TANGENT, contact] >= 0:
-            released = released or name == STICK
+        if tangent[contact] >= 0:
+            changed = changed or name != mode[contact]
+        else:
+            changed = changed or (name == OPEN) != (mode[contact] == OPEN)
         mode[contact] = name
-    return released
+    return changed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from heelstrike.compilation import inner_kernel
@@ -78,12 +79,14 @@ def certify(
     impulse: Floats,
     velocity: Floats,
     residual: Floats,
+    size: Floats,
 ) -> float:
     """Compute the velocity an impulse gives and the residuals; return the largest of them.
 
-    The residuals are complementarity, cone and penetration, scaled as in :class:`Certificate`.
-    ``slope`` is not zero where a contact is prescribed to slide; its friction then lies on the
-    given edge and its tangential velocity is not constrained.
+    The residuals are complementarity, cone and penetration, scaled as in :class:`Certificate`;
+    ``size`` receives the scale of each velocity. ``slope`` is not zero where a contact is
+    prescribed to slide; its friction then lies on the given edge and its tangential velocity is
+    not constrained.
     """
     complementarity = 0.0
     cone = 0.0
@@ -104,8 +107,12 @@ def certify(
             part = delassus[row + 1, column] * impulse[column]
             tangent_velocity += part
             tangent_size += abs(part)
+        if not (normal_size < math.inf and tangent_size < math.inf):
+            penetration = math.inf  # NaN or infinite
         velocity[row] = normal_velocity
         velocity[row + 1] = tangent_velocity
+        size[row] = normal_size
+        size[row + 1] = tangent_size
         normal_impulse = impulse[row]
         tangent_impulse = impulse[row + 1]
         limit = friction[contact] * normal_impulse
@@ -122,8 +129,8 @@ def certify(
         if delassus[row + 1, row + 1] > 0.0 and tangent_size > 0.0:
             force_scale = delassus[row + 1, row + 1] / tangent_size
         else:
-            size = limit + abs(tangent_impulse)
-            force_scale = 1.0 / size if size > 0.0 else 0.0
+            both = limit + abs(tangent_impulse)
+            force_scale = 1.0 / both if both > 0.0 else 0.0
         if slope[contact] != 0.0:
             cone = max(cone, abs(tangent_impulse - slope[contact] * normal_impulse) * force_scale)
             continue

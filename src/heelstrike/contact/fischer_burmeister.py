@@ -26,10 +26,12 @@ from heelstrike.contact.modes import (
     STICK,
 )
 from heelstrike.contact.workspace import (
+    BASIS,
     CONE,
     EQUATIONS,
     ITERATE,
     ITERATIONS,
+    MATRIX,
     NORMAL,
     OFFSET,
     PROGRESS,
@@ -79,7 +81,7 @@ def equations(count: int, unknowns: int, size: float, work: ContactWorkspace) ->
     """
     normal, tangent, cone = work.labels[NORMAL], work.labels[TANGENT], work.vectors[CONE]
     iterate, speed, offset = work.vectors[ITERATE], work.vectors[SPEED], work.vectors[OFFSET]
-    value, matrix, tableau = work.vectors[EQUATIONS], work.matrix, work.tableau
+    value, matrix, tableau = work.vectors[EQUATIONS], work.squares[MATRIX], work.tableau
     merit = 0.0
     for i in range(unknowns):
         speed[i] = offset[i] / size
@@ -122,7 +124,7 @@ def equations(count: int, unknowns: int, size: float, work: ContactWorkspace) ->
 def newton_step(unknowns: int, damping: float, work: ContactWorkspace) -> None:
     """Solve ``(V^T V + damping I) step = -V^T equations`` for the Jacobian V in the tableau."""
     step, value = work.vectors[STEP], work.vectors[EQUATIONS]
-    tableau, square = work.tableau, work.basis
+    tableau, square = work.tableau, work.squares[BASIS]
     for i in range(unknowns):
         step[i] = 0.0
         for j in range(unknowns):
@@ -181,7 +183,9 @@ def fischer_burmeister(count: int, unknowns: int, call: int, work: ContactWorksp
         for i in range(unknowns):
             iterate[i] += step[i]
         along = 1.0
-        while along > 1e-8 and equations(count, unknowns, size, work) > (1.0 - 1e-4 * along) * merit:
+        while (
+            along > 1e-8 and equations(count, unknowns, size, work) > (1.0 - 1e-4 * along) * merit
+        ):
             along *= 0.5
             for i in range(unknowns):
                 iterate[i] -= along * step[i]

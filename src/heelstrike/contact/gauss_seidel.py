@@ -19,6 +19,7 @@ from heelstrike.contact.workspace import (
     CONE,
     ITERATE,
     ITERATIONS,
+    MATRIX,
     NORMAL,
     OFFSET,
     PROGRESS,
@@ -34,7 +35,7 @@ SWEEPS = 2000
 @inner_kernel
 def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
     """Solve one contact of the reduced problem for its own impulse; return its mode."""
-    offset, iterate, matrix = work.vectors[OFFSET], work.vectors[ITERATE], work.matrix
+    offset, iterate, matrix = work.vectors[OFFSET], work.vectors[ITERATE], work.squares[MATRIX]
     first = work.labels[NORMAL, contact]
     second = work.labels[TANGENT, contact]
     rest = offset[first] - matrix[first, first] * iterate[first]
@@ -80,13 +81,15 @@ def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
 def gauss_seidel(count: int, unknowns: int, call: int, work: ContactWorkspace) -> int:
     """Sweep over the reduced problem until other modes are to be tried than before.
 
-    The first sweep starts from the impulse in ``ITERATE``. Returns ``SOLVED`` with a proposal
+    The sweeps start from no impulse. Returns ``SOLVED`` with a proposal
     in ``TRIAL_MODE``, to be called again (``call`` counts from 0) if it does not hold, or
     ``ITERATION_LIMIT``.
     """
     mode, progress = work.labels[TRIAL_MODE], work.vectors[PROGRESS]
     if call == 0:
         progress[0] = 0.0
+        for i in range(unknowns):
+            work.vectors[ITERATE, i] = 0.0
     while progress[0] < SWEEPS:
         progress[0] += 1.0
         work.counters[ITERATIONS] += 1

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.contact.certificate import Certificate
-from heelstrike.contact.modes import STICK, Solver
+from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import run_solvers, solver_order
 from heelstrike.contact.workspace import Floats
 from heelstrike.errors import ContactProblemError
@@ -102,7 +102,7 @@ def solve_lcp(
     delassus[::2, ::2] = matrix
     free = np.zeros(2 * count)
     free[::2] = constant
-    mode = np.full(count, STICK, np.int64)
+    mode = np.full(count, OPEN, np.int64)
     impulse, velocity, certificate = run_solvers(
         delassus, free, np.zeros(count), order, mode, tolerance=tolerance, symmetric=False
     )

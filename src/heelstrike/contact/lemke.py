@@ -22,6 +22,7 @@ from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import (
     CONE,
+    MATRIX,
     NORMAL,
     OFFSET,
     PLACE,
@@ -32,6 +33,9 @@ from heelstrike.contact.workspace import (
 
 PATHS = 3
 """How many covering vectors are tried: what rounding spoils on one path it spares on another."""
+
+AT_REST = 1e-11
+"""Velocities below this, where the largest free one is one, are read as zero."""
 
 GOLDEN = 0.6180339887498949
 
@@ -45,7 +49,7 @@ def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace
     """
     normal, tangent = work.labels[NORMAL], work.labels[TANGENT]
     offset, cone = work.vectors[OFFSET], work.vectors[CONE]
-    matrix, tableau = work.matrix, work.tableau
+    matrix, tableau = work.squares[MATRIX], work.tableau
     size = 0.0
     for i in range(unknowns):
         size = max(size, abs(offset[i]))
@@ -82,6 +86,13 @@ def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace
 
 
 @inner_kernel
+def value(variable: int, work: ContactWorkspace) -> float:
+    """Return the value of a variable in the final dictionary."""
+    row = work.labels[PLACE, variable]
+    return work.tableau[row, 0] if row >= 0 else 0.0
+
+
+@inner_kernel
 def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
     """Find the contact modes of the reduced problem by Lemke's method; return the status.
 
@@ -97,16 +108,26 @@ def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
     place, tangent, mode = work.labels[PLACE], work.labels[TANGENT], work.labels[TRIAL_MODE]
     row = 0
     for contact in range(count):
+        frictional = tangent[contact] >= 0
         mode[contact] = STICK if place[pairs + row] >= 0 else OPEN
-        if tangent[contact] >= 0:
-            if mode[contact] == STICK and place[pairs + row + 3] >= 0:
-                # Slip. With the friction to both sides in the basis its speed is zero, though.
-                forward = place[pairs + row + 2] >= 0
-                backward = place[pairs + row + 1] >= 0
-                if forward and not backward:
+        if path == 0:
+            # By the velocities. The other paths are for problems that rounding makes difficult,
+            # and go by the basis.
+            if mode[contact] == OPEN and value(row, work) <= AT_REST:
+                mode[contact] = STICK
+            if mode[contact] == STICK and frictional:
+                slip = 0.5 * (value(row + 1, work) - value(row + 2, work))
+                if slip > AT_REST:
                     mode[contact] = SLIP_FORWARD
-                elif backward and not forward:
+                elif slip < -AT_REST:
                     mode[contact] = SLIP_BACKWARD
-            row += 3
-        row += 1
+        elif mode[contact] == STICK and frictional and place[pairs + row + 3] >= 0:
+            # Slip. With the friction to both sides in the basis its speed is zero, though.
+            forward = place[pairs + row + 2] >= 0
+            backward = place[pairs + row + 1] >= 0
+            if forward and not backward:
+                mode[contact] = SLIP_FORWARD
+            elif backward and not forward:
+                mode[contact] = SLIP_BACKWARD
+        row += 4 if frictional else 1
     return status

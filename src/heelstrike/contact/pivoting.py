@@ -64,9 +64,9 @@ def precedes(
 def pivot_to_solution(tableau: Floats, pairs: int, tie: float, work: ContactWorkspace) -> int:
     """Run Lemke's pivots on a complementarity problem; return how they ended.
 
-    Find ``w = M z + q >= 0``, ``z >= 0``, ``w @ z = 0``. Column 0 of the dictionary holds q, columns
-    1 ... ``pairs`` hold M and the last one the covering vector, all positive. Ties in the ratio
-    test are broken lexicographically (Cottle, Pang and Stone, The Linear Complementarity
+    Find ``w = M z + q >= 0``, ``z >= 0``, ``w @ z = 0``. Column 0 of the dictionary holds q,
+    columns 1 ... ``pairs`` hold M and the last one the covering vector, all positive. Ties in the
+    ratio test are broken lexicographically (Cottle, Pang and Stone, The Linear Complementarity
     Problem, section 4.9). Variables are numbered w_0 ..., z_0 ..., artificial; in the end
     ``PLACE`` tells which are basic (their row) and which are zero (minus their column).
 
@@ -78,18 +78,18 @@ def pivot_to_solution(tableau: Floats, pairs: int, tie: float, work: ContactWork
     artificial = 2 * pairs
     column = pairs + 1
     row = pairs
+    best = 0.0
     for i in range(pairs):
         row_label[i] = i
         place[i] = i
         column_label[i + 1] = pairs + i
         place[pairs + i] = -(i + 1)
+        # The largest deficit in terms of the covering vector. Of equal ones the later row has the
+        # smaller perturbation, so the larger deficit.
         if tableau[i, 0] < 0.0:
-            # Of equal deficits the later row has the smaller perturbation, so the larger deficit.
-            if row == pairs:
-                row = i
-            elif tableau[i, 0] * tableau[row, column] <= tableau[row, 0] * tableau[i, column] * (
-                1.0 - tie
-            ):
+            deficit = -tableau[i, 0] / tableau[i, column]
+            if deficit >= best * (1.0 - tie):
+                best = deficit
                 row = i
     column_label[column] = artificial
     place[artificial] = -column
@@ -114,15 +114,20 @@ def pivot_to_solution(tableau: Floats, pairs: int, tie: float, work: ContactWork
             if size > 10.0 * tie:
                 ratio = max(tableau[i, 0], 0.0) / size
                 slack = tie * (1.0 + best)
-                if row == pairs or ratio < best - slack:
+                if (
+                    row == pairs
+                    or ratio < best - slack
+                    or (
+                        ratio <= best + slack
+                        and row_label[row] != artificial
+                        and (
+                            row_label[i] == artificial
+                            or precedes(i, row, column, pairs, tie, place, tableau)
+                        )
+                    )
+                ):
                     row = i
                     best = ratio
-                elif ratio <= best + slack and row_label[row] != artificial:
-                    if row_label[i] == artificial or precedes(
-                        i, row, column, pairs, tie, place, tableau
-                    ):
-                        row = i
-                        best = ratio
         if row == pairs:
             return RAY
     return ITERATION_LIMIT

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compilation import inner_kernel, kernel
 from heelstrike.contact.active_set import REST_TOLERANCE, evaluate, label
-from heelstrike.contact.certificate import Certificate
+from heelstrike.contact.certificate import Certificate, certify
 from heelstrike.contact.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.gauss_seidel import gauss_seidel
 from heelstrike.contact.lemke import PATHS, lemke
@@ -31,18 +31,20 @@ from heelstrike.contact.modes import (
     Solver,
     SolveStatus,
 )
-from heelstrike.contact.reduction import reduce_problem
+from heelstrike.contact.reduction import reduce_problem, scale_matrix
 from heelstrike.contact.workspace import (
     FAILURES,
     FALLBACKS,
     IMPULSE,
-    ITERATE,
     ITERATIONS,
     LAST_FALLBACKS,
     PRESCRIBED,
     RESIDUAL,
+    SETTINGS,
     SHORTCUTS,
+    SIZE,
     SKEWED,
+    SLOPE,
     SOLVES,
     SUCCEEDED,
     TOLERANCE,
@@ -57,6 +59,12 @@ from heelstrike.errors import ContactProblemError
 
 CLEAN = 1e-11
 """Modes with smaller residuals are taken at once; others may be nearly right, and better follow."""
+
+AS_GOOD = 2.0 * REST_TOLERANCE
+"""Residual up to which released contacts are preferred to a smaller residual without."""
+
+ROUNDS = 6
+"""How often modes are named after the velocities and tried again."""
 
 
 @inner_kernel
@@ -118,10 +126,10 @@ def solve_contact_kernel(
     residual : (3,) float64
         Out: complementarity, cone and penetration, relative (see ``Certificate``).
     work : ContactWorkspace
-        Buffers; ``counters`` is updated, ``settings`` is read.
+        Buffers; ``counters`` is updated, row ``SETTINGS`` of ``vectors`` is read.
     """
     counters, labels, vectors = work.counters, work.labels, work.vectors
-    tolerance = work.settings[TOLERANCE]
+    tolerance = vectors[SETTINGS, TOLERANCE]
     counters[SOLVES] += 1
     counters[ITERATIONS] = 0
     counters[LAST_FALLBACKS] = 0
@@ -134,8 +142,6 @@ def solve_contact_kernel(
     for i in range(3):
         residual[i] = math.inf
     unknowns = reduce_problem(count, delassus, free, friction, mode, work)
-    for i in range(unknowns):
-        vectors[ITERATE, i] = 0.0
 
     clean = min(tolerance, CLEAN)
     status = UNCERTIFIED
@@ -144,9 +150,12 @@ def solve_contact_kernel(
         outcome = UNCERTIFIED
         if attempt >= 0:
             counters[SUCCEEDED] = order[attempt]
-            if attempt > 0:
+            if attempt == 0:
+                scale_matrix(unknowns, delassus, work)
+            else:
                 counters[FALLBACKS] += 1
                 counters[LAST_FALLBACKS] += 1
+        latest = False
         call = count - count
         proposing = True
         while proposing:
@@ -163,38 +172,47 @@ def solve_contact_kernel(
                 proposing = outcome == SOLVED
             call += 1
             worst = evaluate(count, delassus, free, friction, work)
-            if worst < best:
+            latest = worst < best
+            if latest:
                 best = worst
                 keep(count, mode, impulse, velocity, residual, work)
             if worst <= clean:
                 break
-        if outcome == SOLVED or best <= clean:
-            outcome = UNCERTIFIED
-        if best <= (tolerance if attempt >= 0 else clean):
-            outcome = SOLVED
-        if outcome == SOLVED:
-            status = SOLVED
-            break
+        if attempt >= 0 or best <= clean:
+            if not latest:
+                certify(
+                    count,
+                    delassus,
+                    free,
+                    friction,
+                    vectors[SLOPE],
+                    impulse,
+                    velocity,
+                    residual,
+                    vectors[SIZE],
+                )
+            # The same answer whichever solver found it: contacts at rest are released to carry
+            # any impulse in their cone, so that the split is of least norm among all. And a
+            # candidate that is not quite a solution may become one.
+            for _ in range(ROUNDS):
+                if not label(count, velocity, mode, work):
+                    break
+                for contact in range(count):
+                    labels[TRIAL_MODE, contact] = mode[contact]
+                worst = evaluate(count, delassus, free, friction, work)
+                if not (worst < best or worst <= AS_GOOD):
+                    break
+                best = worst
+                keep(count, mode, impulse, velocity, residual, work)
+            if best <= tolerance:
+                status = SOLVED
+                break
         if attempt == 0 or outcome == RAY:
-            status = outcome
-    if attempt < 0:
-        counters[SHORTCUTS] += 1
+            status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         counters[FAILURES] += 1
-
-    # The same answer whichever solver found it: contacts at rest are released to carry any
-    # impulse in their cone, so that the split is of least norm among all.
-    released = label(count, delassus, free, impulse, velocity, mode, work)
-    for _ in range(3):
-        if not released or status != SOLVED:
-            break
-        for contact in range(count):
-            labels[TRIAL_MODE, contact] = mode[contact]
-        worst = evaluate(count, delassus, free, friction, work)
-        if worst > min(tolerance, max(best, 2.0 * REST_TOLERANCE)):
-            break
-        keep(count, mode, impulse, velocity, residual, work)
-        released = label(count, delassus, free, impulse, velocity, mode, work)
+    elif attempt < 0:
+        counters[SHORTCUTS] += 1
     for contact in range(count):
         if labels[PRESCRIBED, contact] != OPEN and mode[contact] != OPEN:
             mode[contact] = labels[PRESCRIBED, contact]
@@ -308,7 +326,7 @@ def solve_contact(
     return ContactSolution(
         impulse=impulse.reshape(count, 2),
         velocity=velocity.reshape(count, 2),
-        mode=tuple(ContactMode(value) for value in mode),
+        mode=tuple(ContactMode(int(value)) for value in mode),
         certificate=certificate,
     )
 
@@ -326,8 +344,8 @@ def run_solvers(
     """Call the kernel on checked data with fresh memory; return impulse, velocity, certificate."""
     count = friction.size
     work = contact_workspace(count)
-    work.settings[TOLERANCE] = tolerance
-    work.settings[SKEWED] = 0.0 if symmetric else 1.0
+    work.vectors[SETTINGS, TOLERANCE] = tolerance
+    work.vectors[SETTINGS, SKEWED] = 0.0 if symmetric else 1.0
     impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
     status = solve_contact_kernel(
         count, delassus, free, friction, order, mode, impulse, velocity, residual, work

@@ -15,6 +15,7 @@ from heelstrike.compilation import inner_kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
 from heelstrike.contact.workspace import (
     CONE,
+    MATRIX,
     NORMAL,
     OFFSET,
     PRESCRIBED,
@@ -37,14 +38,14 @@ def reduce_problem(
     mode: Integers,
     work: ContactWorkspace,
 ) -> int:
-    """Write the scaled problem into ``work`` and return its number of unknowns.
+    """List the unknowns and their scales in ``work``; return how many they are.
 
     The unknowns of a contact are consecutive, normal first. A contact whose sliding is
     prescribed has a normal unknown only, its friction following along.
     """
     normal, tangent, source = work.labels[NORMAL], work.labels[TANGENT], work.labels[SOURCE]
     prescribed, cone, slope = work.labels[PRESCRIBED], work.vectors[CONE], work.vectors[SLOPE]
-    scale, offset, matrix = work.vectors[SCALE], work.vectors[OFFSET], work.matrix
+    scale, offset = work.vectors[SCALE], work.vectors[OFFSET]
     unknowns = 0
     for contact in range(count):
         normal[contact] = unknowns
@@ -75,6 +76,14 @@ def reduce_problem(
         cone[contact] = 0.0
         if components == 2:
             cone[contact] = friction[contact] * scale[unknowns - 2] / scale[unknowns - 1]
+    return unknowns
+
+
+@inner_kernel
+def scale_matrix(unknowns: int, delassus: Floats, work: ContactWorkspace) -> None:
+    """Write the scaled matrix of the listed unknowns; friction that is prescribed is part of it."""
+    source, slope, scale = work.labels[SOURCE], work.vectors[SLOPE], work.vectors[SCALE]
+    matrix = work.squares[MATRIX]
     for j in range(unknowns):
         column = source[j]
         along = slope[column // 2]
@@ -83,4 +92,3 @@ def reduce_problem(
             if along != 0.0:
                 entry += along * delassus[source[i], column + 1]
             matrix[i, j] = scale[i] * entry * scale[j]
-    return unknowns

@@ -21,10 +21,9 @@ FAILURES = 5
 SHORTCUTS = 6
 COUNTERS = 8
 
-# Places in ``ContactWorkspace.settings``.
+# Places in row ``SETTINGS`` of ``ContactWorkspace.vectors``.
 TOLERANCE = 0
 SKEWED = 1
-SETTINGS = 2
 
 # Rows of ``ContactWorkspace.labels``, by what they are indexed with.
 NORMAL = 0  # contact: its normal unknown
@@ -44,7 +43,7 @@ CONE = 0  # contact: friction coefficient of the scaled problem
 SLOPE = 1  # contact: tangential over normal impulse where sliding is prescribed, else zero
 SCALE = 2  # unknown: impulse per unit of it
 OFFSET = 3  # unknown: scaled free velocity
-LEAN = 4  # equation: tangential per normal unknown at a slipping contact, else zero
+LEAN = 4  # equation: tangential over normal impulse at a slipping contact, else zero
 WEIGHT = 5  # equation: length of the impulse per unit of its unknown
 POINT = 6  # equation: its unknown, in units of impulse
 IMPULSE = 7  # row of the data: the impulse under trial
@@ -55,7 +54,16 @@ STEP = 11  # unknown or equation: a correction
 SPEED = 12  # unknown or equation: scaled velocity
 EQUATIONS = 13  # unknown: what the iterate leaves of the equations
 PROGRESS = 14  # an iterative solver's own numbers
-VECTORS = 15
+SIZE = 15  # row of the data: the scale of its velocity
+SETTINGS = 16  # what the caller may choose: TOLERANCE and SKEWED
+VECTORS = 17
+
+# Matrices of ``ContactWorkspace.squares``.
+MATRIX = 0  # the scaled problem
+BASIS = 1  # free directions of the equations, one a row
+EDGES = 2  # cone edges in terms of the basis; velocities that the basis causes
+DUAL = 3  # dictionary of the least-norm split
+SQUARES = 4
 
 
 class ContactWorkspace(NamedTuple):
@@ -67,25 +75,20 @@ class ContactWorkspace(NamedTuple):
         ``ITERATIONS``, ``SUCCEEDED`` (solver code) and ``LAST_FALLBACKS`` of the last solve;
         ``SOLVES``, ``FALLBACKS``, ``FAILURES`` and ``SHORTCUTS`` (solves answered by the
         warm-started modes) accumulated over all solves. The names are module constants.
-    settings : (2,) float64
-        ``TOLERANCE``: the largest residual that is certified; 1e-9 unless changed. ``SKEWED``:
-        not zero if the matrix may be asymmetric, as in a general complementarity problem.
-    labels, vectors : (.., ..) int64 and float64
-        Lists of the solvers, one a row; the module's constants name the rows.
-    matrix, tableau, basis, edges, dual : (.., ..) float64
-        The scaled problem; the dictionary that is pivoted; and the least-norm split's null
-        space, cone edges and dual dictionary.
+    labels, vectors, squares : int64, float64, float64
+        Lists and matrices of the solvers; the module's constants name them. Row ``SETTINGS`` of
+        ``vectors`` is the caller's: ``TOLERANCE`` is the largest residual that is certified,
+        1e-9 unless changed; ``SKEWED`` is not zero if the matrix may be asymmetric, as in a
+        general complementarity problem.
+    tableau : float64
+        The dictionary that is pivoted.
     """
 
     counters: Integers
-    settings: Floats
     labels: Integers
     vectors: Floats
-    matrix: Floats
+    squares: Floats
     tableau: Floats
-    basis: Floats
-    edges: Floats
-    dual: Floats
 
 
 def contact_workspace(capacity: int) -> ContactWorkspace:
@@ -93,16 +96,12 @@ def contact_workspace(capacity: int) -> ContactWorkspace:
     contacts = max(int(capacity), 1)
     unknowns = 2 * contacts
     pairs = 4 * contacts
-    settings = np.zeros(SETTINGS)
-    settings[TOLERANCE] = 1e-9
+    vectors = np.zeros((VECTORS, max(unknowns, 8)))
+    vectors[SETTINGS, TOLERANCE] = 1e-9
     return ContactWorkspace(
         counters=np.zeros(COUNTERS, np.int64),
-        settings=settings,
         labels=np.zeros((LABELS, 2 * pairs + 2), np.int64),
-        vectors=np.zeros((VECTORS, max(unknowns, 8))),
-        matrix=np.zeros((unknowns, unknowns)),
+        vectors=vectors,
+        squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
         tableau=np.zeros((pairs, pairs + 2)),
-        basis=np.zeros((unknowns, unknowns)),
-        edges=np.zeros((unknowns, unknowns + 1)),
-        dual=np.zeros((unknowns, unknowns + 2)),
     )

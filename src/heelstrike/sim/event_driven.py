@@ -20,7 +20,7 @@ from numba import types
 from heelstrike.compilation import compiled_for, inner_kernel, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
@@ -63,6 +63,7 @@ from heelstrike.sim.event_phase import (
     LAST_IMPACT,
     LAST_ROW,
     LENGTH,
+    LET_PASS,
     LONGEST,
     OUTPUT_PERIOD,
     PAUSE,
@@ -147,6 +148,10 @@ class EventDriven:
         velocities jump.
     solver : str
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``.
+    swing_feet_pass : bool
+        A rule for passive walkers, whose legs of equal length scuff the ground at mid-stance: a
+        point that reaches the ground behind a point already on it, seen in the direction in which
+        the robot moves, passes below the ground until it comes up again.
 
     Raises
     ------
@@ -166,6 +171,7 @@ class EventDriven:
     max_step: float = 0.05
     output_period: float | None = 1e-3
     solver: str = "lemke"
+    swing_feet_pass: bool = False
 
     def __post_init__(self) -> None:
         for name in ("rtol", "atol", "max_step", "output_period"):
@@ -243,7 +249,8 @@ def write_row(
     row = record.row_count[0]
     copy_row(row, time, phase.trial, memory.torque, contacts, memory.residual, record)
     for contact in range(phase.closed.shape[0]):
-        memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -contacts.gap[contact])
+        if phase.passing[contact] == 0:
+            memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -contacts.gap[contact])
     for place in range(count):
         contact = memory.candidate[place]
         record.force[row, contact, 0] = memory.impulse[2 * place]
@@ -370,8 +377,23 @@ def decide(
 
 
 @inner_kernel
+def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> bool:
+    """Whether a point is behind one on the ground and, by the rule, may pass below it."""
+    for other in range(phase.closed.shape[0]):
+        ahead = contacts.position[other, 0] - contacts.position[contact, 0]
+        if phase.closed[other] == 1 and direction * ahead > 0.0:
+            return phase.count[LET_PASS] == 1
+    return False
+
+
+@inner_kernel
 def find_what_happened(
-    starting: bool, link: Integers, contacts: Contacts, memory: Memory, phase: Phase
+    starting: bool,
+    direction: float,
+    link: Integers,
+    contacts: Contacts,
+    memory: Memory,
+    phase: Phase,
 ) -> tuple[bool, bool]:
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
@@ -393,7 +415,11 @@ def find_what_happened(
             if starting:
                 phase.group[contact] = contact
                 first = gap <= ON_THE_GROUND and normal <= rest
-            if normal < -rest and (first or gap <= TOGETHER):
+            if phase.passing[contact] == 1:
+                phase.passing[contact] = 0 if first else 1
+            elif first and not starting and behind(contact, direction, contacts, phase):
+                phase.passing[contact] = 1
+            elif normal < -rest and (first or gap <= TOGETHER):
                 phase.hit[contact] = 1
                 impact = True
             elif first:
@@ -555,7 +581,10 @@ def _advance(
                 controller, model, ground, parameters, kept, spare, memory, phase, clock[TIME],
                 phase.begin, phase.slopes[0], True,
             )  # fmt: skip
-            impact, forced = find_what_happened(starting, link, contacts, memory, phase)
+            momentum(model, memory.tree, phase.scratch[0])
+            impact, forced = find_what_happened(
+                starting, phase.scratch[0, 0], link, contacts, memory, phase
+            )
             if impact:
                 if not strike(model, ground, memory, record, phase, order):
                     count[REASON] = NO_CONSISTENT_FORCE
@@ -670,6 +699,7 @@ class _EventDrivenEngine:
         clock[ABSOLUTE] = method.atol
         clock[FALLEN] = setting.fallen_height
         count[ROW_EVERY] = setting.record_every
+        count[LET_PASS] = int(method.swing_feet_pass)
 
     @property
     def time(self) -> float:

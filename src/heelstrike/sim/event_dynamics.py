@@ -233,18 +233,23 @@ def watch_geometry(
     closed: Integers,
     slide: Integers,
     group: Integers,
+    passing: Integers,
     value: Floats,
     rate: Floats,
 ) -> None:
-    """Event functions that need no forces: gaps of open points, speeds of sliding ones."""
+    """Event functions that need no forces: gaps of open points, speeds of sliding ones.
+
+    That of a point that is let pass below the ground is its depth.
+    """
     for contact in range(closed.shape[0]):
         normal, tangent = contact_velocity(
             link[contact], contacts.position[contact], contacts.normal[contact], tree
         )
         value[2 * contact + 1] = 1.0
         if closed[contact] == 0:
-            value[2 * contact] = contacts.gap[contact]
-            rate[2 * contact] = normal
+            side = 1.0 - 2.0 * passing[contact]
+            value[2 * contact] = side * contacts.gap[contact]
+            rate[2 * contact] = side * normal
         elif slide[contact] != 0 and group[contact] == contact:
             value[2 * contact + 1] = slide[contact] * tangent
 
@@ -334,7 +339,7 @@ def evaluate(
     locate_contacts(model, ground, memory)
     watch_geometry(
         model.contact_link, contacts, memory.tree, phase.closed, phase.slide, phase.group,
-        phase.value, phase.rate,
+        phase.passing, phase.value, phase.rate,
     )  # fmt: skip
     if not forces:
         return

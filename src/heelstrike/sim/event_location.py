@@ -289,8 +289,7 @@ def integrate(
         count[FIRED] = 1
         length *= part
         # Repeat the step to end at the event, and correct its length by what is left there.
-        for _ in range(4):
-            length = max(length, 0.0)
+        for attempt in range(4):
             take_step(controller, model, ground, parameters, kept, spare, memory, phase, length)
             change = 0.0
             for i in range(phase.fired.shape[0]):
@@ -298,7 +297,8 @@ def integrate(
                 geometric = phase.closed[contact] == 0 or (i % 2 == 1 and phase.slide[contact] != 0)
                 if phase.fired[i] == 1 and geometric and phase.end_rate[i] < 0.0:
                     change = -phase.end_value[i] / phase.end_rate[i]
-            if not 1e-15 < abs(change) < 1e-6:
+            change = max(change, -length)
+            if attempt == 3 or not 1e-15 < abs(change) < 1e-6:
                 break
             length += change
     clock[LENGTH] = length

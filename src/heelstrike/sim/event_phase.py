@@ -45,7 +45,8 @@ REASON = 10  # why the loop gave up
 UNDECIDED = 11  # whether the contact modes are still to be decided
 FORCED = 12  # whether contact forces at their limits made it so
 JAMMED = 13  # whether it was forces that grow without bound
-COUNTS = 14
+LET_PASS = 14  # whether swing feet may scuff without effect
+COUNTS = 15
 
 
 class Phase(NamedTuple):
@@ -70,6 +71,8 @@ class Phase(NamedTuple):
         Whether a point has a place where it began to stick, and that place along the tangent.
     hit, plastic : (nc,) int
         Points that reach the ground in this instant; those whose rebound is too short to follow.
+    passing : (nc,) int
+        Points of a swing leg below the ground that are let pass.
     force : (nc, 2) float
         Contact forces of the last evaluation (N), normal and tangent, on the robot.
     end_force : (nc, 2) float
@@ -101,7 +104,7 @@ class Phase(NamedTuple):
     torque : (nu,) float
         Torques at the end of the step, to see whether the controller jumps.
     clock : (14,) float
-    count : (14,) int
+    count : (15,) int
         Their places are module constants.
     """
 
@@ -114,6 +117,7 @@ class Phase(NamedTuple):
     anchor: Floats
     hit: Integers
     plastic: Integers
+    passing: Integers
     force: Floats
     end_force: Floats
     impulse: Floats
@@ -141,7 +145,7 @@ class Phase(NamedTuple):
     dense: Floats
     torque: Floats
     clock: Floats
-    count: Integers
+    count: Integers  # type: ignore[assignment]
 
 
 def allocate_phase(robot: Robot) -> Phase:
@@ -162,6 +166,7 @@ def allocate_phase(robot: Robot) -> Phase:
         anchor=np.zeros(nc),
         hit=integers(nc),
         plastic=integers(nc),
+        passing=integers(nc),
         force=np.zeros((nc, 2)),
         end_force=np.zeros((nc, 2)),
         impulse=np.zeros((nc, 2)),

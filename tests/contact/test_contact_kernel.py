@@ -1,0 +1,210 @@
+"""The compiled entry that simulation loops call: warm starts, counters, prescribed sliding."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from contact_oracle import residual
+from contact_problems import random_problem
+
+from heelstrike.contact.modes import (
+    FISCHER_BURMEISTER,
+    GAUSS_SEIDEL,
+    LEMKE,
+    OPEN,
+    RAY,
+    SLIDING_BACKWARD,
+    SLIDING_FORWARD,
+    SLIP_FORWARD,
+    SOLVED,
+    STICK,
+    WARM_START,
+)
+from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.workspace import (
+    FAILURES,
+    FALLBACKS,
+    LAST_FALLBACKS,
+    SHORTCUTS,
+    SOLVES,
+    SUCCEEDED,
+    contact_workspace,
+)
+
+ALL = (LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL)
+
+
+@dataclass
+class Caller:
+    """A simulation's memory: larger than any one problem, reused from one to the next."""
+
+    capacity: int = 8
+    mode: Any = field(init=False)
+    impulse: Any = field(init=False)
+    velocity: Any = field(init=False)
+    residual: Any = field(init=False)
+    work: Any = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.mode = np.zeros(self.capacity, np.int64)
+        self.impulse = np.full(2 * self.capacity, 7.0)
+        self.velocity = np.full(2 * self.capacity, 7.0)
+        self.residual = np.zeros(3)
+        self.work = contact_workspace(self.capacity)
+
+    def solve(self, G: Any, b: Any, friction: Any, order: tuple[int, ...] = ALL) -> int:
+        count = len(friction)
+        delassus = np.full((2 * self.capacity, 2 * self.capacity), np.nan)
+        delassus[: 2 * count, : 2 * count] = G
+        free = np.full(2 * self.capacity, np.nan)
+        free[: 2 * count] = b
+        coefficient = np.full(self.capacity, np.nan)
+        coefficient[:count] = friction
+        return int(
+            solve_contact_kernel(
+                count,
+                delassus,
+                free,
+                coefficient,
+                np.array(order, np.int64),
+                self.mode,
+                self.impulse,
+                self.velocity,
+                self.residual,
+                self.work,
+            )
+        )
+
+
+def test_only_the_leading_blocks_are_touched() -> None:
+    caller = Caller()
+    assert caller.solve(np.eye(4), [-1.0, 0.2, 1.0, 0.0], [0.5, 0.5]) == SOLVED
+    np.testing.assert_allclose(caller.impulse[:4], [1.0, -0.2, 0.0, 0.0])
+    assert np.all(caller.impulse[4:] == 7.0)
+    assert np.all(caller.velocity[4:] == 7.0)
+
+
+def test_right_modes_are_a_shortcut_to_the_same_answer() -> None:
+    shortcuts = several = 0
+    for seed in range(200):
+        problem = random_problem(np.random.default_rng([3, seed]))
+        caller = Caller()
+        assert caller.solve(problem.delassus, problem.free, problem.friction) == SOLVED
+        cold = caller.impulse.copy()
+        before = caller.work.counters[SHORTCUTS]
+        assert caller.solve(problem.delassus, problem.free, problem.friction) == SOLVED
+        if caller.work.counters[SHORTCUTS] > before:
+            assert caller.work.counters[SUCCEEDED] == WARM_START
+            shortcuts += 1
+        size = np.sqrt(np.diag(problem.delassus))
+        rows = slice(2 * problem.count)
+        difference = np.max(size * np.abs(caller.impulse - cold)[rows])
+        several += difference > 1e-9 * np.max(size * np.abs(cold[rows]))
+    assert shortcuts >= 190
+    assert several == 0
+
+
+@pytest.mark.parametrize("guess", range(6))
+def test_wrong_modes_do_no_harm(guess: int) -> None:
+    for seed in range(100):
+        problem = random_problem(np.random.default_rng([5, seed]))
+        caller = Caller()
+        caller.mode[:] = min(guess, 3)
+        assert caller.solve(problem.delassus, problem.free, problem.friction) == SOLVED
+        impulse = caller.impulse[: 2 * problem.count]
+        assert residual(problem.delassus, problem.free, problem.friction, impulse) <= 1e-9
+
+
+def test_counters() -> None:
+    caller = Caller()
+    G, b = np.eye(2), [-1.0, 0.2]
+    caller.solve(G, b, [0.5])
+    caller.solve(G, b, [0.5])
+    counters = caller.work.counters
+    assert counters[SOLVES] == 2
+    assert counters[SHORTCUTS] == 1
+    assert counters[FALLBACKS] == counters[FAILURES] == 0
+    status = caller.solve(np.zeros((2, 2)), [-1.0, 0.0], [0.5])
+    assert status == RAY
+    assert counters[SOLVES] == 3
+    assert counters[FAILURES] == 1
+    assert counters[FALLBACKS] == counters[LAST_FALLBACKS] == 2
+
+
+def test_no_solver_left_means_failure_not_zero_force_in_silence() -> None:
+    caller = Caller()
+    assert caller.solve(np.eye(2), [-1.0, 0.2], [0.5], order=()) != SOLVED
+    assert caller.work.counters[FAILURES] == 1
+    assert caller.work.counters[SHORTCUTS] == 0
+    assert caller.residual.max() > 1e-3
+
+
+def test_same_bits_every_time() -> None:
+    for seed in range(50):
+        problem = random_problem(np.random.default_rng([9, seed]))
+        answers = []
+        for _ in range(2):
+            caller = Caller()
+            caller.solve(problem.delassus, problem.free, problem.friction)
+            answers.append(caller.impulse.tobytes())
+        assert answers[0] == answers[1]
+
+
+@pytest.mark.parametrize("solver", ALL)
+def test_prescribed_sliding(solver: int) -> None:
+    """Accelerations: a point that slides forward keeps its friction whatever its acceleration.
+
+    G_nn - mu G_nt = 1 - 0.4 * 0.5 = 0.8, so lambda_n = 9.81 / 0.8.
+    """
+    G = np.array([[1.0, 0.5], [0.5, 1.0]])
+    caller = Caller()
+    caller.mode[0] = SLIDING_FORWARD
+    assert caller.solve(G, [-9.81, 100.0], [0.4], order=(solver,)) == SOLVED
+    np.testing.assert_allclose(caller.impulse[:2], 9.81 / 0.8 * np.array([1.0, -0.4]), rtol=1e-13)
+    assert caller.mode[0] == SLIDING_FORWARD
+    caller.mode[0] = SLIDING_BACKWARD
+    assert caller.solve(G, [-9.81, 100.0], [0.4], order=(solver,)) == SOLVED
+    np.testing.assert_allclose(caller.impulse[:2], 9.81 / 1.2 * np.array([1.0, 0.4]), rtol=1e-13)
+
+
+def test_sliding_contact_may_open() -> None:
+    caller = Caller()
+    caller.mode[0] = SLIDING_FORWARD
+    assert caller.solve(np.eye(2), [1.0, 0.0], [0.4]) == SOLVED
+    assert caller.mode[0] == OPEN
+    assert caller.impulse[:2].tolist() == [0.0, 0.0]
+
+
+def test_painleve_configuration_has_no_solution() -> None:
+    """G_nn - mu G_nt < 0: pressing harder pulls the sliding point further in."""
+    caller = Caller()
+    caller.mode[0] = SLIDING_FORWARD
+    status = caller.solve(np.array([[1.0, 0.9], [0.9, 1.0]]), [-1.0, 0.0], [1.5])
+    assert status == RAY
+    assert np.all(np.isfinite(caller.impulse[:2]))
+    assert caller.work.counters[FAILURES] == 1
+
+
+def test_prescribed_sliding_beside_a_foot_at_rest() -> None:
+    """One foot slides, the other is solved for; the laws of the second are Coulomb's."""
+    rng = np.random.default_rng(1)
+    for _ in range(50):
+        root = rng.standard_normal((4, 6))
+        G = root @ root.T
+        b = G @ [-1.0, 0.1 * rng.standard_normal(), -1.0, 0.1 * rng.standard_normal()]
+        friction = np.array([0.2, 0.6])
+        caller = Caller()
+        caller.mode[0] = SLIDING_FORWARD
+        caller.mode[1] = STICK
+        assert caller.solve(G, b, friction) == SOLVED
+        impulse, velocity = caller.impulse[:4], caller.velocity[:4]
+        np.testing.assert_allclose(velocity, G @ impulse + b, atol=1e-12)
+        assert impulse[1] == pytest.approx(-0.2 * impulse[0], abs=1e-14)
+        assert velocity[::2].min() >= -1e-9
+        assert np.abs(np.minimum(velocity[::2], impulse[::2])).max() <= 1e-9
+        assert abs(impulse[3]) <= 0.6 * impulse[2] * (1.0 + 1e-12) + 1e-12
+        if caller.mode[1] == SLIP_FORWARD:
+            assert impulse[3] == pytest.approx(-0.6 * impulse[2])
