@@ -29,7 +29,7 @@ FREE = np.array([-1.0, 0.0, -1.0, 0.0])
         ),
         (EYE, FREE, [0.5, -0.1], {}, r"friction\[1\] is -0.1.*cannot be negative"),
         (EYE, FREE, np.nan, {}, "friction.* is nan"),
-        (EYE * np.inf, FREE, 0.5, {}, r"delassus\[0, 0\] is inf"),
+        (np.full((4, 4), np.inf), FREE, 0.5, {}, r"delassus\[0, 0\] is inf"),
         (EYE, FREE * np.nan, 0.5, {}, r"free\[0\] is nan"),
         (-EYE, FREE, 0.5, {}, r"delassus\[0, 0\] is -1.*negative"),
         (EYE + np.triu(np.ones((4, 4)), 1), FREE, 0.5, {}, "not symmetric"),

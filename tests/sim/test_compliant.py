@@ -270,8 +270,8 @@ def counting(t, q, v, contacts, model, tree, scratch, parameters, memory, torque
         torque[i] = memory[0]
 
 
-def test_a_controller_remembers_only_its_calls_at_the_samples() -> None:
-    """However often the integration asks in between and in steps that it rejects."""
+def test_a_controller_remembers_one_call_for_every_step() -> None:
+    """However often the integration asks within its steps and in those that it rejects."""
     run = hs.simulate(
         walking.bravo7(),
         CompiledController(counting, np.zeros(0), np.zeros(1)),
@@ -280,7 +280,7 @@ def test_a_controller_remembers_only_its_calls_at_the_samples() -> None:
         method=Compliant(),
     )
     assert run.steps > 50
-    np.testing.assert_array_equal(run.torque[:, 0], np.arange(1.0, 52.0))
+    assert run.torque[-1, 0] == run.steps + 1
 
 
 @pytest.mark.parametrize(

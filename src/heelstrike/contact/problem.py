@@ -102,7 +102,8 @@ def solve_contact_kernel(
     """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
 
     The modes in ``mode`` are tried first. Unless their certificate is clean, the solvers in
-    ``order`` are called in turn until one is certified.
+    ``order`` are called in turn until one is certified and clean; an answer that is certified
+    but not clean stands if those after it do no better, and does not count as a fallback.
 
     Parameters
     ----------
@@ -149,12 +150,12 @@ def solve_contact_kernel(
     for attempt in range(-1, order.shape[0]):
         outcome = UNCERTIFIED
         if attempt >= 0:
-            counters[SUCCEEDED] = order[attempt]
             if attempt == 0:
                 scale_matrix(unknowns, delassus, work)
-            else:
+            elif status != SOLVED:
                 counters[FALLBACKS] += 1
                 counters[LAST_FALLBACKS] += 1
+        before = best
         latest = False
         call = count - count
         proposing = True
@@ -204,10 +205,13 @@ def solve_contact_kernel(
                     break
                 best = worst
                 keep(count, mode, impulse, velocity, residual, work)
-            if best <= tolerance:
-                status = SOLVED
+        if best < before and attempt >= 0:
+            counters[SUCCEEDED] = order[attempt]
+        if best <= tolerance and (attempt >= 0 or best <= clean):
+            status = SOLVED
+            if best <= clean:
                 break
-        if attempt == 0 or outcome == RAY:
+        elif attempt == 0 or outcome == RAY:
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         counters[FAILURES] += 1

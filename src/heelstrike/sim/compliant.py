@@ -134,6 +134,13 @@ class Compliant:
 
     Notes
     -----
+    A compiled controller without a control period acts continuously: it is called within every
+    step of the integration and remembers what it saw at its end, with the contact forces of that
+    very instant. Its gains are taken implicitly with the contact forces. A controller in Python,
+    and any with a control period, has its torques held from sample to sample, and sees the mean
+    forces since the last. On compliant ground that is much harder for a light foot: stiff computed
+    torque that walks when it acts continuously can fall when it is sampled at 1 ms.
+
     Third order in the steps of the integration. Penetration is part of the model and reported as
     such. The run's complementarity and non-penetration residuals are zero because there is no
     contact problem, not because it is solved well; its cone residual is measured on the forces of
@@ -243,8 +250,8 @@ def sample(
     clock: Floats,
     memory: Memory,
     work: CompliantWorkspace,
-) -> bool:
-    """Integrate from one sample to the next; return whether that was possible.
+) -> int:
+    """Integrate from one sample to the next; return DONE or what was in the way.
 
     ``memory.contacts.force`` receives the mean contact forces.
     """
@@ -285,19 +292,22 @@ def sample(
                 factor = max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
             h = taken * factor
             rejected = True
-            if control.continuous and work.age[0] > 0:
+            hopeless = h < SHORTEST * span
+            if control.continuous and (work.age[0] > 0 or hopeless):
                 find_gains(control, start + elapsed, model, memory, work)
-            if h < SHORTEST * span:
+            if hopeless:
                 for i in range(model.parent.shape[0]):
                     memory.q[i] = work.base_q[i]
                     memory.v[i] = work.base_v[i]
-                return False
+                return DIVERGED if limit_torque(model, memory) else BAD_CONTROLLER
             continue
-        evaluate(model, ground, laws, control, start + elapsed + taken, memory, work)
+        observe(model, ground, memory)
         met = landing(model, clock[ATOL], memory, work)
         if met < 1.0:
             h = taken * met
             continue
+        # At the sample itself the controller is called by the one who takes it.
+        evaluate(model, ground, laws, control, not final, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
         memory.residual[1] = max(memory.residual[1], cone_residual(model, memory, work))
         memory.tally[STEPS] += 1
@@ -319,7 +329,7 @@ def sample(
     for joint in range(model.parent.shape[0]):
         memory.stop_torque[joint] = work.stop_impulse[joint] / span
     memory.extreme[CONE] = max(memory.extreme[CONE], memory.residual[1])
-    return True
+    return DONE
 
 
 @inner_kernel
@@ -447,7 +457,7 @@ def _advance(
             )
             if not limit_torque(model, memory):
                 return BAD_CONTROLLER
-        evaluate(model, ground, laws, held, time, memory, work)
+        evaluate(model, ground, laws, held, True, time, memory, work)
         recorded = k % span[RECORD_EVERY] == 0 or k == last
         row = record.row_count[0]
         if recorded:
@@ -457,8 +467,9 @@ def _advance(
             return FELL
         if k == last:
             return DONE
-        if not sample(model, ground, laws, control, time, clock, memory, work):
-            return DIVERGED
+        code = sample(model, ground, laws, control, time, clock, memory, work)
+        if code != DONE:
+            return code
         first = record.event_count[0]
         note_events(model, laws, record, time + step, memory, work)
         for place in range(first, record.event_count[0]):
@@ -467,6 +478,10 @@ def _advance(
         if recorded:
             # What acted until the next sample takes the place of what acted at the first instant.
             note_forces(record, row, memory.contacts.force, memory.stop_torque, memory)
+        if continuous:
+            for contact in range(count):
+                memory.contacts.force[contact, 0] = work.force[contact, 0]
+                memory.contacts.force[contact, 1] = work.force[contact, 1]
         span[NOW] = k + 1
 
 

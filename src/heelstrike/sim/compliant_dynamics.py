@@ -89,12 +89,12 @@ class Control(NamedTuple):
     Attributes
     ----------
     continuous : bool
-        Whether it acts at every instant; otherwise its torques are held between the samples.
+        Whether it acts at every instant; otherwise its torques are held.
     kernel : compiled function
     parameters, memory : float arrays
         The controller and its numbers; see :class:`~heelstrike.sim.controller.CompiledController`.
     trial : float array
-        Copy of its memory for the calls between the samples.
+        Copy of its memory for the calls within a step.
     """
 
     continuous: bool
@@ -237,13 +237,10 @@ def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
 
 
 @inner_kernel
-def command(control: Control, time: float, model: Model, memory: Memory, torque: Floats) -> None:
-    """Torques of a controller that acts continuously, within their limits.
-
-    What it remembers stays as it is: only its calls at the samples count.
-    """
-    for i in range(control.memory.shape[0]):
-        control.trial[i] = control.memory[i]
+def command(
+    control: Control, memory_now: Floats, time: float, model: Model, memory: Memory, torque: Floats
+) -> None:
+    """Torques of a controller at the state now, within their limits."""
     control.kernel(
         time,
         memory.q,
@@ -253,7 +250,7 @@ def command(control: Control, time: float, model: Model, memory: Memory, torque:
         memory.tree,
         memory.scratch,
         control.parameters,
-        control.trial,
+        memory_now,
         torque,
     )
     for i in range(torque.shape[0]):
@@ -261,6 +258,16 @@ def command(control: Control, time: float, model: Model, memory: Memory, torque:
             torque[i] = model.torque_upper[i]
         elif torque[i] < model.torque_lower[i]:
             torque[i] = model.torque_lower[i]
+
+
+@inner_kernel
+def try_command(
+    control: Control, time: float, model: Model, memory: Memory, torque: Floats
+) -> None:
+    """Torques that a controller would ask for, were this its next call; it remembers nothing."""
+    for i in range(control.memory.shape[0]):
+        control.trial[i] = control.memory[i]
+    command(control, control.trial, time, model, memory, torque)
 
 
 @inner_kernel
@@ -274,13 +281,13 @@ def find_gains(
         memory.v[j] = work.base_v[j]
     forward_kinematics(model, memory.q, memory.tree)
     link_velocities(model, memory.v, memory.tree)
-    command(control, time, model, memory, memory.torque)
+    try_command(control, time, model, memory, memory.torque)
     for j in range(model.parent.shape[0]):
         kept = memory.q[j]
         memory.q[j] = kept + PERTURBATION
         forward_kinematics(model, memory.q, memory.tree)
         link_velocities(model, memory.v, memory.tree)
-        command(control, time, model, memory, trial)
+        try_command(control, time, model, memory, trial)
         memory.q[j] = kept
         for i in range(trial.shape[0]):
             work.torque_by_q[i, j] = (trial[i] - memory.torque[i]) / PERTURBATION
@@ -289,7 +296,7 @@ def find_gains(
         kept = memory.v[j]
         memory.v[j] = kept + PERTURBATION
         link_velocities(model, memory.v, memory.tree)
-        command(control, time, model, memory, trial)
+        try_command(control, time, model, memory, trial)
         memory.v[j] = kept
         for i in range(trial.shape[0]):
             work.torque_by_v[i, j] = (trial[i] - memory.torque[i]) / PERTURBATION
@@ -302,14 +309,27 @@ def evaluate(
     ground: GroundModel,
     laws: Laws,
     control: Control,
+    accepted: bool,
     time: float,
     memory: Memory,
     work: CompliantWorkspace,
 ) -> None:
-    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.bristle``."""
+    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.bristle``.
+
+    A controller that acts continuously is called: for good, with the contact forces of this very
+    state, if the state is `accepted`; otherwise to see what it would do.
+    """
     observe(model, ground, memory)
+    push_contacts(model, laws, memory, work)
+    push_stops(model, laws, memory, work)
     if control.continuous:
-        command(control, time, model, memory, memory.torque)
+        if accepted:
+            for contact in range(model.contact_link.shape[0]):
+                memory.contacts.force[contact, 0] = work.force[contact, 0]
+                memory.contacts.force[contact, 1] = work.force[contact, 1]
+            command(control, control.memory, time, model, memory, memory.torque)
+        else:
+            try_command(control, time, model, memory, memory.torque)
     mass_matrix(model, memory.tree, memory.mass_matrix)
     factorize(model, memory.mass_matrix, memory.factor)
     bias_force(model, memory.tree, memory.rate)
@@ -318,9 +338,23 @@ def evaluate(
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     rate = work.acceleration
     nv = model.parent.shape[0]
-    push_stops(model, laws, memory, work)
     for j in range(nv):
         rate[j] = memory.force[j] - memory.rate[j] + work.stop_force[j]
+    for contact in range(model.contact_link.shape[0]):
+        normal = work.force[contact, 0]
+        tangent = work.force[contact, 1]
+        if normal > 0.0:
+            for j in range(nv):
+                rate[j] += (
+                    memory.jacobian[2 * contact, j] * normal
+                    + memory.jacobian[2 * contact + 1, j] * tangent
+                )
+    solve_factorized(model, memory.factor, rate)
+
+
+@inner_kernel
+def push_contacts(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
+    """Forces of the contacts and rates of the bristles at the state now."""
     for contact in range(model.contact_link.shape[0]):
         partial = work.partial[contact]
         gap = memory.contacts.gap[contact]
@@ -343,13 +377,6 @@ def evaluate(
         work.force[contact, 0] = normal
         work.force[contact, 1] = tangent
         work.bristle_rate[contact] = bristle_rate
-        if normal > 0.0:
-            for j in range(nv):
-                rate[j] += (
-                    memory.jacobian[2 * contact, j] * normal
-                    + memory.jacobian[2 * contact + 1, j] * tangent
-                )
-    solve_factorized(model, memory.factor, rate)
 
 
 @inner_kernel
@@ -559,7 +586,7 @@ def attempt_step(
                 work.bristle[i] = work.base_bristle[i]
                 for k in range(stage):
                     work.bristle[i] += A[stage, k] * work.stage_bristle[k, i]
-            evaluate(model, ground, laws, control, time + TIMES[stage] * h, memory, work)
+            evaluate(model, ground, laws, control, False, time + TIMES[stage] * h, memory, work)
         for i in range(nv):
             work.right_q[i] = work.base_v[i] if stage == 0 else memory.v[i]
             work.right_v[i] = work.base_acceleration[i] if stage == 0 else work.acceleration[i]

@@ -19,7 +19,7 @@ from numba import types
 
 from heelstrike.compilation import compiled_for, inner_kernel, type_of
 from heelstrike.contact.ground import Ground, GroundModel
-from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -308,7 +308,8 @@ def decide(
     moment ahead, where the state comes to if the modes stay as they are: at the very instant at
     which a normal force vanishes or friction reaches its limit, the old modes and the new are
     equally right. Where the problem has no solution, or forces grow without bound before a sliding
-    point (`jammed`), the velocities jump without a collision (Painlevé's paradox).
+    point (`jammed`), the velocities jump without a collision (Painlevé's paradox). Where it has
+    several, the points leave the ground if that is one of them.
     """
     time = phase.clock[TIME]
     contacts = phase.closed.shape[0]
@@ -353,13 +354,20 @@ def decide(
             if not solved:
                 return False
             continue
+        several = False
+        apart = True
         for place in range(count):
             contact = memory.candidate[place]
             row = 2 * place
+            apart = apart and memory.free[row] >= 0.0
             lean = -phase.slide[contact] * memory.friction[contact]
             if memory.delassus[row, row] + lean * memory.delassus[row, row + 1] <= 0.0:
                 # Pressing it harder would push it into the ground: there are other solutions.
+                several = True
                 log_event(record, time, PAINLEVE, contact, 0.0, 0.0)
+        if several and apart:
+            for place in range(count):
+                memory.problem_mode[place] = OPEN
         if count > 0:
             note_residual(memory.residual, memory.extreme)
         adopt_modes(count, memory.candidate, memory.problem_mode, memory.mode, phase)
