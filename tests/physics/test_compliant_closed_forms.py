@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from physics.mechanisms import block, disc, point
+from mechanisms import block, disc, point
 
 import heelstrike as hs
 from heelstrike.sim import EventKind

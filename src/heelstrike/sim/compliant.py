@@ -85,9 +85,9 @@ from heelstrike.sim.recording import (
 )
 from heelstrike.sim.rosenbrock import ORDER
 
-# A step that must be shorter than this fraction of the sampling step has met a state that is not
-# finite: the tolerance of a jump in the force is met long before.
-SHORTEST = 1e-13
+# Shortest step in s. It is taken whatever its error: only a torque that jumps asks for less, and a
+# jump of 1000 rad/s² over so short a time is 1e-7 rad/s.
+SHORTEST = 1e-10
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 5.0
@@ -286,25 +286,26 @@ def sample(
             memory,
             work,
         )
-        if not error <= 1.0:
-            factor = SHRINK
-            if error < np.inf:
-                factor = max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
-            h = taken * factor
-            rejected = True
-            hopeless = h < SHORTEST * span
-            if control.continuous and (work.age[0] > 0 or hopeless):
+        shortest = taken <= SHORTEST
+        finite = error < np.inf
+        if not (error <= 1.0 or (shortest and finite)):
+            if control.continuous and (work.age[0] > 0 or shortest):
                 find_gains(control, start + elapsed, model, memory, work)
-            if hopeless:
+            if shortest:
                 for i in range(model.parent.shape[0]):
                     memory.q[i] = work.base_q[i]
                     memory.v[i] = work.base_v[i]
                 return DIVERGED if limit_torque(model, memory) else BAD_CONTROLLER
+            factor = SHRINK
+            if finite:
+                factor = max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
+            h = max(taken * factor, SHORTEST)
+            rejected = True
             continue
         observe(model, ground, memory)
         met = landing(model, clock[ATOL], memory, work)
-        if met < 1.0:
-            h = taken * met
+        if met < 1.0 and not shortest:
+            h = max(taken * met, SHORTEST)
             continue
         # At the sample itself the controller is called by the one who takes it.
         evaluate(model, ground, laws, control, not final, start + elapsed + taken, memory, work)
@@ -315,9 +316,9 @@ def sample(
         begin_step(model, memory, work)
         elapsed = span if final else elapsed + taken
         factor = GROW
-        if error > 0.0:
+        if error > 0.0 and not shortest:
             factor = min(GROW, SAFETY * error ** (-1.0 / ORDER))
-        if rejected:
+        if rejected and not shortest:
             factor = min(factor, 1.0)
             rejected = False
         # A step cut short by the sample says little about how long the next may be.

@@ -275,7 +275,6 @@ def find_gains(
     control: Control, time: float, model: Model, memory: Memory, work: CompliantWorkspace
 ) -> None:
     """Derivatives of the controller's torques at the start of the step, by differences."""
-    trial = work.trial_torque
     for j in range(model.parent.shape[0]):
         memory.q[j] = work.base_q[j]
         memory.v[j] = work.base_v[j]
@@ -283,24 +282,39 @@ def find_gains(
     link_velocities(model, memory.v, memory.tree)
     try_command(control, time, model, memory, memory.torque)
     for j in range(model.parent.shape[0]):
-        kept = memory.q[j]
-        memory.q[j] = kept + PERTURBATION
+        difference(control, time, model, memory, memory.q, j, work.trial_torque, work.torque_by_q)
+        difference(control, time, model, memory, memory.v, j, work.trial_torque, work.torque_by_v)
+    work.age[0] = 0
+
+
+@inner_kernel
+def difference(
+    control: Control,
+    time: float,
+    model: Model,
+    memory: Memory,
+    varied: Floats,
+    j: int,
+    trial: Floats,
+    gains: Floats,
+) -> None:
+    """Change of the torques per unit of component j of `varied`, ``memory.q`` or ``memory.v``.
+
+    The smaller of the differences to either side: where the torque jumps, as when a controller
+    changes its mind, the other would be the jump over the perturbation.
+    """
+    kept = varied[j]
+    for side in range(2):
+        change = PERTURBATION if side == 0 else -PERTURBATION
+        varied[j] = kept + change
         forward_kinematics(model, memory.q, memory.tree)
         link_velocities(model, memory.v, memory.tree)
         try_command(control, time, model, memory, trial)
-        memory.q[j] = kept
         for i in range(trial.shape[0]):
-            work.torque_by_q[i, j] = (trial[i] - memory.torque[i]) / PERTURBATION
-    forward_kinematics(model, memory.q, memory.tree)
-    for j in range(model.parent.shape[0]):
-        kept = memory.v[j]
-        memory.v[j] = kept + PERTURBATION
-        link_velocities(model, memory.v, memory.tree)
-        try_command(control, time, model, memory, trial)
-        memory.v[j] = kept
-        for i in range(trial.shape[0]):
-            work.torque_by_v[i, j] = (trial[i] - memory.torque[i]) / PERTURBATION
-    work.age[0] = 0
+            slope = (trial[i] - memory.torque[i]) / change
+            if side == 0 or abs(slope) < abs(gains[i, j]):
+                gains[i, j] = slope
+    varied[j] = kept
 
 
 @inner_kernel

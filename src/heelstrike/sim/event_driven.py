@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numba import types
@@ -172,6 +172,9 @@ class EventDriven:
     output_period: float | None = 1e-3
     solver: str = "lemke"
     swing_feet_pass: bool = False
+
+    # Impulses of impacts are in the run's events, not in the forces of its rows.
+    impulses_in_events: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         for name in ("rtol", "atol", "max_step", "output_period"):

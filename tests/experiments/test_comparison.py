@@ -1,0 +1,78 @@
+"""compare(): methods against each other, on numbers that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import walking
+
+import heelstrike as hs
+from heelstrike.experiments.comparison import Comparison
+
+
+@pytest.fixture(scope="module")
+def comparison() -> Comparison:
+    return hs.compare(
+        walking.bravo7(),
+        hs.ComputedTorque(walking.bravo7(), walking.gait()),
+        methods={
+            "events": hs.EventDriven(),
+            "coarse": hs.TimeStepping(step=1e-3),
+            "fine": hs.TimeStepping(step=1e-4),
+        },
+        state=walking.gait().initial_state,
+        duration=1.5,
+    )
+
+
+def test_the_reference_does_not_differ_from_itself(comparison: Comparison) -> None:
+    first = comparison.differences[0]
+    assert first.method == "events"
+    assert (first.touchdown_s, first.impulse_Ns, first.energy_J, first.position) == (0, 0, 0, 0)
+
+
+def test_shorter_steps_are_nearer(comparison: Comparison) -> None:
+    _, coarse, fine = comparison.differences
+    assert coarse.touchdowns == fine.touchdowns == 2
+    assert coarse.touchdown_s <= 1.1e-3
+    assert fine.touchdown_s <= 1.1e-4
+    assert fine.position < 0.2 * coarse.position
+    assert fine.energy_J < 0.2 * coarse.energy_J
+
+
+def test_landing_impulses_are_the_same_thing_in_both(comparison: Comparison) -> None:
+    """Event-driven runs keep impacts in events, time stepping in forces: 20 N s either way."""
+    fine = comparison.differences[2]
+    assert fine.impulse_Ns <= 0.02 * walking.gait().touchdown_impulse[0]
+
+
+def test_the_table_and_the_figure(comparison: Comparison) -> None:
+    table = comparison.to_dict()
+    assert table["reference"] == "events"
+    assert [row["method"] for row in table["methods"]] == ["events", "coarse", "fine"]
+    labels = [axes.get_ylabel() for axes in comparison.plot().axes]
+    assert any("J" in label for label in labels)
+    assert all("(" in label for label in labels)
+
+
+def test_what_compare_refuses() -> None:
+    def asked(**options: object) -> None:
+        arguments = {
+            "methods": [hs.TimeStepping()],
+            "state": walking.gait().initial_state,
+            "duration": 0.01,
+            **options,
+        }
+        hs.compare(walking.bravo7(), None, **arguments)  # type: ignore[arg-type]
+
+    with pytest.raises(hs.SimulationError, match="no method"):
+        asked(methods=[])
+    with pytest.raises(hs.SimulationError, match="the same"):
+        asked(methods=[hs.TimeStepping(), hs.TimeStepping()])
+    with pytest.raises(hs.SimulationError, match="none of the methods"):
+        asked(reference="truth")
+
+
+def test_positions_are_compared_at_common_instants(comparison: Comparison) -> None:
+    ends = [run.time[-1] for run in comparison.runs.values()]
+    np.testing.assert_allclose(ends, 1.5, atol=1e-9)
