@@ -264,10 +264,10 @@ def test_a_robot_left_alone_falls() -> None:
 
 @controller_kernel
 def counting(t, q, v, contacts, model, tree, scratch, parameters, memory, torque):  # type: ignore[no-untyped-def]
-    """Ask for as many newton metres as it remembers calls."""
+    """Ask for as many 1/1024 newton metres as it remembers calls."""
     memory[0] += 1.0
     for i in range(torque.shape[0]):
-        torque[i] = memory[0]
+        torque[i] = memory[0] / 1024.0
 
 
 def test_a_controller_remembers_one_call_for_every_step() -> None:
@@ -280,7 +280,7 @@ def test_a_controller_remembers_one_call_for_every_step() -> None:
         method=Compliant(),
     )
     assert run.steps > 50
-    assert run.torque[-1, 0] == run.steps + 1
+    assert 1024.0 * run.torque[-1, 0] == run.steps + 1
 
 
 @pytest.mark.parametrize(
