@@ -244,7 +244,7 @@ def _landing_impulse(run: Run, contacts: list[int], touchdown: float) -> float:
     apart, in their events.
     """
     end = touchdown + LANDING
-    spans = np.diff(run.time)
+    spans = np.minimum(run.time[1:], end) - run.time[:-1]
     rows = (run.time[1:] > touchdown - 1e-12) & (run.time[:-1] < end)
     force = run.contact_force[:-1, contacts, 0].sum(axis=1)
     total = float(np.sum((force * spans)[rows]))

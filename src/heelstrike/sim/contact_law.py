@@ -83,7 +83,7 @@ class HuntCrossley:
     --------
     >>> law = HuntCrossley(stiffness=4e8, dissipation=0.5)
     >>> round(law.restitution(0.1), 3)
-    0.953
+    0.952
     """
 
     stiffness: float = 4e8
