@@ -10,14 +10,15 @@ from __future__ import annotations
 import hashlib
 import types
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache, update_wrapper
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba import njit
 from numba.core.caching import FunctionCache
-from numba.core.registry import CPUDispatcher
+
+from heelstrike.linking import InnerKernelCompiler
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -49,7 +50,7 @@ class _PackageCache(FunctionCache):
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)  # type: ignore[no-untyped-call]
+        super().__init__(function)
         index = self._cache_file
         index._source_stamp = (_sources(), index._source_stamp)
 
@@ -62,24 +63,41 @@ def _kept_on_disk(compiled: Any) -> Any:
     return compiled
 
 
+class Kernel:
+    """A function that is compiled on demand, as part of other kernels or to be called from Python.
+
+    Compiled code that calls it takes it in (:mod:`heelstrike.linking`); only a call from Python
+    makes machine code of its own, which is kept on disk.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func = function
+        options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        self._part = njit(**options, pipeline_class=InnerKernelCompiler)(function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba takes it for where another kernel names it."""
+        return type_of(self._part)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call it from Python."""
+        return self._callable(*arguments)
+
+    @cached_property
+    def _callable(self) -> Any:
+        return _kept_on_disk(njit(**_OPTIONS)(self.py_func))
+
+
 def kernel(function: Function) -> Function:
-    """Compile a kernel for the CPU, with its machine code cached on disk.
+    """Turn a function into a :class:`Kernel`.
 
     Division by zero follows IEEE 754 instead of raising, and the GIL is released.
     """
-    compiled: Function = _kept_on_disk(njit(**_OPTIONS)(function))
-    return compiled
-
-
-def inner_kernel(function: Function) -> Function:
-    """Compile a kernel that only other kernels call.
-
-    Without the wrappers that convert Python arguments it compiles much faster, the more so the
-    more arrays it takes; in return Python cannot call it.
-    """
-    options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    compiled: Function = _kept_on_disk(njit(**options)(function))
-    return compiled
+    compiled: Any = Kernel(function)
+    result: Function = compiled
+    return result
 
 
 def compiled_for(signature: Any, function: Function, *, address: bool = False) -> Function:
@@ -104,7 +122,7 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
 
 def type_of(value: Any) -> Any:
     """Return the Numba type of an example value."""
-    return numba.typeof(value)  # type: ignore[no-untyped-call]
+    return numba.typeof(value)
 
 
 def uncompiled(function: Function, replace: Mapping[str, Any] | None = None) -> Function:
@@ -122,7 +140,7 @@ def uncompiled(function: Function, replace: Mapping[str, Any] | None = None) -> 
 
 
 def _twin(function: Any, replace: dict[str, Any], twins: dict[int, Any]) -> Any:
-    source = function.py_func if isinstance(function, CPUDispatcher) else function
+    source = function.py_func if isinstance(function, Kernel) else function
     if id(source) in twins:
         return twins[id(source)]
     scope = dict(source.__globals__)
@@ -133,6 +151,6 @@ def _twin(function: Any, replace: dict[str, Any], twins: dict[int, Any]) -> Any:
     for name in source.__code__.co_names:
         if name in replace:
             scope[name] = replace[name]
-        elif isinstance(scope.get(name), CPUDispatcher):
+        elif isinstance(scope.get(name), Kernel):
             scope[name] = _twin(scope[name], replace, twins)
     return twin

@@ -370,16 +370,20 @@ def robot_without(robot: hs.Robot, what: str) -> hs.Robot:
     if what == "symmetry":
         return dataclasses.replace(robot, mirror=None)
     if what == "motor":
-        model = robot.model._replace(
+        model = dataclasses.replace(
+            robot.model,
             actuator_joint=robot.model.actuator_joint[:-1],
             torque_lower=robot.model.torque_lower[:-1],
             torque_upper=robot.model.torque_upper[:-1],
         )
         return dataclasses.replace(robot, model=model)
     if what == "gravity":
-        return dataclasses.replace(robot, model=robot.model._replace(gravity=np.zeros(2)))
+        return dataclasses.replace(
+            robot, model=dataclasses.replace(robot.model, gravity=np.zeros(2))
+        )
     assert what == "contact points"
-    model = robot.model._replace(
+    model = dataclasses.replace(
+        robot.model,
         contact_link=np.zeros(0, np.int64),
         contact_position=np.zeros((0, 2)),
         contact_radius=np.zeros(0),

@@ -15,7 +15,8 @@ from heelstrike.gait.sole import sole
 def with_contacts(robot: hs.Robot, position: list[list[float]], radius: list[float]) -> hs.Robot:
     """Return the robot with other contact points on its first foot, and none elsewhere."""
     count = len(position)
-    model = robot.model._replace(
+    model = dataclasses.replace(
+        robot.model,
         contact_link=np.full(count, robot.feet[0].link),
         contact_position=np.array(position),
         contact_radius=np.array(radius),

@@ -274,7 +274,7 @@ def test_a_spoilt_file_is_refused_or_gives_a_sound_robot(name: str) -> None:
                 refused += 1
                 continue
         assert robot.total_mass > 0.0
-        for field, values in robot.model._asdict().items():
+        for field, values in robot.model.members().items():
             assert not np.any(np.isnan(values)), field
     assert 0 < refused < 150
 

@@ -137,7 +137,7 @@ def test_contact_discs_are_where_mujoco_has_the_geoms(seed: int) -> None:
 
 def test_arrays_are_what_kernels_want() -> None:
     robot = read_mjcf(random_tree(3))
-    for name, values in robot.model._asdict().items():
+    for name, values in robot.model.members().items():
         if name == "pivot":
             assert type(values) is int
             continue

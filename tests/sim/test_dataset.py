@@ -26,7 +26,7 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, np.ndarray):
         return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=True)
     if isinstance(a, hs.Ground):
-        return all(same(x, y) for x, y in zip(a.model(), b.model(), strict=True))
+        return same(a.model(), b.model())
     if dataclasses.is_dataclass(a):
         return type(a) is type(b) and all(
             same(getattr(a, field.name), getattr(b, field.name)) for field in dataclasses.fields(a)

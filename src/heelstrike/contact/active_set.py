@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.least_norm import split
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
@@ -62,7 +62,7 @@ SHARP = 1e-13
 """Residuals above this are worth a step of iterative refinement."""
 
 
-@inner_kernel
+@kernel
 def assemble(count: int, delassus: Floats, friction: Floats, work: ContactWorkspace) -> int:
     """Write the equations of the modes under trial into the tableau; return their number.
 
@@ -106,7 +106,7 @@ def assemble(count: int, delassus: Floats, friction: Floats, work: ContactWorksp
     return size
 
 
-@inner_kernel
+@kernel
 def eliminate(size: int, symmetric: bool, work: ContactWorkspace) -> int:
     """Solve the equations in the tableau as far as their rank allows; return their nullity.
 
@@ -162,7 +162,7 @@ def eliminate(size: int, symmetric: bool, work: ContactWorkspace) -> int:
     return nullity
 
 
-@inner_kernel
+@kernel
 def expand(count: int, friction: Floats, work: ContactWorkspace) -> None:
     """Write ``POINT`` out as an impulse inside the cones, exactly.
 
@@ -193,7 +193,7 @@ def expand(count: int, friction: Floats, work: ContactWorkspace) -> None:
         impulse[row + 1] = across * impulse[row]
 
 
-@inner_kernel
+@kernel
 def evaluate(
     count: int, delassus: Floats, free: Floats, friction: Floats, work: ContactWorkspace
 ) -> float:
@@ -250,7 +250,7 @@ def evaluate(
         refinements += 1
 
 
-@inner_kernel
+@kernel
 def label(count: int, velocity: Floats, mode: Integers, work: ContactWorkspace) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 

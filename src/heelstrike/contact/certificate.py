@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import Solver, SolveStatus
 from heelstrike.contact.workspace import Floats
 
@@ -69,7 +69,7 @@ class Certificate:
         )
 
 
-@inner_kernel
+@kernel
 def certify(
     count: int,
     delassus: Floats,

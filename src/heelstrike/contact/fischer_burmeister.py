@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import (
     ITERATION_LIMIT,
     OPEN,
@@ -56,7 +56,7 @@ are not solutions; on random problems that costs five failures for one."""
 GOLDEN = 0.6180339887498949
 
 
-@inner_kernel
+@kernel
 def read_iterate(count: int, work: ContactWorkspace) -> bool:
     """Write the modes that ``ITERATE`` and its velocity point to; return whether any changed."""
     mode, normal, tangent = work.labels[TRIAL_MODE], work.labels[NORMAL], work.labels[TANGENT]
@@ -78,7 +78,7 @@ def read_iterate(count: int, work: ContactWorkspace) -> bool:
     return changed
 
 
-@inner_kernel
+@kernel
 def equations(count: int, unknowns: int, size: float, work: ContactWorkspace) -> float:
     """Evaluate the equations at ``ITERATE``; return half the sum of their squares.
 
@@ -125,7 +125,7 @@ def equations(count: int, unknowns: int, size: float, work: ContactWorkspace) ->
     return merit
 
 
-@inner_kernel
+@kernel
 def newton_step(unknowns: int, damping: float, work: ContactWorkspace) -> None:
     """Solve ``(V^T V + damping I) step = -V^T equations`` for the Jacobian V in the tableau."""
     step, value = work.vectors[STEP], work.vectors[EQUATIONS]
@@ -154,7 +154,7 @@ def newton_step(unknowns: int, damping: float, work: ContactWorkspace) -> None:
         step[i] /= square[i, i]
 
 
-@inner_kernel
+@kernel
 def fischer_burmeister(count: int, unknowns: int, call: int, work: ContactWorkspace) -> int:
     """Iterate on the reduced problem until other modes are to be tried than before.
 

@@ -6,7 +6,7 @@ are; those are proposed for an exact solve whenever they change.
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import (
     ITERATION_LIMIT,
     OPEN,
@@ -32,7 +32,7 @@ SWEEPS = 2000
 """Sweeps over all contacts before giving up."""
 
 
-@inner_kernel
+@kernel
 def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
     """Solve one contact of the reduced problem for its own impulse; return its mode."""
     offset, iterate, matrix = work.vectors[OFFSET], work.vectors[ITERATE], work.squares[MATRIX]
@@ -77,7 +77,7 @@ def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
     return STICK
 
 
-@inner_kernel
+@kernel
 def gauss_seidel(count: int, unknowns: int, call: int, work: ContactWorkspace) -> int:
     """Sweep over the reduced problem until other modes are to be tried than before.
 

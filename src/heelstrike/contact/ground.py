@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.bundle import Bundle
+from heelstrike.compilation import kernel
 from heelstrike.errors import SimulationError
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 REACH = 0.25
 
 
-class GroundModel(NamedTuple):
+class GroundModel(Bundle):
     """The ground as the kernels see it.
 
     Attributes
@@ -180,7 +180,7 @@ def _coefficients(name: str, value: ArrayLike, segments: int, highest: float) ->
     return np.broadcast_to(coefficients, (segments,)).copy()
 
 
-@inner_kernel
+@kernel
 def segment_below(ground: GroundModel, x: float) -> int:
     """Index of the segment under x; the right one at a corner."""
     low = 0
@@ -194,7 +194,7 @@ def segment_below(ground: GroundModel, x: float) -> int:
     return low
 
 
-@inner_kernel
+@kernel
 def ground_height(ground: GroundModel, x: float) -> float:
     """Height of the ground at x."""
     segment = segment_below(ground, x)
@@ -203,7 +203,7 @@ def ground_height(ground: GroundModel, x: float) -> float:
     return ground.vertices[segment, 1] + rise / run * (x - ground.vertices[segment, 0])
 
 
-@inner_kernel
+@kernel
 def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: Floats) -> float:
     """Signed distance to the line through a segment; writes its upward normal."""
     run = ground.vertices[segment + 1, 0] - ground.vertices[segment, 0]
@@ -216,7 +216,7 @@ def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: 
     ) * normal[1]
 
 
-@inner_kernel
+@kernel
 def ground_contact(
     ground: GroundModel, x: float, z: float, radius: float, normal: Floats
 ) -> tuple[float, float, float]:

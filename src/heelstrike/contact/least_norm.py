@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import (
@@ -35,7 +35,7 @@ MARGIN = 1e-14
 a hundred times as far if that is not enough, and once more."""
 
 
-@inner_kernel
+@kernel
 def free_directions(size: int, work: ContactWorkspace) -> int:
     """Write the free directions of the equations in the tableau to ``basis``; return how many."""
     pivot_row, weight = work.labels[PIVOT_ROW], work.vectors[WEIGHT]
@@ -51,7 +51,7 @@ def free_directions(size: int, work: ContactWorkspace) -> int:
     return found
 
 
-@inner_kernel
+@kernel
 def keep_velocity(
     count: int, size: int, found: int, delassus: Floats, work: ContactWorkspace
 ) -> int:
@@ -106,7 +106,7 @@ def keep_velocity(
     return kept
 
 
-@inner_kernel
+@kernel
 def project(size: int, nullity: int, work: ContactWorkspace) -> None:
     """Orthonormalise the free directions and remove them from ``POINT``."""
     point, basis = work.vectors[POINT], work.squares[BASIS]
@@ -130,7 +130,7 @@ def project(size: int, nullity: int, work: ContactWorkspace) -> None:
             basis[found, j] *= inverse
 
 
-@inner_kernel
+@kernel
 def split(
     count: int,
     size: int,

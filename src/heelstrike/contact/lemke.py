@@ -17,7 +17,7 @@ has internal forces that the free velocity works against, not that the method wa
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import (
@@ -40,7 +40,7 @@ AT_REST = 1e-11
 GOLDEN = 0.6180339887498949
 
 
-@inner_kernel
+@kernel
 def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
     """Write the reduced problem as a dictionary; return the number of pairs.
 
@@ -85,14 +85,14 @@ def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace
     return pairs
 
 
-@inner_kernel
+@kernel
 def value(variable: int, work: ContactWorkspace) -> float:
     """Return the value of a variable in the final dictionary."""
     row = work.labels[PLACE, variable]
     return work.tableau[row, 0] if row >= 0 else 0.0
 
 
-@inner_kernel
+@kernel
 def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
     """Find the contact modes of the reduced problem by Lemke's method; return the status.
 

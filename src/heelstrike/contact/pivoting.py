@@ -6,7 +6,7 @@ A dictionary writes its basic variables in terms of the others: row i reads
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import ITERATION_LIMIT, RAY, SOLVED
 from heelstrike.contact.workspace import (
     COLUMN_LABEL,
@@ -19,7 +19,7 @@ from heelstrike.contact.workspace import (
 )
 
 
-@inner_kernel
+@kernel
 def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> None:
     """Exchange the basic variable of ``row`` with the other variable of ``column``."""
     inverse = 1.0 / tableau[row, column]
@@ -34,7 +34,7 @@ def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> No
                 tableau[i, j] += factor * tableau[row, j]
 
 
-@inner_kernel
+@kernel
 def precedes(
     first: int, second: int, column: int, pairs: int, tie: float, place: Integers, tableau: Floats
 ) -> bool:
@@ -60,7 +60,7 @@ def precedes(
     return first < second
 
 
-@inner_kernel
+@kernel
 def pivot_to_solution(tableau: Floats, pairs: int, tie: float, work: ContactWorkspace) -> int:
     """Run Lemke's pivots on a complementarity problem; return how they ended.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.compilation import inner_kernel, kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.active_set import REST_TOLERANCE, evaluate, label
 from heelstrike.contact.certificate import Certificate, certify
 from heelstrike.contact.fischer_burmeister import fischer_burmeister
@@ -67,7 +67,7 @@ ROUNDS = 6
 """How often modes are named after the velocities and tried again."""
 
 
-@inner_kernel
+@kernel
 def keep(
     count: int,
     mode: Integers,

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
 from heelstrike.contact.workspace import (
     CONE,
@@ -29,7 +29,7 @@ from heelstrike.contact.workspace import (
 )
 
 
-@inner_kernel
+@kernel
 def reduce_problem(
     count: int,
     delassus: Floats,
@@ -79,7 +79,7 @@ def reduce_problem(
     return unknowns
 
 
-@inner_kernel
+@kernel
 def scale_matrix(unknowns: int, delassus: Floats, work: ContactWorkspace) -> None:
     """Write the scaled matrix of the listed unknowns; friction that is prescribed is part of it."""
     source, slope, scale = work.labels[SOURCE], work.vectors[SLOPE], work.vectors[SCALE]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
+
+from heelstrike.bundle import Bundle
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -66,7 +66,7 @@ DUAL = 3  # dictionary of the least-norm split
 SQUARES = 4
 
 
-class ContactWorkspace(NamedTuple):
+class ContactWorkspace(Bundle):
     """Buffers of the contact kernels for up to ``capacity`` contacts (d = 2).
 
     Attributes

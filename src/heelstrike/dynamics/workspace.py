@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.bundle import Bundle
+
 Floats = NDArray[np.float64]
 
 
-class Workspace(NamedTuple):
+class Workspace(Bundle):
     """What the kernels know about one state of a robot.
 
     Spatial vectors are planar and ordered (rotation about +y, x, z), in world axes, taken at the

@@ -236,7 +236,7 @@ def fingerprint(robot: Robot) -> str:
     Numbers enter with nine digits, so that it is the same on every machine.
     """
     digest = hashlib.sha256()
-    for field, value in zip(robot.model._fields, robot.model, strict=True):
+    for field, value in robot.model.members().items():
         numbers = " ".join(f"{x + 0.0:.9g}" for x in np.ravel(np.asarray(value, dtype=np.float64)))
         digest.update(f"{field} {numbers};".encode())
     return digest.hexdigest()[:16]

@@ -122,7 +122,7 @@ def _center_of_mass(links: Links) -> Floats:
 def _refuse_impossible_numbers(file: MujocoFile, model: Model) -> None:
     """Refuse NaN, and what is infinite or huge where only a limit may be."""
     limits = {"lower", "upper", "torque_lower", "torque_upper"}
-    for field, values in model._asdict().items():
+    for field, values in model.members().items():
         bad = np.isnan(values) if field in limits else ~(np.abs(values) <= LARGEST_NUMBER)
         if np.any(bad):
             raise file.error(

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
+
+from heelstrike.bundle import Bundle
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class Model(NamedTuple):
+class Model(Bundle):
     """A planar kinematic tree with inertia, contact points and actuators.
 
     Every link hangs on its parent by one joint of one degree of freedom, so that link ``i`` and

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import compiled_for, inner_kernel, type_of
+from heelstrike.compilation import compiled_for, kernel, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -184,7 +184,7 @@ class Compliant:
         return _CompliantEngine(self, setting)
 
 
-@inner_kernel
+@kernel
 def account(model: Model, since: float, h: float, memory: Memory, work: CompliantWorkspace) -> None:
     """Add a step of length h, begun at time `since`, to impulses, extremes and crossings.
 
@@ -211,7 +211,7 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
             work.left[contact] = since + share * h
 
 
-@inner_kernel
+@kernel
 def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace) -> float:
     """Part of the step after which the first contact point that fell into the ground met it.
 
@@ -227,7 +227,7 @@ def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace
     return first
 
 
-@inner_kernel
+@kernel
 def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
@@ -240,7 +240,7 @@ def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> flo
     return worst
 
 
-@inner_kernel
+@kernel
 def sample(
     model: Model,
     ground: GroundModel,
@@ -333,7 +333,7 @@ def sample(
     return DONE
 
 
-@inner_kernel
+@kernel
 def note_events(
     model: Model, laws: Laws, record: Record, time: float, memory: Memory, work: CompliantWorkspace
 ) -> None:
@@ -380,7 +380,7 @@ def note_events(
         memory.stopped[joint] = 1 if pressed else 0
 
 
-@inner_kernel
+@kernel
 def note_forces(
     record: Record, row: int, force: Floats, stop_force: Floats, memory: Memory
 ) -> None:

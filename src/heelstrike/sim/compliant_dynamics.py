@@ -22,7 +22,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.bundle import Bundle
+from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -62,7 +63,7 @@ GAINS_LAST = 20
 NO_BEND = 1e-30
 
 
-class Laws(NamedTuple):
+class Laws(Bundle):
     """The contact laws as the kernels see them.
 
     Attributes
@@ -104,7 +105,7 @@ class Control(NamedTuple):
     trial: Floats
 
 
-class CompliantWorkspace(NamedTuple):
+class CompliantWorkspace(Bundle):
     """State of the bristles and the scratch of a step.
 
     Attributes
@@ -236,7 +237,7 @@ def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
     )
 
 
-@inner_kernel
+@kernel
 def command(
     control: Control, memory_now: Floats, time: float, model: Model, memory: Memory, torque: Floats
 ) -> None:
@@ -260,7 +261,7 @@ def command(
             torque[i] = model.torque_lower[i]
 
 
-@inner_kernel
+@kernel
 def try_command(
     control: Control, time: float, model: Model, memory: Memory, torque: Floats
 ) -> None:
@@ -270,7 +271,7 @@ def try_command(
     command(control, control.trial, time, model, memory, torque)
 
 
-@inner_kernel
+@kernel
 def find_gains(
     control: Control, time: float, model: Model, memory: Memory, work: CompliantWorkspace
 ) -> None:
@@ -287,7 +288,7 @@ def find_gains(
     work.age[0] = 0
 
 
-@inner_kernel
+@kernel
 def difference(
     control: Control,
     time: float,
@@ -317,7 +318,7 @@ def difference(
     varied[j] = kept
 
 
-@inner_kernel
+@kernel
 def evaluate(
     model: Model,
     ground: GroundModel,
@@ -366,7 +367,7 @@ def evaluate(
     solve_factorized(model, memory.factor, rate)
 
 
-@inner_kernel
+@kernel
 def push_contacts(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
     """Forces of the contacts and rates of the bristles at the state now."""
     for contact in range(model.contact_link.shape[0]):
@@ -393,7 +394,7 @@ def push_contacts(model: Model, laws: Laws, memory: Memory, work: CompliantWorks
         work.bristle_rate[contact] = bristle_rate
 
 
-@inner_kernel
+@kernel
 def push_stops(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
     """Forces of the joint stops at the state now."""
     for j in range(model.parent.shape[0]):
@@ -412,7 +413,7 @@ def push_stops(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspac
             )
 
 
-@inner_kernel
+@kernel
 def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Make the state evaluated last the start of the next step."""
     nv = model.parent.shape[0]
@@ -437,7 +438,7 @@ def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
             work.base_partial[contact, k] = work.partial[contact, k]
 
 
-@inner_kernel
+@kernel
 def tangent_gains(partial: Floats, g: float) -> tuple[float, float, float]:
     """Change of the tangential force by normal force, by speed and by the bristle's residual.
 
@@ -449,7 +450,7 @@ def tangent_gains(partial: Floats, g: float) -> tuple[float, float, float]:
     return by_normal, by_speed, bend
 
 
-@inner_kernel
+@kernel
 def factorize_step(model: Model, control: Control, g: float, work: CompliantWorkspace) -> None:
     """Factorise the linear system of all stages of a step of length g / γ."""
     nv = model.parent.shape[0]
@@ -489,7 +490,7 @@ def factorize_step(model: Model, control: Control, g: float, work: CompliantWork
     eliminate(nv, system, work.order)
 
 
-@inner_kernel
+@kernel
 def eliminate(size: int, matrix: Floats, order: Integers) -> None:
     """Replace a matrix by its triangular factors, exchanging rows."""
     for k in range(size):
@@ -509,7 +510,7 @@ def eliminate(size: int, matrix: Floats, order: Integers) -> None:
                 matrix[i, j] -= matrix[i, k] * matrix[k, j]
 
 
-@inner_kernel
+@kernel
 def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
     """Replace x by the solution of the system that was eliminated."""
     for k in range(size):
@@ -527,7 +528,7 @@ def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
         x[i] /= matrix[i, i]
 
 
-@inner_kernel
+@kernel
 def dot(a: Floats, b: Floats) -> float:
     """Scalar product."""
     total = 0.0
@@ -536,7 +537,7 @@ def dot(a: Floats, b: Floats) -> float:
     return total
 
 
-@inner_kernel
+@kernel
 def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) -> None:
     """Solve for a stage from its right-hand side."""
     nv = model.parent.shape[0]
@@ -570,7 +571,7 @@ def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) ->
         u_s[contact] = change / (1.0 / g - partial[BRISTLE_BY_BRISTLE])
 
 
-@inner_kernel
+@kernel
 def attempt_step(
     model: Model,
     ground: GroundModel,
@@ -626,7 +627,7 @@ def attempt_step(
     return worst
 
 
-@inner_kernel
+@kernel
 def finish(base: Floats, stages: Floats, rtol: float, atol: float, result: Floats, i: int) -> float:
     """Write one component at the end of the step; return its error over the tolerance."""
     change = 0.0
@@ -638,7 +639,7 @@ def finish(base: Floats, stages: Floats, rtol: float, atol: float, result: Float
     return abs(error) / (atol + rtol * max(abs(base[i]), abs(result[i])))
 
 
-@inner_kernel
+@kernel
 def larger(a: float, b: float) -> float:
     """Maximum that keeps a NaN, wherever it stands."""
     return b if not b <= a else a

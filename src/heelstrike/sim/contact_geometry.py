@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel, kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.kernels import (
     forward_kinematics,
@@ -14,7 +14,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.memory import Memory
 
 
-@inner_kernel
+@kernel
 def locate_contacts(model: Model, ground: GroundModel, memory: Memory) -> None:
     """Contact points, gaps, normals and ground coefficients of the state now (eq. 6, 7)."""
     contacts = memory.contacts
@@ -31,7 +31,7 @@ def locate_contacts(model: Model, ground: GroundModel, memory: Memory) -> None:
         point[1] -= radius * normal[1]
 
 
-@inner_kernel
+@kernel
 def contact_rows(model: Model, memory: Memory, contact: int, place: int) -> None:
     """Write the Jacobian rows (normal, tangent) of a contact point as candidate `place`."""
     tree = memory.tree
@@ -54,7 +54,7 @@ def contact_rows(model: Model, memory: Memory, contact: int, place: int) -> None
         j = model.parent[j]
 
 
-@inner_kernel
+@kernel
 def row_product(memory: Memory, row: int, v: Floats) -> float:
     """Jacobian row times a generalised velocity."""
     total = 0.0
@@ -63,7 +63,7 @@ def row_product(memory: Memory, row: int, v: Floats) -> float:
     return total
 
 
-@inner_kernel
+@kernel
 def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
     """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates, from the factor of A."""
     nv = model.parent.shape[0]

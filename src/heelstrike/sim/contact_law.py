@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.errors import SimulationError
 
 Floats = NDArray[np.float64]
@@ -381,7 +381,7 @@ def _linear_restitution(ratio: float) -> float:
     return exp(-2.0 * ratio * _arc_over_root(ratio))
 
 
-@inner_kernel
+@kernel
 def normal_force(
     kind: int, numbers: Floats, gap: float, normal_speed: float, partial: Floats
 ) -> float:
@@ -406,7 +406,7 @@ def normal_force(
     return spring * factor
 
 
-@inner_kernel
+@kernel
 def friction_force(
     kind: int,
     numbers: Floats,
@@ -450,7 +450,7 @@ def friction_force(
     return -side * limit, (side * limit - spring) / damper
 
 
-@inner_kernel
+@kernel
 def slips(kind: int, numbers: Floats, limit: float, speed: float, bristle: float) -> bool:
     """Whether a contact point slides: its anchor is dragged, or it is faster than v_s."""
     if kind == REGULARISED:

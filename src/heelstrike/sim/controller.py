@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from heelstrike.bundle import Bundle
 from heelstrike.compilation import compiled_for, type_of
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.state import State
 
 
-class Contacts(NamedTuple):
+class Contacts(Bundle):
     """Contact points of a robot as a controller sees them.
 
     Attributes

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 
 Floats = NDArray[np.float64]
 
@@ -229,7 +229,7 @@ DENSE = _table(
 )
 
 
-@inner_kernel
+@kernel
 def stage_point(stage: int, step: float, begin: Floats, slopes: Floats, point: Floats) -> None:
     """Write the point at which the slope of a stage is to be evaluated."""
     size = begin.shape[0]
@@ -244,7 +244,7 @@ def stage_point(stage: int, step: float, begin: Floats, slopes: Floats, point: F
         point[i] = begin[i] + step * point[i]
 
 
-@inner_kernel
+@kernel
 def error_norm(
     step: float, begin: Floats, end: Floats, slopes: Floats, relative: float, absolute: float
 ) -> float:
@@ -266,7 +266,7 @@ def error_norm(
     return abs(step) * fifth / np.sqrt((fifth + 0.01 * third) * size)
 
 
-@inner_kernel
+@kernel
 def fit_dense(step: float, begin: Floats, end: Floats, slopes: Floats, dense: Floats) -> None:
     """Turn the slopes of a finished step into the coefficients of its dense output."""
     for i in range(begin.shape[0]):
@@ -281,7 +281,7 @@ def fit_dense(step: float, begin: Floats, end: Floats, slopes: Floats, dense: Fl
             dense[3 + k, i] = step * total
 
 
-@inner_kernel
+@kernel
 def interpolate(part: float, begin: Floats, dense: Floats, point: Floats) -> None:
     """State at the fraction `part` of a step."""
     for i in range(begin.shape[0]):

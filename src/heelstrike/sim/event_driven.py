@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import compiled_for, inner_kernel, type_of
+from heelstrike.compilation import compiled_for, kernel, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
@@ -190,7 +190,7 @@ class EventDriven:
         return _EventDrivenEngine(self, setting)
 
 
-@inner_kernel
+@kernel
 def copy_row(
     row: int,
     time: float,
@@ -219,7 +219,7 @@ def copy_row(
         record.residual[row, k] = residual[k]
 
 
-@inner_kernel
+@kernel
 def write_row(
     controller: Any,
     model: Model,
@@ -269,7 +269,7 @@ def write_row(
         phase.count[ROW] += 1
 
 
-@inner_kernel
+@kernel
 def extrapolate(ahead: float, begin: Floats, slope: Floats, state: Floats) -> None:
     """Where the state comes to in a moment if its accelerations stay as they are."""
     nv = begin.shape[0] // 2
@@ -278,7 +278,7 @@ def extrapolate(ahead: float, begin: Floats, slope: Floats, state: Floats) -> No
         state[nv + i] = begin[nv + i] + ahead * slope[nv + i]
 
 
-@inner_kernel
+@kernel
 def insist(phase: Phase) -> None:
     """Switch what fired, without asking the acceleration-level problem first."""
     for contact in range(phase.closed.shape[0]):
@@ -289,7 +289,7 @@ def insist(phase: Phase) -> None:
             phase.slide[contact] = -1 if phase.force[contact, 1] > 0.0 else 1
 
 
-@inner_kernel
+@kernel
 def decide(
     controller: Any,
     model: Model,
@@ -387,7 +387,7 @@ def decide(
     return False
 
 
-@inner_kernel
+@kernel
 def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> bool:
     """Whether a point is behind one on the ground and, by the rule, may pass below it."""
     for other in range(phase.closed.shape[0]):
@@ -397,7 +397,7 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
     return False
 
 
-@inner_kernel
+@kernel
 def find_what_happened(
     starting: bool,
     direction: float,
@@ -447,7 +447,7 @@ def find_what_happened(
     return impact, forced and not impact
 
 
-@inner_kernel
+@kernel
 def control(
     controller: Any,
     model: Model,
@@ -483,7 +483,7 @@ def control(
     return JUMPED if jumped else SAME
 
 
-@inner_kernel
+@kernel
 def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
     """Time that the next step may not pass."""
     stop = min(clock[END], clock[PAUSE])
@@ -494,7 +494,7 @@ def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
     return stop
 
 
-@inner_kernel
+@kernel
 def end_step(memory: Memory, record: Record, phase: Phase) -> None:
     """Move time and state to the end of the finished step."""
     clock = phase.clock

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -35,7 +35,7 @@ RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
 
 
-@inner_kernel
+@kernel
 def contact_velocity(
     link: int, position: Floats, normal: Floats, tree: Workspace
 ) -> tuple[float, float]:
@@ -47,13 +47,13 @@ def contact_velocity(
     return normal[0] * vx + normal[1] * vz, normal[1] * vx - normal[0] * vz
 
 
-@inner_kernel
+@kernel
 def tangential_place(position: Floats, normal: Floats, radius: float, angle: float) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled."""
     return normal[1] * position[0] - normal[0] * position[1] - radius * angle
 
 
-@inner_kernel
+@kernel
 def solve_system(size: int, system: Floats, column: Integers, unknown: Floats) -> int:
     """Solve linear equations, their right-hand side in the last column, by complete pivoting.
 
@@ -99,7 +99,7 @@ def solve_system(size: int, system: Floats, column: Integers, unknown: Floats) -
     return rank
 
 
-@inner_kernel
+@kernel
 def list_unknowns(
     count: int,
     candidate: Integers,
@@ -125,7 +125,7 @@ def list_unknowns(
     return size
 
 
-@inner_kernel
+@kernel
 def constraint_matrix(
     size: int, row: Integers, lean: Floats, friction: float, delassus: Floats, system: Floats
 ) -> None:
@@ -138,7 +138,7 @@ def constraint_matrix(
             system[i, j] = entry
 
 
-@inner_kernel
+@kernel
 def free_contact_acceleration(
     place: int,
     link: int,
@@ -170,7 +170,7 @@ def free_contact_acceleration(
     free[2 * place + 1] = along_tangent
 
 
-@inner_kernel
+@kernel
 def add_contact_force(
     count: int,
     model: Model,
@@ -192,7 +192,7 @@ def add_contact_force(
         change[j] += force[j]
 
 
-@inner_kernel
+@kernel
 def share_forces(
     count: int,
     candidate: Integers,
@@ -225,7 +225,7 @@ def share_forces(
                     force[contact, 1] = friction[contact] * impulse[2 * other] / limit * tangential
 
 
-@inner_kernel
+@kernel
 def watch_geometry(
     link: Integers,
     contacts: Contacts,
@@ -254,7 +254,7 @@ def watch_geometry(
             value[2 * contact + 1] = slide[contact] * tangent
 
 
-@inner_kernel
+@kernel
 def watch_forces(
     count: int,
     candidate: Integers,
@@ -283,7 +283,7 @@ def watch_forces(
             phase.rate[2 * contact + 1] = phase.slide[contact] * acceleration
 
 
-@inner_kernel
+@kernel
 def free_acceleration(model: Model, memory: Memory, state: Floats) -> None:
     """Acceleration without contact, A⁻¹ (B Γ + passive − H), into ``memory.rate``."""
     nv = model.parent.shape[0]
@@ -298,7 +298,7 @@ def free_acceleration(model: Model, memory: Memory, state: Floats) -> None:
     solve_factorized(model, memory.factor, memory.rate)
 
 
-@inner_kernel
+@kernel
 def gather_closed(model: Model, memory: Memory, closed: Integers) -> int:
     """Jacobian rows and Delassus matrix of the closed contact points; return their number."""
     count = 0
@@ -312,7 +312,7 @@ def gather_closed(model: Model, memory: Memory, closed: Integers) -> int:
     return count
 
 
-@inner_kernel
+@kernel
 def evaluate(
     controller: Any,
     model: Model,
@@ -396,7 +396,7 @@ def evaluate(
         slope[nv + i] = memory.rate[i]
 
 
-@inner_kernel
+@kernel
 def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> None:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 

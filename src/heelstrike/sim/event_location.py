@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.dormand_prince import (
@@ -56,7 +56,7 @@ FORCE_NOISE = 1e-10
 SHORTEST_STEP = 8.0
 
 
-@inner_kernel
+@kernel
 def take_step(
     controller: Any,
     model: Model,
@@ -102,7 +102,7 @@ def take_step(
     return error
 
 
-@inner_kernel
+@kernel
 def noise(closed: int, slide: int, function: int, weight: float) -> float:
     """How far an event function may be below zero without meaning it."""
     if closed == 0:
@@ -112,7 +112,7 @@ def noise(closed: int, slide: int, function: int, weight: float) -> float:
     return FORCE_NOISE * weight
 
 
-@inner_kernel
+@kernel
 def find_root(
     controller: Any,
     model: Model,
@@ -164,7 +164,7 @@ def find_root(
     return low if going_back else high
 
 
-@inner_kernel
+@kernel
 def first_event(
     controller: Any,
     model: Model,
@@ -239,7 +239,7 @@ def first_event(
     return NO_EVENT
 
 
-@inner_kernel
+@kernel
 def integrate(
     controller: Any,
     model: Model,
@@ -306,7 +306,7 @@ def integrate(
     return True
 
 
-@inner_kernel
+@kernel
 def total_weight(mass: Floats, gravity: Floats) -> float:
     """Weight of the robot, or its mass where there is no gravity."""
     total = 0.0

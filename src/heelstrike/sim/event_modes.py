@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.modes import (
     OPEN,
     SLIDING_BACKWARD,
@@ -28,7 +28,7 @@ REVERSAL = int(EventKind.SLIP_REVERSAL)
 PARALLEL = 1e-9
 
 
-@inner_kernel
+@kernel
 def log_event(
     record: Record, time: float, kind: int, contact: int, normal: float, tangent: float
 ) -> None:
@@ -42,7 +42,7 @@ def log_event(
     record.event_count[0] = place + 1
 
 
-@inner_kernel
+@kernel
 def note_residual(residual: Floats, extreme: Floats) -> None:
     """Keep the worst residuals of the run."""
     extreme[COMPLEMENTARITY] = max(extreme[COMPLEMENTARITY], residual[0])
@@ -50,7 +50,7 @@ def note_residual(residual: Floats, extreme: Floats) -> None:
     extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], residual[2])
 
 
-@inner_kernel
+@kernel
 def solve_candidates(
     count: int, memory: Memory, slide: Integers, accelerations: bool, order: Integers
 ) -> int:
@@ -87,7 +87,7 @@ def solve_candidates(
     )
 
 
-@inner_kernel
+@kernel
 def adopt_modes(
     count: int, candidate: Integers, found: Integers, mode: Integers, phase: Phase
 ) -> None:
@@ -104,7 +104,7 @@ def adopt_modes(
             phase.slide[contact] = -1
 
 
-@inner_kernel
+@kernel
 def form_groups(
     model: Model,
     position: Floats,
@@ -169,7 +169,7 @@ def form_groups(
             )
 
 
-@inner_kernel
+@kernel
 def report_modes(
     time: float,
     closed: Integers,

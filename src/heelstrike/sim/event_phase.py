@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.bundle import Bundle
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.dormand_prince import DENSE_ROWS, SLOPES
 
@@ -49,7 +48,7 @@ LET_PASS = 14  # whether swing feet may scuff without effect
 COUNTS = 15
 
 
-class Phase(NamedTuple):
+class Phase(Bundle):
     """A smooth phase of the motion, in which every contact point keeps its mode.
 
     A contact point that is closed and does not slide sticks. Closed points of one link on the same
@@ -145,7 +144,7 @@ class Phase(NamedTuple):
     dense: Floats
     torque: Floats
     clock: Floats
-    count: Integers  # type: ignore[assignment]
+    count: Integers
 
 
 def allocate_phase(robot: Robot) -> Phase:

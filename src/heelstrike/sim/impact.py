@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
@@ -34,7 +34,7 @@ SHORTEST_BOUNCE = 1e-6
 PERPETUAL = 0.999999
 
 
-@inner_kernel
+@kernel
 def row_velocity(row: int, jacobian: Floats, state: Floats) -> float:
     """Velocity along a Jacobian row."""
     nv = jacobian.shape[1]
@@ -44,7 +44,7 @@ def row_velocity(row: int, jacobian: Floats, state: Floats) -> float:
     return total
 
 
-@inner_kernel
+@kernel
 def collide(
     model: Model, memory: Memory, phase: Phase, order: Integers, state: Floats, nudge: float
 ) -> tuple[bool, float]:
@@ -108,7 +108,7 @@ def collide(
     return status == SOLVED, made / through if through > 0.0 else 0.0
 
 
-@inner_kernel
+@kernel
 def short_bounces(
     model: Model, ground: GroundModel, memory: Memory, phase: Phase, order: Integers, state: Floats
 ) -> bool:
@@ -168,7 +168,7 @@ def short_bounces(
     return found
 
 
-@inner_kernel
+@kernel
 def strike(
     model: Model, ground: GroundModel, memory: Memory, record: Record, phase: Phase, order: Integers
 ) -> bool:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import dataclasses
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.bundle import Bundle
 from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
@@ -29,7 +31,7 @@ NON_PENETRATION = 3
 EXTREMES = 4
 
 
-class Memory(NamedTuple):
+class Memory(Bundle):
     """State of a simulation and the scratch of its step.
 
     Attributes
@@ -161,7 +163,7 @@ def allocate_memory(robot: Robot) -> Memory:
     )
 
 
-class Record(NamedTuple):
+class Record(Bundle):
     """Rows of a run, filled by the compiled loop, one row an instant.
 
     Forces and torques of a row are those decided at its instant and acting over the step that
@@ -226,6 +228,5 @@ def joined(records: list[Record]) -> Record:
         "row_count": np.array([sum(rows)]),
         "event_count": np.array([sum(events)]),
     }
-    return Record(
-        **{name: counts[name] if name in counts else join(name) for name in Record._fields}
-    )
+    names = [field.name for field in dataclasses.fields(Record)]
+    return Record(**{name: counts[name] if name in counts else join(name) for name in names})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heelstrike.compilation import inner_kernel
+from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.robot.model import Model
 from heelstrike.sim.memory import (
@@ -30,7 +30,7 @@ SLIP_SPEED = 1e-6
 INFINITY = float("inf")
 
 
-@inner_kernel
+@kernel
 def limit_torque(model: Model, memory: Memory) -> bool:
     """Clip the torques to their limits; return whether all were finite."""
     for i in range(model.actuator_joint.shape[0]):
@@ -47,7 +47,7 @@ def limit_torque(model: Model, memory: Memory) -> bool:
     return True
 
 
-@inner_kernel
+@kernel
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
     extreme = memory.extreme
@@ -58,7 +58,7 @@ def note_extremes(model: Model, memory: Memory) -> None:
     extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], memory.residual[2])
 
 
-@inner_kernel
+@kernel
 def note_event(record: Record, time: float, kind: int, contact: int, memory: Memory) -> None:
     """Append an event; its impulse is that of the step it happened in."""
     place = record.event_count[0]
@@ -70,7 +70,7 @@ def note_event(record: Record, time: float, kind: int, contact: int, memory: Mem
     record.event_count[0] = place + 1
 
 
-@inner_kernel
+@kernel
 def note_events(model: Model, record: Record, time: float, step: float, memory: Memory) -> None:
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
@@ -118,7 +118,7 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
         memory.stopped[joint] = 1 if pushed else 0
 
 
-@inner_kernel
+@kernel
 def note_row(record: Record, time: float, memory: Memory) -> None:
     """Append the state now and what acts on it to the record."""
     row = record.row_count[0]
@@ -142,7 +142,7 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
     record.row_count[0] = row + 1
 
 
-@inner_kernel
+@kernel
 def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
     """Height of the centre of mass above the ground below it."""
     tree = memory.tree
@@ -157,7 +157,7 @@ def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
     return tree.pivot[1] + z / mass - below
 
 
-@inner_kernel
+@kernel
 def sound(memory: Memory) -> bool:
     """Whether the state is finite and not absurd."""
     for i in range(memory.v.shape[0]):

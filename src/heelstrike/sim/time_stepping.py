@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import compiled_for, inner_kernel, type_of
+from heelstrike.compilation import compiled_for, kernel, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
@@ -144,7 +144,7 @@ class TimeStepping:
         return _TimeSteppingEngine(self, setting)
 
 
-@inner_kernel
+@kernel
 def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
@@ -172,7 +172,7 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
         memory.next_v[i] = memory.v[i] + memory.rate[i]
 
 
-@inner_kernel
+@kernel
 def select_candidates(
     model: Model, step: float, scheme: int, activation: float, memory: Memory
 ) -> int:
@@ -205,7 +205,7 @@ def select_candidates(
     return count
 
 
-@inner_kernel
+@kernel
 def select_stops(
     model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
 ) -> int:
@@ -245,7 +245,7 @@ def select_stops(
     return count
 
 
-@inner_kernel
+@kernel
 def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:

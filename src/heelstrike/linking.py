@@ -1,0 +1,57 @@
+"""Kernels without machine code of their own, which the kernels that call them take in.
+
+Numba optimises every function, turns it into machine code, and does so again in every function that
+calls it. For kernels nested six deep that is most of the time to compile. Here a kernel that only
+other kernels call stays an unfinished module until an outer kernel has taken in everything it needs
+and is optimised as a whole, once.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class _UnfinishedLibrary(JITCodeLibrary):
+    """A module with what it calls linked in, and nothing else done to it."""
+
+    def finalize(self) -> None:
+        for library in dict.fromkeys(self._linking_libraries):
+            self._reload_init.update(library._reload_init)
+            self._final_module.link_in(library._get_module_for_linking(), preserve=True)
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _UnfinishedLowering(NativeLowering):
+    """Turn a kernel into an unfinished module."""
+
+    _name = "unfinished_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = _UnfinishedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.flags.no_compile = True
+        super().run_pass(state)
+        # Numba asks for the Python function of a kernel. This one is like no other, and raises.
+        entry: Any = [].index
+        state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
+        state["cr"] = state["cr"]._replace(cfunc=entry)
+        return True
+
+
+class InnerKernelCompiler(CompilerBase):
+    """Numba's compiler, ending in :class:`_UnfinishedLowering`."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Replace the step that makes machine code."""
+        pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        for place, (step, _) in enumerate(pipeline.passes):
+            if step is NativeLowering:
+                pipeline.passes[place] = (_UnfinishedLowering, "unfinished lowering")
+        pipeline.finalize()
+        return [pipeline]
