@@ -210,7 +210,7 @@ def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
 def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
     """Factorise A = Lᵀ D L along the tree, without fill-in (Featherstone 2008, section 6.5).
 
-    `factor` receives D on its diagonal and the strictly lower part of the unit matrix L, nonzero
+    `factor` receives D⁻¹ on its diagonal and the strictly lower part of the unit matrix L, nonzero
     only where the column is an ancestor of the row.
     """
     count = model.parent.shape[0]
@@ -221,9 +221,11 @@ def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
             factor[i, j] = matrix[i, j]
             j = model.parent[j]
     for k in range(count - 1, -1, -1):
+        inverse = 1.0 / factor[k, k]
+        factor[k, k] = inverse
         i = model.parent[k]
         while i >= 0:
-            ratio = factor[k, i] / factor[k, k]
+            ratio = factor[k, i] * inverse
             j = i
             while j >= 0:
                 factor[i, j] -= ratio * factor[k, j]
@@ -257,7 +259,7 @@ def solve_factorized(model: Model, factor: Floats, x: Floats) -> None:
     """Replace x by A⁻¹ x."""
     solve_upper(model, factor, x)
     for i in range(model.parent.shape[0]):
-        x[i] /= factor[i, i]
+        x[i] *= factor[i, i]
     solve_lower(model, factor, x)
 
 

@@ -68,8 +68,11 @@ class Memory(Bundle):
     candidate : (capacity,) int
         Contact points in the contact problem of this step; after them the joint stops, numbered
         on from nc: twice the joint, plus one for its upper end. The capacity has room for all.
-    jacobian, half : (2 capacity, nv) float
-        Contact Jacobian of the candidates and L⁻ᵀ Jᵀ.
+    jacobian : (2 capacity, nv) float
+        Contact Jacobian of the candidates.
+    root : (nv,) float
+    half : (nv, 2 capacity) float
+        D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
     delassus : (2 capacity, 2 capacity) float
     free, impulse, velocity : (2 capacity,) float
         The contact problem and its solution.
@@ -107,6 +110,7 @@ class Memory(Bundle):
     stopped: Integers
     candidate: Integers
     jacobian: Floats
+    root: Floats
     half: Floats
     delassus: Floats
     free: Floats
@@ -149,7 +153,8 @@ def allocate_memory(robot: Robot) -> Memory:
         stopped=np.zeros(nv, dtype=np.int64),
         candidate=np.zeros(capacity, dtype=np.int64),
         jacobian=np.zeros((2 * capacity, nv)),
-        half=np.zeros((2 * capacity, nv)),
+        root=np.zeros(nv),
+        half=np.zeros((nv, 2 * capacity)),
         delassus=np.zeros((2 * capacity, 2 * capacity)),
         free=np.zeros(2 * capacity),
         impulse=np.zeros(2 * capacity),
