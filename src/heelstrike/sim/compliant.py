@@ -460,7 +460,7 @@ def _advance(
             )
             if not limit_torque(model, memory):
                 return BAD_CONTROLLER
-        evaluate(model, ground, laws, held, True, time, memory, work)
+        evaluate(model, ground, laws, held, True, False, time, memory, work)
         recorded = k % span[RECORD_EVERY] == 0 or k == last
         row = record.row_count[0]
         if recorded:
