@@ -89,7 +89,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
             f"ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
             "spheres, capsules or boxes where the robot meets the ground."
         )
-    return _in_order(_merged(points))
+    return in_order(points)
 
 
 def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:
@@ -205,6 +205,6 @@ def _merged(points: Iterable[ContactPoint]) -> list[ContactPoint]:
     return [point for there in kept.values() for point in there]
 
 
-def _in_order(points: Iterable[ContactPoint]) -> list[ContactPoint]:
-    """Sort by link, then from back to front, then upwards."""
-    return sorted(points, key=lambda p: (p.link, round(p.x, 9), round(p.z, 9)))
+def in_order(points: Iterable[ContactPoint]) -> list[ContactPoint]:
+    """Contact points by link, then from back to front, then upwards; coinciding ones merged."""
+    return sorted(_merged(points), key=lambda p: (p.link, round(p.x, 9), round(p.z, 9)))

@@ -41,6 +41,9 @@ class Model(Bundle):
         opposes it as it moves.
     lower, upper : (nv,) float
         Range of the coordinate; infinite where there is no stop.
+    speed_limit : (nv,) float
+        Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
+        infinite where there is none.
     gravity : (2,) float
         Acceleration of free fall, (0, -9.81) on earth.
     contact_link : (nc,) int
@@ -72,6 +75,7 @@ class Model(Bundle):
     dry_friction: Floats
     lower: Floats
     upper: Floats
+    speed_limit: Floats
     gravity: Floats
     contact_link: Integers
     contact_position: Floats

@@ -98,6 +98,9 @@ class Robot:
         Exchange of left and right, or None for a robot that is not symmetric.
     floating : bool
         Whether the first three coordinates are the trunk's x, z and pitch.
+    contact_friction : tuple of float
+        Friction of the nc contact points according to the robot's file, empty if unknown. A
+        simulation takes friction from its `Ground`.
     source : str
         File or builder the robot came from, for error messages.
     """
@@ -111,6 +114,7 @@ class Robot:
     feet: tuple[Foot, ...]
     mirror: Mirror | None
     floating: bool
+    contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
 
     @property

@@ -92,6 +92,7 @@ def example_model() -> Model:
         dry_friction=floats,
         lower=floats,
         upper=floats,
+        speed_limit=floats,
         gravity=floats,
         contact_link=integers,
         contact_position=pairs,

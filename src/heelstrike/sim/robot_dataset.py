@@ -29,6 +29,7 @@ _MODEL = {
     "dry_friction": ("coordinate",),
     "lower": ("coordinate",),
     "upper": ("coordinate",),
+    "speed_limit": ("coordinate",),
     "gravity": ("xz",),
     "contact_link": ("contact",),
     "contact_position": ("contact", "xz"),
@@ -38,7 +39,7 @@ _MODEL = {
     "torque_upper": ("actuator",),
 }
 _INDICES = ("parent", "contact_link", "actuator_joint")
-_MAY_BE_INFINITE = ("lower", "upper", "torque_lower", "torque_upper")
+_MAY_BE_INFINITE = ("lower", "upper", "speed_limit", "torque_lower", "torque_upper")
 _NAMES = {
     "joint_names": "coordinate",
     "link_names": "coordinate",
@@ -92,8 +93,10 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
     """
     import xarray
 
-    if "dry_friction" not in dataset:  # the file of a time when robots had none
-        dataset = dataset.assign(dry_friction=xarray.zeros_like(dataset["damping"]))
+    for name, nothing in (("dry_friction", 0.0), ("speed_limit", math.inf)):
+        if name not in dataset:  # the file of a time when robots had none
+            none = xarray.full_like(dataset["damping"], nothing)
+            dataset = dataset.assign({name: none})
     sizes = {
         "coordinate": dataset["parent"].size,
         "contact": dataset["contact_link"].size,
@@ -139,10 +142,11 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
                 for name, dim in _MIRROR.items()
             }
         )
+    names: dict[str, Any] = {name: text(name, dim) for name, dim in _NAMES.items()}
     robot = Robot(
         name=_decoded(dataset.attrs["name"]),
         model=model,
-        **{name: text(name, dim) for name, dim in _NAMES.items()},
+        **names,
         feet=feet,
         mirror=mirror,
         floating=bool(int(dataset.attrs["floating"])),
