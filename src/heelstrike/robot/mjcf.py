@@ -17,7 +17,13 @@ from heelstrike.robot.speed_limits import read_speed_limits
 from heelstrike.robot.unmodelled import warn_of_unmodelled
 
 
-def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
+def read_mjcf(
+    source: Path | str,
+    *,
+    name: str | None = None,
+    floating: bool = False,
+    projected: bool = False,
+) -> Robot:
     """Read a planar robot from an MJCF or URDF file, or from a string that holds one.
 
     Coordinates keep the order of the file, and so do links. The reference configuration is
@@ -30,6 +36,12 @@ def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
         Path of the file, or the XML text itself.
     name : str, optional
         Name of the robot; by default the model name that the file gives, or the file's own.
+    floating : bool
+        Let the trunk float in the x–z plane, though the file fixes it to the world or leaves it
+        free in space.
+    projected : bool
+        Lock the joints that leave the x–z plane, where a symmetric robot of three dimensions is
+        meant to move in it.
 
     Raises
     ------
@@ -41,7 +53,7 @@ def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
     RobotWarning
         If the file says something that is not simulated, or left and right differ.
     """
-    file = parse(source)
+    file = parse(source, floating=floating, projected=projected)
     model = file.model
     links = read_links(file)
     warn_of_unmodelled(file)

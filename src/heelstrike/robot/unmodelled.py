@@ -50,8 +50,8 @@ def _warn_of_fixed_root(file: MujocoFile) -> None:
         if link.get("name") not in children and mass is not None:
             warn(
                 f"{file.source}: link {link.get('name')!r} is fixed to the world, for no joint "
-                "moves it. If the robot floats, put it on a link 'world' by prismatic joints "
-                "along x and z and a continuous joint about y."
+                "moves it. If the robot floats, load it with floating=True, or put it on a link "
+                "'world' by a planar joint with the axis (0, 1, 0)."
             )
 
 
