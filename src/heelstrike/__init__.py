@@ -44,9 +44,11 @@ if TYPE_CHECKING:
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
+    from heelstrike.robot import RobotBuilder as RobotBuilder
     from heelstrike.robot import RobotWarning as RobotWarning
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
+    from heelstrike.robot import human as human
     from heelstrike.robot import load_robot as load_robot
     from heelstrike.sim import Compliant as Compliant
     from heelstrike.sim import EventDriven as EventDriven
@@ -81,12 +83,14 @@ _HOME = {
     "HeelstrikeError": "heelstrike.errors",
     "InfeasibleGaitError": "heelstrike.errors",
     "Robot": "heelstrike.robot",
+    "RobotBuilder": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
     "Run": "heelstrike.sim",
     "RunFileError": "heelstrike.errors",
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "human": "heelstrike.robot",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",

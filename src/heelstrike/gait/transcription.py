@@ -298,7 +298,7 @@ class Transcription:
                 constraints.add(
                     Group.TORQUE, torque[k], subject=name, lower=lower, upper=upper, unit=unit
                 )
-            limit = self.request.joint_speed_limit
+            limit = min(self.request.joint_speed_limit, float(model.speed_limit[j]))
             if np.isfinite(limit):
                 constraints.add(
                     Group.JOINT_SPEED,

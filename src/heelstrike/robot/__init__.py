@@ -1,5 +1,7 @@
 """What a robot is, the readers of robot files, and the built-in robots."""
 
+from heelstrike.robot.builder import JointProperties, RobotBuilder
+from heelstrike.robot.human import BodyTable, human
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mjcf import read_mjcf
 from heelstrike.robot.model import Model
@@ -8,13 +10,17 @@ from heelstrike.robot.state import State
 from heelstrike.robot.warning import RobotWarning
 
 __all__ = [
+    "BodyTable",
     "Foot",
+    "JointProperties",
     "Mirror",
     "Model",
     "Robot",
+    "RobotBuilder",
     "RobotWarning",
     "State",
     "builtin_robots",
+    "human",
     "load_robot",
     "read_mjcf",
 ]

@@ -8,6 +8,7 @@ import numpy as np
 
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.mujoco_file import MujocoFile
+from heelstrike.robot.urdf import MASSLESS
 
 IN_PLANE = 1e-6
 """How far (as the sine of an angle) an axis may stand off the plane before it is refused."""
@@ -90,7 +91,8 @@ def _refuse_spatial_joints(file: MujocoFile) -> None:
             raise file.error(
                 f"{name!r} of body {body!r} is a free joint, which moves in three dimensions. For "
                 "a robot in the x–z plane give the body three joints instead: slide along x, slide "
-                "along z, hinge about y, in this order."
+                "along z, hinge about y, in this order; or load it with floating=True, which does "
+                "so, or with projected=True, which also locks all joints that leave the plane."
             )
         if kind == BALL:
             spatial.append(f"{name!r} of body {body!r} is a ball joint")
@@ -111,7 +113,8 @@ def _refuse_spatial_joints(file: MujocoFile) -> None:
     mend = (
         "All its hinges are parallel: turn the robot so that they point along y."
         if parallel
-        else "Remove these joints (or weld them) to keep the motion in the plane."
+        else "Remove these joints (or weld them) to keep the motion in the plane, or load the "
+        "robot with projected=True, which locks them."
     )
     raise file.error(
         "this robot leaves the x–z plane; heelstrike simulates planar robots, whose hinges turn "
@@ -137,10 +140,13 @@ def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> tuple[Float
     model, pose = file.model, file.pose
     moving = of_body >= 0
     link = of_body[moving]
-    body_mass = model.body_mass[moving]
+    body_mass = model.body_mass[moving].copy()
     position = pose.xipos[moving, ::2] - origin[link]
     # Only the moment about y of the rotated inertia tensor acts in the plane.
     about_y = ((pose.ximat[moving, 3:6] ** 2) * model.body_inertia[moving]).sum(axis=1)
+    nothing = body_mass < MASSLESS
+    body_mass[nothing] = 0.0
+    about_y[nothing] = 0.0
 
     def total(values: Floats) -> Floats:
         return np.bincount(link, values, minlength=len(origin)).astype(np.float64)

@@ -30,8 +30,15 @@ _ALIKE = (
     "armature",
     "damping",
     "stiffness",
+    "dry_friction",
+    "speed_limit",
 )
-_LABEL = {"center_of_mass": "centre of mass", "offset": "place"}
+_LABEL = {
+    "center_of_mass": "centre of mass",
+    "offset": "place",
+    "dry_friction": "dry friction",
+    "speed_limit": "speed limit",
+}
 
 
 def find_mirror(

@@ -7,21 +7,23 @@ from pathlib import Path
 import numpy as np
 
 from heelstrike.robot.actuators import read_actuators
+from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
 from heelstrike.robot.contact_points import read_contact_points
-from heelstrike.robot.feet import find_feet, name_contacts
-from heelstrike.robot.links import IN_PLANE, Links, read_links
-from heelstrike.robot.mirror import find_mirror
+from heelstrike.robot.links import IN_PLANE, read_links
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.mujoco_file import MujocoFile, parse
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.speed_limits import read_speed_limits
 from heelstrike.robot.unmodelled import warn_of_unmodelled
-from heelstrike.robot.warning import warn
-
-LARGEST_NUMBER = 1e10
-"""Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
 
 
-def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
+def read_mjcf(
+    source: Path | str,
+    *,
+    name: str | None = None,
+    floating: bool = False,
+    projected: bool = False,
+) -> Robot:
     """Read a planar robot from an MJCF or URDF file, or from a string that holds one.
 
     Coordinates keep the order of the file, and so do links. The reference configuration is
@@ -34,6 +36,12 @@ def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
         Path of the file, or the XML text itself.
     name : str, optional
         Name of the robot; by default the model name that the file gives, or the file's own.
+    floating : bool
+        Let the trunk float in the x–z plane, though the file fixes it to the world or leaves it
+        free in space.
+    projected : bool
+        Lock the joints that leave the x–z plane, where a symmetric robot of three dimensions is
+        meant to move in it.
 
     Raises
     ------
@@ -45,7 +53,7 @@ def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
     RobotWarning
         If the file says something that is not simulated, or left and right differ.
     """
-    file = parse(source)
+    file = parse(source, floating=floating, projected=projected)
     model = file.model
     links = read_links(file)
     warn_of_unmodelled(file)
@@ -54,6 +62,7 @@ def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
     limited = model.jnt_limited.astype(bool) & (not file.disabled("limit"))
     spring = 0.0 if file.disabled("spring") else 1.0
     damper = 0.0 if file.disabled("damper") else 1.0
+    dry = 0.0 if file.disabled("frictionloss") else 1.0
     hinges = np.flatnonzero(links.axis[:, 0])
     arrays = Model(
         parent=links.parent,
@@ -67,38 +76,37 @@ def read_mjcf(source: Path | str, *, name: str | None = None) -> Robot:
         damping=_floats(damper * (model.dof_damping + actuators.damping)),
         stiffness=_floats(spring * model.jnt_stiffness),
         rest=_floats(model.qpos_spring),
-        lower=np.where(limited, model.jnt_range[:, 0], -np.inf),
-        upper=np.where(limited, model.jnt_range[:, 1], np.inf),
+        dry_friction=_floats(dry * model.dof_frictionloss),
+        lower=_limits(np.where(limited, model.jnt_range[:, 0], -np.inf)),
+        upper=_limits(np.where(limited, model.jnt_range[:, 1], np.inf)),
+        speed_limit=read_speed_limits(file),
         gravity=_gravity(file),
         contact_link=np.array([p.link for p in points], dtype=np.int64),
         contact_position=np.array([(p.x, p.z) for p in points], dtype=np.float64).reshape(-1, 2),
         contact_radius=np.array([p.radius for p in points], dtype=np.float64),
         actuator_joint=actuators.joint,
-        torque_lower=actuators.lower,
-        torque_upper=actuators.upper,
+        torque_lower=_limits(actuators.lower),
+        torque_upper=_limits(actuators.upper),
         pivot=int(hinges[0]) if len(hinges) else 0,
     )
-    _refuse_impossible_numbers(file, arrays)
-    joint_names = _joint_names(file)
-    feet = find_feet(links.parent, links.names, points, links.origin, _center_of_mass(links))
-    return Robot(
-        name=name or _model_name(file, source),
-        model=arrays,
-        joint_names=joint_names,
+    return assembled(
+        name or _model_name(file, source),
+        arrays,
+        joint_names=_joint_names(file),
         link_names=links.names,
         actuator_names=actuators.names,
-        contact_names=name_contacts(links.names, points, feet),
-        feet=feet,
-        mirror=find_mirror(
-            arrays, joint_names, links.names, feet, [p.friction for p in points], file.source
-        ),
-        floating=_is_floating(file, arrays),
+        points=points,
         source=file.source,
     )
 
 
 def _floats(values: Floats) -> Floats:
     return np.array(values, dtype=np.float64, order="C")
+
+
+def _limits(values: Floats) -> Floats:
+    """Limits, of which a huge one is none: formats want numbers for both sides of a range."""
+    return _floats(np.where(np.abs(values) >= LARGEST_NUMBER, np.copysign(np.inf, values), values))
 
 
 def _gravity(file: MujocoFile) -> Floats:
@@ -111,24 +119,6 @@ def _gravity(file: MujocoFile) -> Floats:
             'Set it in the file: <option gravity="0 0 -9.81"/>.'.format(*gravity)
         )
     return _floats(gravity[::2])
-
-
-def _center_of_mass(links: Links) -> Floats:
-    """Centre of mass of the whole robot in the reference configuration (world x, z)."""
-    center: Floats = links.mass @ (links.origin + links.center_of_mass) / links.mass.sum()
-    return center
-
-
-def _refuse_impossible_numbers(file: MujocoFile, model: Model) -> None:
-    """Refuse NaN, and what is infinite or huge where only a limit may be."""
-    limits = {"lower", "upper", "torque_lower", "torque_upper"}
-    for field, values in model.members().items():
-        bad = np.isnan(values) if field in limits else ~(np.abs(values) <= LARGEST_NUMBER)
-        if np.any(bad):
-            raise file.error(
-                f"the {field.replace('_', ' ')} of the robot is not a number below "
-                f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
-            )
 
 
 def _joint_names(file: MujocoFile) -> tuple[str, ...]:
@@ -151,24 +141,3 @@ def _model_name(file: MujocoFile, source: Path | str) -> str:
     if name in ("", "MuJoCo Model"):
         return source.stem if isinstance(source, Path) else "robot"
     return name
-
-
-def _is_floating(file: MujocoFile, model: Model) -> bool:
-    """Whether the robot begins with unactuated slide x, slide z and hinge y of its trunk.
-
-    Warn if it floats by three such joints in another order: gaits and controllers expect this one.
-    """
-    if len(model.parent) < 3 or list(model.parent[:3]) != [-1, 0, 1]:
-        return False
-    alone = all(np.count_nonzero(model.parent == k) == 1 for k in (-1, 0, 1))
-    if not alone or np.any(model.mass[:2]) or np.any(model.actuator_joint < 3):
-        return False
-    first = model.axis[:3]
-    if np.array_equal(first, [[0, 1, 0], [0, 0, 1], [1, 0, 0]]):
-        return True
-    if np.count_nonzero(first[:, 0]) == 1 and np.linalg.matrix_rank(first) == 3:
-        warn(
-            f"{file.source}: the first body floats, but not by slide along x, slide along z, hinge "
-            "about y in this order and sense; gaits and walking controllers need them so."
-        )
-    return False

@@ -36,8 +36,14 @@ class Model(Bundle):
         Centre of mass in the link frame.
     armature, damping, stiffness, rest : (nv,) float
         Rotor inertia (kg m²), viscous damping (N m s), spring (N m) and its rest coordinate.
+    dry_friction : (nv,) float
+        Coulomb friction of the joint (N m; N of a slide): what it takes to move it at all, and what
+        opposes it as it moves.
     lower, upper : (nv,) float
         Range of the coordinate; infinite where there is no stop.
+    speed_limit : (nv,) float
+        Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
+        infinite where there is none.
     gravity : (2,) float
         Acceleration of free fall, (0, -9.81) on earth.
     contact_link : (nc,) int
@@ -66,8 +72,10 @@ class Model(Bundle):
     damping: Floats
     stiffness: Floats
     rest: Floats
+    dry_friction: Floats
     lower: Floats
     upper: Floats
+    speed_limit: Floats
     gravity: Floats
     contact_link: Integers
     contact_position: Floats

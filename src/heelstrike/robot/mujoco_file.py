@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.flattening import float_in_plane, project
 from heelstrike.robot.screening import screen
+from heelstrike.robot.urdf import prepare_urdf, urdf_text
 from heelstrike.robot.warning import warn
 
 
@@ -70,13 +72,17 @@ class MujocoFile:
         return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
 
 
-def parse(source: Path | str) -> MujocoFile:
+def parse(source: Path | str, *, floating: bool = False, projected: bool = False) -> MujocoFile:
     """Parse an MJCF or URDF file, or a string that holds one.
 
     Parameters
     ----------
     source : Path or str
         Path of a file, or the XML text itself.
+    floating : bool
+        Whether the body that the file fixes to the world (or leaves free) floats in the plane.
+    projected : bool
+        Whether joints that leave the x–z plane are locked.
 
     Raises
     ------
@@ -90,18 +96,42 @@ def parse(source: Path | str) -> MujocoFile:
     remarks: list[str] = []
     try:
         with _warnings_into(remarks):
-            if isinstance(source, Path):
+            urdf = xml is not None and xml.tag == "robot"
+            if urdf or floating or projected:
+                spec = _parsed(source, xml, label)
+                if floating:
+                    float_in_plane(spec, label)
+                if projected:
+                    project(spec, label)
+                model = spec.compile()
+            elif isinstance(source, Path):
                 model = mujoco.MjModel.from_xml_path(str(source))
             else:
                 model = mujoco.MjModel.from_xml_string(source)
             pose = mujoco.MjData(model)
             mujoco.mj_kinematics(model, pose)
+    except RobotError:
+        raise
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())
         raise RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}") from error
     for remark in remarks:
         warn(f"{label}: {remark}")
     return MujocoFile(model, pose, xml, label)
+
+
+def _parsed(source: Path | str, xml: Element | None, label: str) -> Any:
+    """Return a file as MuJoCo understands it, not yet compiled."""
+    import mujoco
+
+    if xml is not None and xml.tag == "robot":
+        directory = source.parent if isinstance(source, Path) else Path()
+        spec = mujoco.MjSpec.from_string(urdf_text(xml, directory, label))
+        prepare_urdf(spec)
+        return spec
+    if isinstance(source, Path):
+        return mujoco.MjSpec.from_file(str(source))
+    return mujoco.MjSpec.from_string(source)
 
 
 @contextmanager

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -98,6 +100,9 @@ class Robot:
         Exchange of left and right, or None for a robot that is not symmetric.
     floating : bool
         Whether the first three coordinates are the trunk's x, z and pitch.
+    contact_friction : tuple of float
+        Friction of the nc contact points according to the robot's file, empty if unknown. A
+        simulation takes friction from its `Ground`.
     source : str
         File or builder the robot came from, for error messages.
     """
@@ -111,6 +116,7 @@ class Robot:
     feet: tuple[Foot, ...]
     mirror: Mirror | None
     floating: bool
+    contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
 
     @property
@@ -146,6 +152,37 @@ class Robot:
     def reference_state(self) -> State:
         """State at rest in the reference configuration of the robot's file."""
         return State(self.model.reference.copy(), np.zeros(self.nv))
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF (``.urdf``) most.
+
+        What is read back has the same dynamics, on the same coordinates. URDF cannot hold springs,
+        armature (so no motor inertia) and torque limits that differ between the two senses; and its
+        zero configuration becomes the robot's reference.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        RobotError
+            If the ending is another one.
+
+        Warns
+        -----
+        RobotWarning
+            With everything that the format cannot hold, joint by joint.
+        """
+        from heelstrike.robot.saving import save_robot
+
+        return save_robot(self, path)
 
     def __repr__(self) -> str:
         return (

@@ -22,8 +22,6 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
     acting = {
         "equality constraints": model.neq > 0 and not file.disabled("equality"),
         "tendons": any(np.any(file.field(name)) for name in TENDON_FORCES),
-        "dry friction in joints (frictionloss)": _any(file, "dof_frictionloss")
-        and not file.disabled("frictionloss"),
         "nonlinear springs or dampers": _any(file, "jnt_stiffnesspoly")
         or _any(file, "dof_dampingpoly")
         or _any(file, "actuator_dampingpoly"),
@@ -52,8 +50,8 @@ def _warn_of_fixed_root(file: MujocoFile) -> None:
         if link.get("name") not in children and mass is not None:
             warn(
                 f"{file.source}: link {link.get('name')!r} is fixed to the world, for no joint "
-                "moves it. If the robot floats, put it on a link 'world' by prismatic joints "
-                "along x and z and a continuous joint about y."
+                "moves it. If the robot floats, load it with floating=True, or put it on a link "
+                "'world' by a planar joint with the axis (0, 1, 0)."
             )
 
 

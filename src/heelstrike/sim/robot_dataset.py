@@ -26,8 +26,10 @@ _MODEL = {
     "damping": ("coordinate",),
     "stiffness": ("coordinate",),
     "rest": ("coordinate",),
+    "dry_friction": ("coordinate",),
     "lower": ("coordinate",),
     "upper": ("coordinate",),
+    "speed_limit": ("coordinate",),
     "gravity": ("xz",),
     "contact_link": ("contact",),
     "contact_position": ("contact", "xz"),
@@ -37,7 +39,7 @@ _MODEL = {
     "torque_upper": ("actuator",),
 }
 _INDICES = ("parent", "contact_link", "actuator_joint")
-_MAY_BE_INFINITE = ("lower", "upper", "torque_lower", "torque_upper")
+_MAY_BE_INFINITE = ("lower", "upper", "speed_limit", "torque_lower", "torque_upper")
 _NAMES = {
     "joint_names": "coordinate",
     "link_names": "coordinate",
@@ -89,6 +91,12 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
     ValueError, KeyError
         If anything is missing, of the wrong shape, or points outside the robot.
     """
+    import xarray
+
+    for name, nothing in (("dry_friction", 0.0), ("speed_limit", math.inf)):
+        if name not in dataset:  # the file of a time when robots had none
+            none = xarray.full_like(dataset["damping"], nothing)
+            dataset = dataset.assign({name: none})
     sizes = {
         "coordinate": dataset["parent"].size,
         "contact": dataset["contact_link"].size,
@@ -134,10 +142,11 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
                 for name, dim in _MIRROR.items()
             }
         )
+    names: dict[str, Any] = {name: text(name, dim) for name, dim in _NAMES.items()}
     robot = Robot(
         name=_decoded(dataset.attrs["name"]),
         model=model,
-        **{name: text(name, dim) for name, dim in _NAMES.items()},
+        **names,
         feet=feet,
         mirror=mirror,
         floating=bool(int(dataset.attrs["floating"])),

@@ -1,0 +1,141 @@
+"""From arrays and names to a `Robot`: its feet, its mirror image, and what no robot may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.contact_points import ContactPoint
+from heelstrike.robot.feet import find_feet, name_contacts
+from heelstrike.robot.mirror import find_mirror
+from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.warning import warn
+
+LARGEST_NUMBER = 1e10
+"""Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
+
+_MAY_BE_INFINITE = {"lower", "upper", "torque_lower", "torque_upper", "speed_limit"}
+
+
+def assembled(
+    name: str,
+    model: Model,
+    *,
+    joint_names: tuple[str, ...],
+    link_names: tuple[str, ...],
+    actuator_names: tuple[str, ...],
+    points: Sequence[ContactPoint],
+    source: str,
+) -> Robot:
+    """Make a robot of its numbers and names.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot.
+    model : Model
+        Its numbers.
+    joint_names, link_names, actuator_names : tuple of str
+        Its names.
+    points : sequence of ContactPoint
+        The contact points of the model, in its order.
+    source : str
+        What to call the robot in messages.
+
+    Raises
+    ------
+    RobotError
+        If a number is NaN or absurdly large, or a joint moves no mass.
+
+    Warns
+    -----
+    RobotWarning
+        If left and right differ, or the base floats by joints in an unusual order.
+    """
+    _refuse_impossible_numbers(model, source)
+    origin = link_origins(model)
+    _refuse_joints_without_inertia(model, origin, joint_names, source)
+    points = list(points)
+    center: Floats = model.mass @ (origin + model.center_of_mass) / model.mass.sum()
+    feet = find_feet(model.parent, link_names, points, origin, center)
+    friction = tuple(point.friction for point in points)
+    return Robot(
+        name=name,
+        model=model,
+        joint_names=joint_names,
+        link_names=link_names,
+        actuator_names=actuator_names,
+        contact_names=name_contacts(link_names, points, feet),
+        feet=feet,
+        mirror=find_mirror(model, joint_names, link_names, feet, friction, source),
+        floating=_is_floating(model, source),
+        contact_friction=friction,
+        source=source,
+    )
+
+
+def link_origins(model: Model) -> Floats:
+    """World position (x, z) of the link frames in the reference configuration, (nv, 2)."""
+    origin = model.offset.copy()
+    for link, parent in enumerate(model.parent):
+        if parent >= 0:
+            origin[link] += origin[parent]
+    return origin
+
+
+def _refuse_impossible_numbers(model: Model, source: str) -> None:
+    """Refuse NaN, and what is infinite or huge where only a limit may be."""
+    for field, values in model.members().items():
+        bad = np.isnan(values) if field in _MAY_BE_INFINITE else ~(np.abs(values) <= LARGEST_NUMBER)
+        if np.any(bad):
+            raise RobotError(
+                f"{source}: the {field.replace('_', ' ')} of the robot is not a number below "
+                f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
+            )
+
+
+def _refuse_joints_without_inertia(
+    model: Model, origin: Floats, joint_names: tuple[str, ...], source: str
+) -> None:
+    """Refuse a joint whose acceleration no mass resists: its equation of motion says 0 = 0."""
+    resistance = model.armature.copy()
+    for link in range(len(model.parent)):
+        center = origin[link] + model.center_of_mass[link]
+        joint = link
+        while joint >= 0:
+            if model.axis[joint, 0]:
+                arm = center - origin[joint]
+                resistance[joint] += model.inertia[link] + model.mass[link] * (arm @ arm)
+            else:
+                resistance[joint] += model.mass[link]
+            joint = int(model.parent[joint])
+    idle = np.flatnonzero(~(resistance > 0.0))
+    if len(idle):
+        raise RobotError(
+            f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
+            "nothing resists it. Give the link that it moves a mass and a moment of inertia."
+        )
+
+
+def _is_floating(model: Model, source: str) -> bool:
+    """Whether the robot begins with unactuated slide x, slide z and hinge y of its trunk.
+
+    Warn if it floats by three such joints in another order: gaits and controllers expect this one.
+    """
+    if len(model.parent) < 3 or list(model.parent[:3]) != [-1, 0, 1]:
+        return False
+    alone = all(np.count_nonzero(model.parent == k) == 1 for k in (-1, 0, 1))
+    if not alone or np.any(model.mass[:2]) or np.any(model.actuator_joint < 3):
+        return False
+    first = model.axis[:3]
+    if np.array_equal(first, [[0, 1, 0], [0, 0, 1], [1, 0, 0]]):
+        return True
+    if np.count_nonzero(first[:, 0]) == 1 and np.linalg.matrix_rank(first) == 3:
+        warn(
+            f"{source}: the first body floats, but not by slide along x, slide along z, hinge "
+            "about y in this order and sense; gaits and walking controllers need them so."
+        )
+    return False

@@ -1,0 +1,427 @@
+"""A robot built in Python, without a file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.assembly import assembled
+from heelstrike.robot.contact_points import ContactPoint, in_order
+from heelstrike.robot.model import Model
+from heelstrike.robot.robot import Robot
+
+Pair = Sequence[float]
+Limits = float | Sequence[float]
+
+
+class JointProperties(TypedDict, total=False):
+    """What a link and the joint that moves it may have; nothing is required.
+
+    Attributes
+    ----------
+    mass, inertia : float
+        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²), zero by
+        default.
+    center_of_mass : (2,) float
+        Centre of mass (x, z) in the link frame (m).
+    reference : float
+        Coordinate at which the robot stands as it is described, zero by default.
+    limits : (2,) float
+        Range of the coordinate (rad, m); unlimited by default.
+    damping : float
+        Viscous damping (N m s/rad, N s/m).
+    stiffness, rest : float
+        Spring (N m/rad, N/m) and the coordinate at which it is slack.
+    dry_friction : float
+        Coulomb friction (N m, N).
+    armature : float
+        Rotor inertia as the joint feels it (kg m², kg).
+    torque : float or (2,) float
+        Greatest torque of the motor at the joint (N m, N) either way, or its two limits; infinity
+        for a motor without limits. A joint without it has no motor.
+    speed : float
+        Greatest speed that the drive stands (rad/s, m/s).
+    gear, motor_inertia : float
+        Ratio of the gear, and the inertia of the motor before it: they add
+        ``gear**2 * motor_inertia`` to the armature. Torque and speed are those at the joint.
+    """
+
+    mass: float
+    inertia: float
+    center_of_mass: Pair
+    reference: float
+    limits: Pair
+    damping: float
+    stiffness: float
+    rest: float
+    dry_friction: float
+    armature: float
+    torque: Limits
+    speed: float
+    gear: float
+    motor_inertia: float
+
+
+@dataclass(frozen=True)
+class _Link:
+    """One link with its joint, checked."""
+
+    joint: str
+    name: str
+    parent: int
+    axis: tuple[float, float, float]
+    at: tuple[float, float]
+    mass: float = 0.0
+    inertia: float = 0.0
+    center_of_mass: tuple[float, float] = (0.0, 0.0)
+    reference: float = 0.0
+    limits: tuple[float, float] = (-math.inf, math.inf)
+    damping: float = 0.0
+    stiffness: float = 0.0
+    rest: float = 0.0
+    dry_friction: float = 0.0
+    armature: float = 0.0
+    torque: tuple[float, float] | None = None
+    speed: float = math.inf
+
+
+class RobotBuilder:
+    """Builds a planar robot link by link.
+
+    Describe the robot in one configuration, its reference. There all link frames are parallel to
+    the world frame (x forward, z up), and each has its origin at the joint that moves the link. The
+    robot is the one that an MJCF file with the same numbers gives.
+
+    Parameters
+    ----------
+    name : str
+        Name of the robot.
+    gravity : float
+        Acceleration of free fall (m/s²), downwards.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> biped = hs.RobotBuilder("biped")
+    >>> trunk = biped.floating_base("trunk", (0, 0.8), mass=20, inertia=1, center_of_mass=(0, 0.2))
+    >>> for side in ("right", "left"):
+    ...     leg = biped.slide(f"{side}_leg", trunk, direction=(0, -1), mass=2, torque=400)
+    ...     foot = biped.hinge(f"{side}_ankle", leg, at=(0, -0.75), mass=1, inertia=0.01, torque=50)
+    ...     biped.sole(foot, heel=(-0.05, -0.05), toe=(0.12, -0.05))
+    >>> biped.build()
+    Robot('biped': 7 coordinates, 4 actuators, 4 contact points, 26 kg)
+    """
+
+    def __init__(self, name: str, *, gravity: float = 9.81) -> None:
+        self.name = name
+        self._gravity = _number("gravity", gravity)
+        self._links: list[_Link] = []
+        self._points: list[ContactPoint] = []
+
+    def floating_base(
+        self, link: str, at: Pair = (0.0, 0.0), **properties: Unpack[JointProperties]
+    ) -> str:
+        """Add the trunk of a robot that moves freely: its coordinates are x, z and pitch.
+
+        Parameters
+        ----------
+        link : str
+            Name of the trunk. Its joints are ``root_x``, ``root_z`` and ``root_pitch``.
+        at : (2,) float
+            Where the origin of its frame is when the robot stands as described (m).
+        **properties : JointProperties
+            Mass, inertia, centre of mass.
+
+        Returns
+        -------
+        str
+            `link`, to hang other links on.
+        """
+        if self._links:
+            raise self._error(f"the floating base {link!r} must be the first link.")
+        x, z = _pair("at", at)
+        self._add("root_x", link, -1, (0.0, 1.0, 0.0), (0.0, 0.0), {"reference": x})
+        self._add("root_z", link, 0, (0.0, 0.0, 1.0), (0.0, 0.0), {"reference": z})
+        return self._add("root_pitch", link, 1, (1.0, 0.0, 0.0), (x, z), properties)
+
+    def hinge(
+        self,
+        name: str,
+        parent: str | None,
+        *,
+        at: Pair = (0.0, 0.0),
+        link: str = "",
+        sense: int = 1,
+        **properties: Unpack[JointProperties],
+    ) -> str:
+        """Add a link that turns on another.
+
+        Parameters
+        ----------
+        name : str
+            Name of the joint.
+        parent : str or None
+            Link that carries it; None for the world.
+        at : (2,) float
+            Place of the joint in the frame of that link (m).
+        link : str, optional
+            Name of the new link, by default that of the joint.
+        sense : {1, -1}
+            Whether a positive coordinate turns about +y (clockwise, seen with x to the right) or
+            about -y.
+        **properties : JointProperties
+            Everything that link and joint have.
+
+        Returns
+        -------
+        str
+            Name of the new link.
+
+        Raises
+        ------
+        RobotError
+            If a name is taken or unknown, or a number is impossible.
+        """
+        if sense not in (1, -1):
+            raise self._error(f"joint {name!r}: sense is 1 or -1, got {sense!r}.")
+        return self._add(
+            name,
+            link or name,
+            self._parent(name, parent),
+            (float(sense), 0.0, 0.0),
+            _pair("at", at),
+            properties,
+        )
+
+    def slide(
+        self,
+        name: str,
+        parent: str | None,
+        *,
+        direction: Pair,
+        at: Pair = (0.0, 0.0),
+        link: str = "",
+        **properties: Unpack[JointProperties],
+    ) -> str:
+        """Add a link that slides on another along `direction` (x, z), of any length.
+
+        The other parameters are those of :meth:`hinge`.
+        """
+        x, z = _pair("direction", direction)
+        length = math.hypot(x, z)
+        if not length > 0.0:
+            raise self._error(f"joint {name!r} slides along (0, 0), which is no direction.")
+        axis = (0.0, x / length, z / length)
+        parent_link = self._parent(name, parent)
+        return self._add(name, link or name, parent_link, axis, _pair("at", at), properties)
+
+    def contact(self, link: str, at: Pair, *, radius: float = 0.0, friction: float = 1.0) -> None:
+        """Add a contact point: a disc fixed to a link, a point if its radius is zero.
+
+        Parameters
+        ----------
+        link : str
+            Link that carries it.
+        at : (2,) float
+            Its centre in the frame of that link (m).
+        radius : float
+            Radius (m).
+        friction : float
+            Friction of its surface. A simulation takes friction from the ground; left and right are
+            compared by it.
+        """
+        x, z = _pair("at", at)
+        size, roughness = _positive("radius", radius), _positive("friction", friction)
+        self._points.append(ContactPoint(self._index(link), x, z, size, roughness))
+
+    def sole(self, link: str, *, heel: Pair, toe: Pair, friction: float = 1.0) -> None:
+        """Add the two ends of a flat sole; see :meth:`contact`."""
+        self.contact(link, heel, friction=friction)
+        self.contact(link, toe, friction=friction)
+
+    def build(self) -> Robot:
+        """Return the robot. The builder may go on and build others.
+
+        Raises
+        ------
+        RobotError
+            If there are no links, or a joint moves no mass.
+
+        Warns
+        -----
+        RobotWarning
+            If names speak of left and right, but the two differ.
+        """
+        links = self._links
+        if not links:
+            raise self._error("the robot has no links.")
+        count = len(links)
+        points = in_order(self._points)
+        driven = [i for i, link in enumerate(links) if link.torque is not None]
+        torque = [link.torque for link in links if link.torque is not None]
+
+        def column(field: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+            return np.array([getattr(link, field) for link in links], dtype=np.float64)
+
+        def pairs(
+            values: list[tuple[float, float]],
+        ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+            return np.array(values, dtype=np.float64).reshape(-1, 2)
+
+        limits, torques = pairs([link.limits for link in links]), pairs(torque)
+        model = Model(
+            parent=np.array([link.parent for link in links], dtype=np.int64),
+            axis=np.array([link.axis for link in links], dtype=np.float64).reshape(count, 3),
+            offset=pairs([link.at for link in links]),
+            reference=column("reference"),
+            mass=column("mass"),
+            center_of_mass=pairs([link.center_of_mass for link in links]),
+            inertia=column("inertia"),
+            armature=column("armature"),
+            damping=column("damping"),
+            stiffness=column("stiffness"),
+            rest=column("rest"),
+            dry_friction=column("dry_friction"),
+            lower=limits[:, 0].copy(),
+            upper=limits[:, 1].copy(),
+            speed_limit=column("speed"),
+            gravity=np.array([0.0, -self._gravity]),
+            contact_link=np.array([p.link for p in points], dtype=np.int64),
+            contact_position=pairs([(p.x, p.z) for p in points]),
+            contact_radius=np.array([p.radius for p in points], dtype=np.float64),
+            actuator_joint=np.array(driven, dtype=np.int64),
+            torque_lower=torques[:, 0].copy(),
+            torque_upper=torques[:, 1].copy(),
+            pivot=next((i for i, link in enumerate(links) if link.axis[0]), 0),
+        )
+        return assembled(
+            self.name,
+            model,
+            joint_names=tuple(link.joint for link in links),
+            link_names=tuple(link.name for link in links),
+            actuator_names=tuple(links[i].joint for i in driven),
+            points=points,
+            source=self.name,
+        )
+
+    def _add(
+        self,
+        joint: str,
+        name: str,
+        parent: int,
+        axis: tuple[float, float, float],
+        at: tuple[float, float],
+        properties: JointProperties,
+    ) -> str:
+        unknown = set(properties) - set(JointProperties.__annotations__)
+        if unknown:
+            raise TypeError(
+                f"joint {joint!r} got {', '.join(sorted(unknown))}; it may have "
+                f"{', '.join(JointProperties.__annotations__)}"
+            )
+        if any(link.joint == joint for link in self._links):
+            raise self._error(f"there is a joint {joint!r} already.")
+        # The massless links of one base share its name; nothing else does.
+        if any(link.name == name for link in self._links) and not joint.startswith("root_"):
+            raise self._error(f"there is a link {name!r} already.")
+        try:
+            self._links.append(_checked(joint, name, parent, axis, at, properties))
+        except RobotError as error:
+            raise self._error(f"joint {joint!r}: {error}") from None
+        return name
+
+    def _parent(self, joint: str, parent: str | None) -> int:
+        if parent is None:
+            return -1
+        return self._index(parent, f"joint {joint!r} hangs on")
+
+    def _index(self, link: str, why: str = "a contact point is on") -> int:
+        for i in reversed(range(len(self._links))):
+            if self._links[i].name == link:
+                return i
+        known = ", ".join(dict.fromkeys(one.name for one in self._links)) or "none yet"
+        raise self._error(f"{why} link {link!r}, which there is not. Links are: {known}.")
+
+    def _error(self, message: str) -> RobotError:
+        return RobotError(f"{self.name}: {message}")
+
+
+def _checked(
+    joint: str,
+    name: str,
+    parent: int,
+    axis: tuple[float, float, float],
+    at: tuple[float, float],
+    given: JointProperties,
+) -> _Link:
+    numbers: Any = given  # a key out of a list is not a literal to type checkers
+    positive = {
+        key: _positive(key, numbers.get(key, 0.0))
+        for key in ("mass", "inertia", "damping", "stiffness", "dry_friction", "motor_inertia")
+    }
+    gear = _number("gear", given.get("gear", 1.0))
+    armature = _positive("armature", given.get("armature", 0.0))
+    torque = given.get("torque")
+    return _Link(
+        joint,
+        name,
+        parent,
+        axis,
+        at,
+        mass=positive["mass"],
+        inertia=positive["inertia"],
+        center_of_mass=_pair("center_of_mass", given.get("center_of_mass", (0.0, 0.0))),
+        reference=_number("reference", given.get("reference", 0.0)),
+        limits=_ordered("limits", given.get("limits", (-math.inf, math.inf))),
+        damping=positive["damping"],
+        stiffness=positive["stiffness"],
+        rest=_number("rest", given.get("rest", 0.0)),
+        dry_friction=positive["dry_friction"],
+        armature=armature + gear**2 * positive["motor_inertia"],
+        torque=None if torque is None else _torque(torque),
+        speed=_positive("speed", given.get("speed", math.inf), infinite=True),
+    )
+
+
+def _torque(given: Limits) -> tuple[float, float]:
+    if isinstance(given, Sequence | np.ndarray):
+        return _ordered("torque", given)
+    size = _positive("torque", given, infinite=True)
+    return _ordered("torque", (-size, size))
+
+
+def _ordered(what: str, given: Pair) -> tuple[float, float]:
+    low, high = _pair(what, given, infinite=True)
+    if not low < high:
+        raise RobotError(f"{what} must go from low to high, got {low:g} to {high:g}.")
+    return low, high
+
+
+def _pair(what: str, given: Pair, *, infinite: bool = False) -> tuple[float, float]:
+    try:
+        first, second = given
+    except (TypeError, ValueError):
+        raise RobotError(f"{what} must be a pair of numbers, got {given!r}.") from None
+    return _number(what, first, infinite=infinite), _number(what, second, infinite=infinite)
+
+
+def _positive(what: str, given: float, *, infinite: bool = False) -> float:
+    number = _number(what, given, infinite=infinite)
+    if number < 0.0:
+        raise RobotError(f"{what} must not be negative, got {number:g}.")
+    return number
+
+
+def _number(what: str, given: float, *, infinite: bool = False) -> float:
+    try:
+        number = float(given)
+    except (TypeError, ValueError):
+        raise RobotError(f"{what} must be a number, got {given!r}.") from None
+    if math.isnan(number) or (math.isinf(number) and not infinite):
+        raise RobotError(f"{what} must be finite, got {number:g}.")
+    return number

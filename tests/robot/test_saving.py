@@ -1,0 +1,192 @@
+"""Round trips: a robot written to a file and read again moves as it did."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from random_trees import random_tree
+
+from heelstrike import dynamics
+from heelstrike.errors import RobotError
+from heelstrike.robot import (
+    Robot,
+    RobotBuilder,
+    RobotWarning,
+    builtin_robots,
+    human,
+    load_robot,
+    read_mjcf,
+)
+
+TOLERANCE = 1e-12  # relative; all digits are written, so that only sums in another order differ
+
+
+def quiet(text: str) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        return read_mjcf(text)
+
+
+def again(robot: Robot, path: Path) -> Robot:
+    """Save and load, without a warning but those that a random tree earns at any rate."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=".*gaits and walking controllers need them so")
+        return load_robot(robot.save(path))
+
+
+def assert_same_dynamics(one: Robot, other: Robot, *, states: int = 5) -> None:
+    """Mass matrix, bias, passive force and contact points on the same coordinates."""
+    assert (one.nv, one.nu, one.nc) == (other.nv, other.nu, other.nc)
+    draw = np.random.default_rng(0)
+    for _ in range(states):
+        q, v = draw.normal(size=one.nv), draw.normal(size=one.nv)
+        for query in (
+            lambda robot, q=q: dynamics.mass_matrix(robot, q),
+            lambda robot, q=q, v=v: dynamics.bias_force(robot, q, v),
+            lambda robot, q=q, v=v: dynamics.passive_force(robot, q, v),
+            lambda robot, q=q: dynamics.contact_positions(robot, q),
+        ):
+            expected, found = query(one), query(other)
+            scale = max(np.abs(expected).max(initial=0.0), 1.0)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=TOLERANCE * scale)
+
+
+EXACT = ("axis", "armature", "damping", "stiffness", "rest", "dry_friction", "lower", "upper")
+ALSO_EXACT = ("speed_limit", "torque_lower", "torque_upper", "actuator_joint", "contact_radius")
+
+
+@pytest.mark.parametrize("name", builtin_robots())
+def test_library_through_mjcf(name: str, tmp_path: Path) -> None:
+    robot = load_robot(name)
+    back = again(robot, tmp_path / "r.xml")
+    assert_same_dynamics(robot, back)
+    for field in (*EXACT, *ALSO_EXACT, "reference", "parent", "gravity"):
+        np.testing.assert_array_equal(
+            getattr(back.model, field), getattr(robot.model, field), err_msg=field
+        )
+    for field in ("name", "joint_names", "link_names", "actuator_names", "contact_names"):
+        assert getattr(back, field) == getattr(robot, field), field
+    assert (back.feet, back.floating) == (robot.feet, robot.floating)
+    assert back.contact_friction == robot.contact_friction
+    assert (back.mirror is None) == (robot.mirror is None)
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "r.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data)
+    assert np.all(np.isfinite(data.qacc))
+
+
+@pytest.mark.parametrize("name", builtin_robots())
+def test_library_through_urdf(name: str, tmp_path: Path) -> None:
+    robot = load_robot(name)
+    if name == "walker2d":  # the one robot with motor inertia
+        with pytest.warns(RobotWarning, match=r"walker2d: .* armature .* of right_hip, .*MJCF"):
+            robot.save(tmp_path / "r.urdf")
+        none = np.zeros(robot.nv)
+        robot = replace(robot, model=_changed(robot, armature=none))
+    back = again(robot, tmp_path / "r.urdf")
+    assert_same_dynamics(robot, back)
+    for field in (*EXACT, *ALSO_EXACT, "parent", "gravity"):
+        np.testing.assert_array_equal(
+            getattr(back.model, field), getattr(robot.model, field), err_msg=field
+        )
+    for field in ("name", "joint_names", "actuator_names", "contact_names", "floating"):
+        assert getattr(back, field) == getattr(robot, field), field
+    assert [foot.name for foot in back.feet] == [foot.name for foot in robot.feet]
+    assert (back.mirror is None) == (robot.mirror is None)
+
+
+def _changed(robot: Robot, **fields: np.ndarray) -> object:
+    return type(robot.model)(**robot.model.members() | fields)
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_random_trees_through_mjcf_and_urdf(seed: int, tmp_path: Path) -> None:
+    robot = quiet(random_tree(seed))
+    back = again(robot, tmp_path / "r.xml")
+    assert_same_dynamics(robot, back, states=2)
+    for field in (*EXACT, *ALSO_EXACT):
+        np.testing.assert_allclose(
+            getattr(back.model, field),
+            getattr(robot.model, field),
+            rtol=1e-15,
+            atol=1e-15,
+            err_msg=field,
+        )
+    none = np.zeros(robot.nv)
+    without = replace(robot, model=_changed(robot, armature=none, stiffness=none))
+    back = again_quietly(without, tmp_path / "r.urdf")  # its motors pull unequally to two sides
+    # The order of a link's points is that of x in the reference configuration, which URDF moves.
+    assert_same_dynamics(_with_contacts_of(without, back), back, states=2)
+
+
+def _with_contacts_of(robot: Robot, other: Robot) -> Robot:
+    """Sort the contact points of each link as another robot has them."""
+    q = np.zeros(robot.nv)
+    here, there = (dynamics.contact_positions(one, q) for one in (robot, other))
+    apart = np.hypot(*(here[None] - there[:, None]).transpose(2, 0, 1))
+    apart[other.model.contact_link[:, None] != robot.model.contact_link] = np.inf
+    order = apart.argmin(axis=1) if robot.nc else np.zeros(0, dtype=np.int64)
+    assert sorted(order) == list(range(robot.nc))
+    changed = {
+        field: getattr(robot.model, field)[order]
+        for field in ("contact_link", "contact_position", "contact_radius")
+    }
+    return replace(robot, model=_changed(robot, **changed))
+
+
+def again_quietly(robot: Robot, path: Path) -> Robot:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        return load_robot(robot.save(path))
+
+
+def test_what_urdf_cannot_hold_is_named(tmp_path: Path) -> None:
+    build = RobotBuilder("odd")
+    link = build.hinge("a", None, mass=1, inertia=1, stiffness=3, torque=(-1, 2))
+    build.hinge("b", link, mass=1, inertia=1, armature=0.1)
+    with pytest.warns(RobotWarning) as caught:
+        build.build().save(tmp_path / "r.urdf")
+    (message,) = (str(one.message) for one in caught)
+    for words in ("springs of a;", "armature (motor inertia) of b;", "torque limits", "of a."):
+        assert words in message
+
+
+def test_limits_of_one_side_and_motors_without_limits(tmp_path: Path) -> None:
+    build = RobotBuilder("one_sided", gravity=1.62)
+    link = build.hinge(
+        "a", None, mass=1, inertia=1, limits=(-np.inf, 0.5), torque=np.inf, speed=7, dry_friction=2
+    )
+    build.slide("b", link, direction=(1, 0), mass=1, inertia=0.1, limits=(0.1, np.inf), torque=3)
+    robot = build.build()
+    for path in (tmp_path / "r.xml", tmp_path / "r.urdf"):
+        back = again(robot, path)
+        assert_same_dynamics(robot, back)
+        for field in (*EXACT, *ALSO_EXACT, "gravity"):
+            np.testing.assert_array_equal(
+                getattr(back.model, field), getattr(robot.model, field), err_msg=field
+            )
+
+
+def test_a_human_through_files(tmp_path: Path) -> None:
+    robot = human(62, 1.7)
+    for path in (tmp_path / "h.xml", tmp_path / "h.urdf"):
+        assert_same_dynamics(robot, again(robot, path))
+
+
+def test_names_that_xml_must_quote(tmp_path: Path) -> None:
+    build = RobotBuilder('<a & "b">')
+    build.hinge("l'é <1>", None, mass=1, inertia=1)
+    for path in (tmp_path / "r.xml", tmp_path / "r.urdf"):
+        back = again(build.build(), path)
+        assert (back.name, back.joint_names) == ('<a & "b">', ("l'é <1>",))
+
+
+def test_another_ending(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match=r"MJCF \(.xml\) or URDF \(.urdf\), not as '.json'"):
+        load_robot("bravo7").save(tmp_path / "r.json")
