@@ -26,6 +26,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
+    from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import GaitError as GaitError
     from heelstrike.errors import HeelstrikeError as HeelstrikeError
     from heelstrike.errors import InfeasibleGaitError as InfeasibleGaitError
+    from heelstrike.errors import LimitCycleError as LimitCycleError
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
@@ -80,6 +83,8 @@ _HOME = {
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "InfeasibleGaitError": "heelstrike.errors",
+    "LimitCycle": "heelstrike.analysis.limit_cycle",
+    "LimitCycleError": "heelstrike.errors",
     "Robot": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
     "Run": "heelstrike.sim",
@@ -87,6 +92,7 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
