@@ -168,7 +168,7 @@ def find_limit_cycle(
                 residual=residual,
                 iterations=iteration,
             )
-        newton: Floats = np.linalg.lstsq(np.eye(chart.size) - derivative, change)[0]
+        newton = np.asarray(np.linalg.lstsq(np.eye(chart.size) - derivative, change)[0], np.float64)
         state = _moved_on(step, chart, newton)
     raise LimitCycleError(
         f"no limit cycle of robot {robot.name!r} in {max_iterations} iterations: its state still "
