@@ -133,7 +133,10 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
             record.event_impulse[place, 1] = 0.0
             record.event_count[0] = place + 1
-        memory.stopped[joint] = 1 if pushed else 0
+        if pushed:
+            memory.stopped[joint] = 1
+        elif way > LIFTOFF_GAP:
+            memory.stopped[joint] = 0
 
 
 @kernel
