@@ -26,6 +26,8 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
+    from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import GaitError as GaitError
     from heelstrike.errors import HeelstrikeError as HeelstrikeError
     from heelstrike.errors import InfeasibleGaitError as InfeasibleGaitError
+    from heelstrike.errors import LimitCycleError as LimitCycleError
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
@@ -82,6 +85,8 @@ _HOME = {
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "InfeasibleGaitError": "heelstrike.errors",
+    "LimitCycle": "heelstrike.analysis.limit_cycle",
+    "LimitCycleError": "heelstrike.errors",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
@@ -90,25 +95,4 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
-    "human": "heelstrike.robot",
-    "load_gait": "heelstrike.gait",
-    "load_robot": "heelstrike.robot",
-    "load_run": "heelstrike.sim",
-    "optimize_gait": "heelstrike.gait",
-    "simulate": "heelstrike.sim",
-    "solve_contact": "heelstrike.contact",
-    "solve_lcp": "heelstrike.contact",
-}
-
-
-def __getattr__(name: str) -> Any:
-    home = _HOME.get(name)
-    if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(importlib.import_module(home), name)
-    globals()[name] = value  # the next look-up does not come here
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(_HOME))
+    "find_limit_cycle": "heelstrike.analysis.limit_cycle",

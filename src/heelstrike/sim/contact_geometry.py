@@ -12,6 +12,7 @@ from heelstrike.dynamics.kernels import (
     point_position,
     solve_lower,
 )
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.memory import Memory
 
@@ -31,6 +32,18 @@ def locate_contacts(model: Model, ground: GroundModel, memory: Memory) -> None:
         memory.restitution[i] = restitution
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
+
+
+@kernel
+def contact_velocity(
+    link: int, position: Floats, normal: Floats, tree: Workspace
+) -> tuple[float, float]:
+    """Normal and tangential velocity of a point of a link."""
+    x = position[0] - tree.pivot[0]
+    z = position[1] - tree.pivot[1]
+    vx = tree.velocity[link, 1] + tree.velocity[link, 0] * z
+    vz = tree.velocity[link, 2] - tree.velocity[link, 0] * x
+    return normal[0] * vx + normal[1] * vz, normal[1] * vx - normal[0] * vz
 
 
 @kernel

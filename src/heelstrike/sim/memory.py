@@ -53,13 +53,13 @@ class Memory(Bundle):
         Kinematics of the state now; a second one for controllers.
     contacts : Contacts
         Contact points now; their forces are those of the last solve.
-    friction, restitution : (nc,) float
-        Coefficients of the ground under each contact point.
+    friction, restitution : (capacity,) float
+        Coefficients of the ground under each contact point; zero for the joint stops after them.
     slip : (nc,) float
         Tangential velocity of each contact point at the end of the step.
-    mode : (nc,) int
+    mode : (capacity,) int
         Contact mode found by the last solve, the guess of the next.
-    closed, slipping : (nc,) int
+    closed, slipping : (capacity,) int
         Whether each contact point is on the ground, and whether it slips.
     stop_torque : (nv,) float
         Generalised force of the joint stops in the last solve.
@@ -143,12 +143,12 @@ def allocate_memory(robot: Robot) -> Memory:
         tree=workspace(nv),
         scratch=workspace(nv),
         contacts=Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2))),
-        friction=np.zeros(nc),
-        restitution=np.zeros(nc),
+        friction=np.zeros(capacity),
+        restitution=np.zeros(capacity),
         slip=np.zeros(nc),
-        mode=np.zeros(nc, dtype=np.int64),
-        closed=np.zeros(nc, dtype=np.int64),
-        slipping=np.zeros(nc, dtype=np.int64),
+        mode=np.zeros(capacity, dtype=np.int64),
+        closed=np.zeros(capacity, dtype=np.int64),
+        slipping=np.zeros(capacity, dtype=np.int64),
         stop_torque=np.zeros(nv),
         stopped=np.zeros(nv, dtype=np.int64),
         candidate=np.zeros(capacity, dtype=np.int64),

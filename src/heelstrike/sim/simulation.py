@@ -197,7 +197,7 @@ class _Loop:
     def _new_record(self) -> None:
         rows = min(CHUNK, self.engine.rows_left + 2)
         self.records.append(
-            allocate_record(self.robot, rows, max(256, 8 * (self.robot.nc + self.robot.nv)))
+            allocate_record(self.robot, rows, max(256, 16 * (self.robot.nc + 2 * self.robot.nv)))
         )
 
     def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
