@@ -26,7 +26,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
+    from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
+    from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
+    from heelstrike.contact import contact_kinematics as contact_kinematics
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import ComputedTorque as ComputedTorque
@@ -75,6 +79,7 @@ _HOME = {
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
+    "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
@@ -87,6 +92,9 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "contact_forward_dynamics": "heelstrike.contact",
+    "contact_inverse_dynamics": "heelstrike.contact",
+    "contact_kinematics": "heelstrike.contact",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
