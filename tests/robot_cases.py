@@ -11,7 +11,7 @@ from importlib.resources import files
 import numpy as np
 from random_trees import random_tree
 
-from heelstrike.robot import Robot, RobotWarning, read_mjcf
+from heelstrike.robot import Robot, RobotWarning, builtin_robots, read_mjcf
 
 
 def walker2d_xml() -> str:
@@ -52,8 +52,7 @@ def _read(name: str, xml: str) -> Robot:
 
 
 NAMED = [
-    RobotCase("bravo7", builtin_xml("bravo7")),
-    RobotCase("spring_flamingo", builtin_xml("spring_flamingo")),
+    *(RobotCase(name, builtin_xml(name)) for name in builtin_robots()),
     RobotCase("walker2d_v5", walker2d_xml()),
 ]
 RANDOM = [RobotCase(f"tree{seed}", random_tree(seed)) for seed in range(20)]

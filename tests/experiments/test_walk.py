@@ -11,7 +11,6 @@ import pytest
 import heelstrike as hs
 from heelstrike.analysis import walking_steps
 from heelstrike.experiments.walk import BRAVO7, StepSize, design, typical_step, walk
-from heelstrike.robot import builtin_robots
 
 
 def test_step_of_a_robot_twice_as_large(bravo7: hs.Robot) -> None:
@@ -54,8 +53,8 @@ def test_no_step_suits_a_robot_without_feet(bravo7: hs.Robot) -> None:
         typical_step(footless)
 
 
-@pytest.mark.parametrize("name", builtin_robots())
-def test_every_built_in_robot_walks_its_typical_step(name: str) -> None:
+@pytest.mark.parametrize("name", ["bravo7", "geyer7", "human7", "spring_flamingo", "walker2d"])
+def test_every_built_in_robot_with_soles_walks_its_typical_step(name: str) -> None:
     robot = hs.load_robot(name)
     gait = design(robot)
     run = walk(robot, gait, steps=20)

@@ -128,7 +128,7 @@ URDF = """<robot name="leg">
   </link>
   <joint name="knee" type="revolute"><parent link="{base}"/><child link="shank"/>
     <axis xyz="0 1 0"/><limit lower="-1" upper="2" effort="30" velocity="5"/>
-    <dynamics damping="0.3"/></joint>
+    <dynamics damping="0.3" friction="0.4"/></joint>
 </robot>"""
 
 
@@ -138,6 +138,7 @@ def test_urdf_drives_the_joints_that_have_an_effort_limit() -> None:
     np.testing.assert_array_equal(robot.model.torque_upper, [30.0])
     np.testing.assert_array_equal(robot.model.upper, [2.0])
     np.testing.assert_array_equal(robot.model.damping, [0.3])
+    np.testing.assert_array_equal(robot.model.dry_friction, [0.4])
     np.testing.assert_allclose(robot.model.contact_position, [[0.0, -0.4]])
 
 

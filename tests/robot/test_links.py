@@ -243,12 +243,14 @@ def test_joint_properties() -> None:
     robot = read_mjcf(
         one_body(
             '<joint name="a" axis="0 1 0" damping="0.3" armature="0.02" stiffness="4" '
+            'frictionloss="0.7" '
             'springref="10" range="-30 60"/><joint name="b" axis="0 1 0" pos="1 0 0"/>'
         )
     )
     model = robot.model
     np.testing.assert_allclose(model.damping, [0.3, 0.0])
     np.testing.assert_allclose(model.armature, [0.02, 0.0])
+    np.testing.assert_array_equal(model.dry_friction, [0.7, 0.0])
     np.testing.assert_allclose(model.stiffness, [4.0, 0.0])
     np.testing.assert_allclose(model.rest, np.radians([10.0, 0.0]))
     np.testing.assert_allclose(model.lower, [np.radians(-30.0), -np.inf])
@@ -256,12 +258,16 @@ def test_joint_properties() -> None:
 
 
 def test_what_the_file_switches_off_is_off() -> None:
-    joint = '<joint axis="0 1 0" damping="0.3" stiffness="4" range="-30 60"/>'
-    flags = '<option><flag spring="disable" damper="disable" limit="disable"/></option>'
+    joint = '<joint axis="0 1 0" damping="0.3" stiffness="4" frictionloss="2" range="-30 60"/>'
+    flags = (
+        '<option><flag spring="disable" damper="disable" limit="disable" frictionloss="disable"/>'
+        "</option>"
+    )
     model = read_mjcf(one_body(joint, flags)).model
     assert model.damping[0] == 0.0
     assert model.stiffness[0] == 0.0
     assert model.upper[0] == np.inf
+    assert model.dry_friction[0] == 0.0
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "1e999", "1e300"])
@@ -275,7 +281,6 @@ def test_numbers_that_are_none_are_refused(number: str) -> None:
 @pytest.mark.parametrize(
     ("content", "more", "words"),
     [
-        ('<joint name="a" axis="0 1 0" frictionloss="1"/>', "", "dry friction"),
         (
             '<joint name="a" axis="0 1 0"/><joint name="b" axis="0 1 0" pos="1 0 0"/>',
             '<equality><joint joint1="a" joint2="b"/></equality>',

@@ -47,7 +47,7 @@ def biped(*names: tuple[str, str], **changes: object) -> Robot:
     return read_mjcf(biped_text(*names, **changes))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", builtin_robots())
+@pytest.mark.parametrize("name", [name for name in builtin_robots() if name != "rimless_wheel"])
 def test_built_in_robots_have_a_mirror(name: str) -> None:
     robot = load_robot(name)
     assert robot.mirror is not None
@@ -59,6 +59,10 @@ def test_built_in_robots_have_a_mirror(name: str) -> None:
         assert robot.contact_names[j] == swapped.replace("R", "right")
     np.testing.assert_array_equal(robot.mirror.foot, [1, 0])
     np.testing.assert_array_equal(robot.mirror.sign, 1.0)
+
+
+def test_a_wheel_has_no_sides() -> None:
+    assert load_robot("rimless_wheel").mirror is None
 
 
 @pytest.mark.parametrize(

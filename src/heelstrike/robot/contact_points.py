@@ -13,6 +13,7 @@ from heelstrike.robot.mujoco_file import MujocoFile
 from heelstrike.robot.warning import warn
 
 SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
+SMALLEST_RADIUS = 1e-9  # metres; a smaller sphere is a point, which MJCF cannot say otherwise
 ALIGNED = 1e-6  # sine of the angle within which a direction counts as that of y
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)  # MuJoCo's mjtGeom
@@ -45,7 +46,8 @@ class ContactPoint:
 def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     """Turn the geoms that can touch the ground into contact points, link by link, heel to toe.
 
-    A sphere, or a cylinder across the plane (a wheel), becomes a disc; a capsule becomes the discs
+    A sphere, or a cylinder across the plane (a wheel), becomes a disc, or a point if its radius is
+    below 1e-9 m; a capsule becomes the discs
     of its two ends; a box or a cylinder in the plane becomes the two ends of its sole, the
     lowest edge in the reference configuration. Its upper corners are left out: they meet flat
     ground only when the robot has fallen, and every contact point costs time in every step. Whoever
@@ -152,7 +154,8 @@ def _outline(
     across = np.hypot(*along) < ALIGNED
     in_plane = abs(turn[1, 2]) < ALIGNED
     if kind == SPHERE or (kind == CYLINDER and across):
-        return middle[None], float(size[0])
+        radius = float(size[0])
+        return middle[None], radius if radius > SMALLEST_RADIUS else 0.0
     if kind == CAPSULE:
         ends = np.array([middle - size[1] * along, middle + size[1] * along])
         return ends, float(size[0])

@@ -30,8 +30,9 @@ _ALIKE = (
     "armature",
     "damping",
     "stiffness",
+    "dry_friction",
 )
-_LABEL = {"center_of_mass": "centre of mass", "offset": "place"}
+_LABEL = {"center_of_mass": "centre of mass", "offset": "place", "dry_friction": "dry friction"}
 
 
 def find_mirror(

@@ -36,6 +36,9 @@ class Model(Bundle):
         Centre of mass in the link frame.
     armature, damping, stiffness, rest : (nv,) float
         Rotor inertia (kg m²), viscous damping (N m s), spring (N m) and its rest coordinate.
+    dry_friction : (nv,) float
+        Coulomb friction of the joint (N m; N of a slide): what it takes to move it at all, and what
+        opposes it as it moves.
     lower, upper : (nv,) float
         Range of the coordinate; infinite where there is no stop.
     gravity : (2,) float
@@ -66,6 +69,7 @@ class Model(Bundle):
     damping: Floats
     stiffness: Floats
     rest: Floats
+    dry_friction: Floats
     lower: Floats
     upper: Floats
     gravity: Floats

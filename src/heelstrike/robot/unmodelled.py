@@ -22,8 +22,6 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
     acting = {
         "equality constraints": model.neq > 0 and not file.disabled("equality"),
         "tendons": any(np.any(file.field(name)) for name in TENDON_FORCES),
-        "dry friction in joints (frictionloss)": _any(file, "dof_frictionloss")
-        and not file.disabled("frictionloss"),
         "nonlinear springs or dampers": _any(file, "jnt_stiffnesspoly")
         or _any(file, "dof_dampingpoly")
         or _any(file, "actuator_dampingpoly"),

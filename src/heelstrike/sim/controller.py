@@ -89,6 +89,7 @@ def example_model() -> Model:
         damping=floats,
         stiffness=floats,
         rest=floats,
+        dry_friction=floats,
         lower=floats,
         upper=floats,
         gravity=floats,

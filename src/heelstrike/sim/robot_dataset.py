@@ -26,6 +26,7 @@ _MODEL = {
     "damping": ("coordinate",),
     "stiffness": ("coordinate",),
     "rest": ("coordinate",),
+    "dry_friction": ("coordinate",),
     "lower": ("coordinate",),
     "upper": ("coordinate",),
     "gravity": ("xz",),
@@ -89,6 +90,10 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
     ValueError, KeyError
         If anything is missing, of the wrong shape, or points outside the robot.
     """
+    import xarray
+
+    if "dry_friction" not in dataset:  # the file of a time when robots had none
+        dataset = dataset.assign(dry_friction=xarray.zeros_like(dataset["damping"]))
     sizes = {
         "coordinate": dataset["parent"].size,
         "contact": dataset["contact_link"].size,
