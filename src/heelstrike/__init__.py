@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import SimulationError as SimulationError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
+    from heelstrike.gait import PiecewiseGait as PiecewiseGait
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
@@ -85,6 +86,7 @@ _HOME = {
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "InfeasibleGaitError": "heelstrike.errors",
+    "PiecewiseGait": "heelstrike.gait",
     "Robot": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
     "Run": "heelstrike.sim",
