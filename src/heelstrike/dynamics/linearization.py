@@ -90,10 +90,10 @@ def linearize(
     nothing = np.zeros(n + k)
     constant = np.array(equations(position, velocity, nothing, gamma)).ravel()
     system = np.array(derivatives(position, velocity, nothing, gamma)[0])
-    solution = np.linalg.lstsq(system, -constant, rcond=None)[0]
+    solution = _solved(system, -constant[:, None], n)[:, 0]
     slopes = [np.array(part) for part in derivatives(position, velocity, solution, gamma)]
     # Implicit differentiation: the equations stay satisfied.
-    rates = np.linalg.lstsq(system, -np.hstack(slopes[1:]), rcond=None)[0]
+    rates = _solved(system, -np.hstack(slopes[1:]), n)
     by_state, by_torque = rates[:, : 2 * n], rates[:, 2 * n :]
     upper = np.hstack([np.zeros((n, n)), np.eye(n)])
     return Linearization(
@@ -101,9 +101,21 @@ def linearize(
         B=np.vstack([np.zeros((n, robot.nu)), by_torque[:n]]),
         state_derivative=np.concatenate([velocity, solution[:n]]),
         contact_force=solution[n:].reshape(-1, 2),
-        contact_force_state=by_state[n:].reshape(-1, 2, 2 * n),
-        contact_force_torque=by_torque[n:].reshape(-1, 2, robot.nu),
+        contact_force_state=by_state[n:].reshape(len(held), 2, 2 * n),
+        contact_force_torque=by_torque[n:].reshape(len(held), 2, robot.nu),
     )
+
+
+def _solved(system: Floats, right: Floats, n: int) -> Floats:
+    """Solve for n accelerations, which are unique, and contact forces, the shortest there are.
+
+    Accelerations are scaled by the mass matrix's diagonal, so that light links count as heavy ones.
+    """
+    scale = np.ones(len(system))
+    scale[:n] = 1.0 / np.sqrt(np.diag(system)[:n])
+    scaled = scale[:, None] * system * scale
+    solution: Floats = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=1e-12)[0]
+    return scale[:, None] * solution
 
 
 @lru_cache(maxsize=32)
