@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
-from heelstrike.dynamics.queries import center_of_mass
+from heelstrike.dynamics import center_of_mass
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
