@@ -16,7 +16,7 @@ SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
 SMALLEST_RADIUS = 1e-9  # metres; a smaller sphere is a point, which MJCF cannot say otherwise
 ALIGNED = 1e-6  # sine of the angle within which a direction counts as that of y
 
-PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)  # MuJoCo's mjtGeom
+PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's mjtGeom
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     of its two ends; a box or a cylinder in the plane becomes the two ends of its sole, the
     lowest edge in the reference configuration. Its upper corners are left out: they meet flat
     ground only when the robot has fallen, and every contact point costs time in every step. Whoever
-    needs them adds spheres of radius 1e-6 there.
+    needs them adds spheres of radius 1e-6 there. A mesh is treated like a box, with a warning.
 
     Parameters
     ----------
@@ -67,15 +67,19 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     """
     points: list[ContactPoint] = []
     skipped: list[str] = []
+    meshes: list[str] = []
     model, pose = file.model, file.pose
     for geom in _geoms_that_touch(file, links):
         link = int(links.of_body[model.geom_bodyid[geom]])
-        shape = _outline(
-            int(model.geom_type[geom]),
-            model.geom_size[geom],
-            pose.geom_xpos[geom],
-            pose.geom_xmat[geom].reshape(3, 3),
-        )
+        turn = pose.geom_xmat[geom].reshape(3, 3)
+        if model.geom_type[geom] == MESH:
+            vertices = pose.geom_xpos[geom] + _vertices(file, geom) @ turn.T
+            shape: tuple[NDArray[np.float64], float] | None = (_sole(vertices[:, ::2]), 0.0)
+            meshes.append(f"{file.name('geom', geom)} of {links.names[link]}")
+        else:
+            shape = _outline(
+                int(model.geom_type[geom]), model.geom_size[geom], pose.geom_xpos[geom], turn
+            )
         if shape is None:
             skipped.append(file.name("geom", geom))
             continue
@@ -85,11 +89,25 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
             points.append(ContactPoint(link, float(x), float(z), radius, friction))
     if skipped:
         warn(
-            f"{file.source}: these geoms cannot touch the ground here, because their shape (mesh, "
-            f"ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
+            f"{file.source}: these geoms cannot touch the ground here, because their shape "
+            f"(ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
             "spheres, capsules or boxes where the robot meets the ground."
         )
+    if meshes:
+        warn(
+            f"{file.source}: these meshes touch the ground only at the two ends of their lowest "
+            f"edge: {', '.join(meshes)}. Where that is not the sole, replace them by boxes, "
+            "capsules or spheres."
+        )
     return in_order(points)
+
+
+def _vertices(file: MujocoFile, geom: int) -> NDArray[np.float64]:
+    """Corners of a mesh, in the frame of its geom, (n, 3)."""
+    model = file.model
+    mesh = model.geom_dataid[geom]
+    first = model.mesh_vertadr[mesh]
+    return np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
 
 
 def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:

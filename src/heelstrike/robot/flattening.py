@@ -57,7 +57,7 @@ def mend_planar_root(spec: Any) -> None:
     """Give the root that URDF's planar joint holds in x–z the coordinates x, z and pitch."""
     for body in spec.worldbody.bodies:
         if _is_planar(body):
-            turn = _turn(body)
+            turn = _turn(spec, body)
             normal = turn @ np.asarray(body.joints[2].axis)
             if np.hypot(normal[0], normal[2]) < IN_PLANE * np.linalg.norm(normal):
                 _put_on_planar_root(spec, body)
@@ -94,7 +94,7 @@ def project(spec: Any, label: str) -> None:
         for joint in spec.joints
         if joint.type in (FREE, BALL) or _leaves_plane(int(joint.type), data.xaxis[joint.id])
     ]
-    if len(locked) == len(spec.joints):
+    if locked and all(joint in locked or joint.name in ROOT for joint in spec.joints):
         raise RobotError(
             f"{label}: no joint of this robot moves in the x–z plane, so there is nothing to "
             "project. Turn it so that it walks along x, with its pitch joints about y."
@@ -161,7 +161,7 @@ def _is_planar(body: Any) -> bool:
 def _put_on_planar_root(spec: Any, body: Any) -> None:
     import mujoco
 
-    turn, (x, _, z) = _turn(body), body.pos
+    turn, (x, _, z) = _turn(spec, body), body.pos
     for joint in list(body.joints):
         spec.delete(joint)
     slide, hinge = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE
@@ -179,12 +179,17 @@ def _put_on_planar_root(spec: Any, body: Any) -> None:
         added.limited = mujoco.mjtLimited.mjLIMITED_FALSE
 
 
-def _turn(body: Any) -> NDArray[np.float64]:
+def _turn(spec: Any, body: Any) -> NDArray[np.float64]:
     """World axes of a body that hangs on the world, as columns."""
     import mujoco
 
     matrix = np.zeros(9)
     quaternion = np.array(body.quat, dtype=np.float64)
+    if body.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:  # given by angles or axes
+        compiler = spec.compiler
+        quaternion[:] = mujoco.MjSpec.resolve_orientation(
+            degree=bool(compiler.degree), sequence=compiler.eulerseq, orientation=body.alt
+        )
     mujoco.mju_normalize4(quaternion)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)
