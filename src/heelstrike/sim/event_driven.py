@@ -108,6 +108,8 @@ NUDGE = 1e-10
 JUMP = 1e-7
 # An event is followed by another in the same instant when less than this (s) lies between.
 INSTANT = 1e-10
+# Mark of a point that touches the ground without force or speed, until it is known what happens.
+UNPRESSED = 2
 # So many in a row are switched by what fired; so many end the run.
 INSISTENT = 8
 TOO_MANY = 100
@@ -465,20 +467,17 @@ def find_what_happened(
                 phase.slide[contact] = 0
                 if abs(tangent) > rest:
                     phase.slide[contact] = 1 if tangent > 0.0 else -1
+            elif gap <= TOGETHER and normal <= rest:
+                phase.hit[contact] = UNPRESSED
         elif second and phase.slide[contact] != 0:
             for other in range(phase.closed.shape[0]):
                 if phase.group[other] == phase.group[contact]:
                     phase.slide[other] = 0
         elif first or second:
             forced = True
-    if impact:
-        for contact in range(phase.closed.shape[0]):
-            if phase.closed[contact] == 1 or phase.passing[contact] == 1:
-                continue
-            gap = gap_now(contact, contacts, phase, phase.begin)
-            normal, _ = gap_velocity(contact, model, contacts, memory.tree, phase, phase.begin)
-            if gap <= TOGETHER and normal <= rest:
-                phase.hit[contact] = 1
+    for contact in range(phase.closed.shape[0]):
+        if phase.hit[contact] == UNPRESSED:
+            phase.hit[contact] = 1 if impact else 0
     return impact, forced and not impact
 
 

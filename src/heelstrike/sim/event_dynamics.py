@@ -25,9 +25,9 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, locate_contacts
+from heelstrike.sim.contact_geometry import assemble_delassus, contact_velocity, locate_contacts
 from heelstrike.sim.controller import Contacts
-from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows, gap_velocity
+from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
 
@@ -189,12 +189,22 @@ def watch_geometry(
 
     That of a point that is let pass below the ground is its depth.
     """
-    for contact in range(phase.closed.shape[0]):
-        normal, tangent = gap_velocity(contact, model, contacts, tree, phase, state)
+    nv = state.shape[0] // 2
+    points = contacts.gap.shape[0]
+    for stop in range(phase.stop_joint.shape[0]):
+        if phase.closed[points + stop] == 0:
+            joint = phase.stop_joint[stop]
+            side = phase.stop_side[stop]
+            phase.value[2 * (points + stop)] = side * (state[joint] - phase.stop_limit[stop])
+            phase.rate[2 * (points + stop)] = side * state[nv + joint]
+    for contact in range(points):
+        normal, tangent = contact_velocity(
+            model.contact_link[contact], contacts.position[contact], contacts.normal[contact], tree
+        )
         phase.value[2 * contact + 1] = 1.0
         if phase.closed[contact] == 0:
             side = 1.0 - 2.0 * phase.passing[contact]
-            phase.value[2 * contact] = side * gap_now(contact, contacts, phase, state)
+            phase.value[2 * contact] = side * contacts.gap[contact]
             phase.rate[2 * contact] = side * normal
         elif phase.slide[contact] != 0 and phase.group[contact] == contact:
             phase.value[2 * contact + 1] = phase.slide[contact] * tangent

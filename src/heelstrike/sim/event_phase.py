@@ -94,7 +94,7 @@ class Phase(Bundle):
     value, rate, end_value, end_rate : (2 nc,) float
     before, before_rate, sample, sample_rate : (2 nc,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
-        the step, at the sample before, at this one.
+        the step, at the sample before, at this one. Of a joint stop the second is always 1.
     fired : (2 nc,) int
         Event functions that ended the step.
     scratch : (2, 3) float
@@ -189,7 +189,7 @@ def allocate_phase(robot: Robot) -> Phase:
         system=np.zeros((2 * nc, 2 * nc + 1)),
         unknown=np.zeros(2 * nc),
         column=integers(2 * nc),
-        value=np.zeros(2 * nc),
+        value=np.ones(2 * nc),
         rate=np.zeros(2 * nc),
         end_value=np.zeros(2 * nc),
         end_rate=np.zeros(2 * nc),
