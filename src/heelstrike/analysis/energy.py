@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.actuation import actuator_power
 from heelstrike.analysis.intervals import event_impulse, impulses_in_events, mean_over_intervals
 from heelstrike.analysis.motion import motion, run_motion
+from heelstrike.dynamics import point_jacobian
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -33,6 +34,8 @@ class EnergyBalance:
         Work of the ground: impacts and sliding friction. An exact contact never adds energy.
     stops : (nt,) float
         Work of the joint stops, of which the same is true.
+    pushes : (nt,) float
+        Work of the pushes.
     """
 
     time: Floats
@@ -42,6 +45,7 @@ class EnergyBalance:
     dampers: Floats
     contacts: Floats
     stops: Floats
+    pushes: Floats
 
     @property
     def total(self) -> Floats:
@@ -52,7 +56,8 @@ class EnergyBalance:
     def residual(self) -> Floats:
         """Change of energy that no work explains, (nt,), in J: the error of the time method."""
         gained = self.total - self.total[:1]
-        return gained - self.actuators - self.dampers - self.contacts - self.stops
+        known = self.actuators + self.dampers + self.contacts + self.stops + self.pushes
+        return gained - known
 
 
 def energy_balance(run: Run) -> EnergyBalance:
@@ -89,4 +94,23 @@ def energy_balance(run: Run) -> EnergyBalance:
         dampers=summed(damper_power * held),
         contacts=summed(contact_work),
         stops=summed((mean_over_intervals(run, run.stop_torque) * mean).sum(axis=1) * held),
+        pushes=summed(_push_work(run, mean)),
     )
+
+
+def _push_work(run: Run, mean: Floats) -> Floats:
+    """Work of the pushes between the rows, (nt − 1,), in J; `mean` are the mean velocities."""
+    robot = run.robot
+    work = np.zeros(len(mean))
+    for push in run.pushes:
+        link, point = push.place(robot)
+        acting = push.time_within(run.time[:-1], run.time[1:])
+        for row in np.flatnonzero(acting):
+            before = point_jacobian(robot, run.position[row], link, point)[:2]
+            if impulses_in_events(run):
+                after = point_jacobian(robot, run.position[row + 1], link, point)[:2]
+                moved = 0.5 * (before @ run.velocity[row] + after @ run.velocity[row + 1])
+            else:
+                moved = before @ mean[row]
+            work[row] += acting[row] * np.dot(push.force, moved)
+    return work

@@ -30,6 +30,7 @@ from heelstrike.sim.controller import Contacts
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
+from heelstrike.sim.push import add_pushes
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
@@ -241,12 +242,13 @@ def watch_forces(
 
 @kernel
 def free_acceleration(model: Model, memory: Memory, state: Floats) -> None:
-    """Acceleration without contact, A⁻¹ (B Γ + passive − H), into ``memory.rate``."""
+    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``memory.rate``."""
     nv = model.parent.shape[0]
     mass_matrix(model, memory.tree, memory.mass_matrix)
     factorize(model, memory.mass_matrix, memory.factor)
     bias_force(model, memory.tree, memory.rate)
     passive_force(model, state[:nv], state[nv:], memory.force)
+    add_pushes(model, memory.tree, memory.pushes, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     for i in range(nv):

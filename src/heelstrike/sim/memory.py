@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.push import Push, Pushes, pushes_on
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -82,6 +84,8 @@ class Memory(Bundle):
         Residuals of the certificate of the last solve.
     solver : ContactWorkspace
         Memory of the contact solvers.
+    pushes : Pushes
+        Forces from outside.
     tally : (3,) int
     extreme : (4,) float
         Counts and worst values of the run; their places are module constants.
@@ -120,11 +124,12 @@ class Memory(Bundle):
     problem_mode: Integers
     residual: Floats
     solver: ContactWorkspace
+    pushes: Pushes
     tally: Integers
     extreme: Floats
 
 
-def allocate_memory(robot: Robot) -> Memory:
+def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nv, nu, nc = robot.nv, robot.nu, robot.nc
     stops = np.isfinite(robot.model.lower).sum() + np.isfinite(robot.model.upper).sum()
@@ -163,6 +168,7 @@ def allocate_memory(robot: Robot) -> Memory:
         problem_mode=np.zeros(capacity, dtype=np.int64),
         residual=np.zeros(3),
         solver=contact_workspace(max(capacity, 1)),
+        pushes=pushes_on(robot, pushes),
         tally=np.zeros(TALLIES, dtype=np.int64),
         extreme=np.zeros(EXTREMES),
     )

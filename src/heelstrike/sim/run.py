@@ -14,6 +14,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.engine import Method
+from heelstrike.sim.push import Push
 from heelstrike.sim.status import EventKind, RunStatus
 
 if TYPE_CHECKING:
@@ -143,6 +144,8 @@ class Run:
     timing : Timing
     error : Exception or None
         What the controller raised, if that ended the run.
+    pushes : tuple of Push
+        What pushed the robot.
     """
 
     robot: Robot
@@ -168,6 +171,7 @@ class Run:
     saturations: int
     timing: Timing
     error: Exception | None = field(default=None, repr=False)
+    pushes: tuple[Push, ...] = ()
 
     @property
     def completed(self) -> bool:
