@@ -50,8 +50,9 @@ class Options:
     @property
     def label(self) -> str:
         """Name in tables and figures."""
-        ground = "default contacts" if self.stiff is None else "stiff contacts"
-        return f"MuJoCo {self.integrator}, {ground}"
+        if self.stiff is None:
+            return f"MuJoCo {self.integrator}, default contacts"
+        return f"MuJoCo {self.integrator}, contacts stiff to {self.stiff:g} steps"
 
 
 class MuJoCoPeer:
@@ -135,12 +136,10 @@ class MuJoCoPeer:
 
         return work
 
-    @property
-    def final(self) -> State:
-        """Where it ended."""
-        nq, nv = self.model.nq, self.model.nv
-        last = self._states[0, -1]
-        return State(last[1 : 1 + nq], last[1 + nq : 1 + nq + nv])
+    def final_position(self) -> Floats:
+        """Generalised positions at the end of the last run, (nq,)."""
+        position: Floats = self._states[0, -1, 1 : 1 + self.model.nq].copy()
+        return position
 
     def check(self) -> dict[str, float]:
         """Step through once, looking at contacts and forces.

@@ -69,7 +69,7 @@ def _start(robot: Robot) -> State:
     if robot.nc == 0 and robot.nv != 3:
         q += 0.3
     elif robot.nc:
-        v[0] = 2.0  # it slides to the end
+        v[0] = 4.0  # it slides to the end
     return State(q, v)
 
 
