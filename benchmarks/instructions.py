@@ -49,7 +49,7 @@ void end(const char *name) { CALLGRIND_DUMP_STATS_AT(name); CALLGRIND_STOP_INSTR
 
 
 def scenarios() -> dict[str, Any]:
-    """Scenarios by name; each is (robot name, state, controller, first step, counted steps)."""
+    """Scenarios by name: what to simulate, steps to let pass, and steps to count."""
     from heelstrike.experiments.benchmark.scenarios import falling, standing, walking
 
     walk = walking()
@@ -123,7 +123,7 @@ def count(folder: Path, switch: Any) -> None:
         ) -> None:
             loop.engine.pause_after(steps)
             if loop.engine.advance(kernel, parameters, memory, loop.records[-1]) != PAUSED:
-                raise RuntimeError(f"{name}: the run ended early")
+                raise RuntimeError(f"the run ended early at t = {loop.engine.time} s")
 
         advance(int(given["first"]))
         for label, steps in (("call", 0), ("steps", int(given["count"]))):
