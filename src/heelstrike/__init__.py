@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
     from heelstrike.robot import human as human
+    from heelstrike.robot import inspect_robot as inspect_robot
     from heelstrike.robot import load_robot as load_robot
     from heelstrike.sim import Compliant as Compliant
     from heelstrike.sim import EventDriven as EventDriven
@@ -91,6 +92,7 @@ _HOME = {
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "human": "heelstrike.robot",
+    "inspect_robot": "heelstrike.robot",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",

@@ -23,6 +23,7 @@ def read_mjcf(
     name: str | None = None,
     floating: bool = False,
     projected: bool = False,
+    lenient: bool = False,
 ) -> Robot:
     """Read a planar robot from an MJCF or URDF file, or from a string that holds one.
 
@@ -42,6 +43,8 @@ def read_mjcf(
     projected : bool
         Lock the joints that leave the x–z plane, where a symmetric robot of three dimensions is
         meant to move in it.
+    lenient : bool
+        Let impossible masses and inertias pass, to look at the robot; see `inspect_robot`.
 
     Raises
     ------
@@ -53,7 +56,7 @@ def read_mjcf(
     RobotWarning
         If the file says something that is not simulated, or left and right differ.
     """
-    file = parse(source, floating=floating, projected=projected)
+    file = parse(source, floating=floating, projected=projected, lenient=lenient)
     model = file.model
     links = read_links(file)
     warn_of_unmodelled(file)

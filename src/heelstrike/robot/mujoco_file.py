@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from heelstrike.errors import RobotError
 from heelstrike.robot.flattening import float_in_plane, project
 from heelstrike.robot.screening import screen
-from heelstrike.robot.urdf import prepare_urdf, urdf_text
+from heelstrike.robot.urdf import let_massless_links_pass, prepare_urdf, urdf_text
 from heelstrike.robot.warning import warn
 
 
@@ -72,7 +73,13 @@ class MujocoFile:
         return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
 
 
-def parse(source: Path | str, *, floating: bool = False, projected: bool = False) -> MujocoFile:
+def parse(
+    source: Path | str,
+    *,
+    floating: bool = False,
+    projected: bool = False,
+    lenient: bool = False,
+) -> MujocoFile:
     """Parse an MJCF or URDF file, or a string that holds one.
 
     Parameters
@@ -83,6 +90,9 @@ def parse(source: Path | str, *, floating: bool = False, projected: bool = False
         Whether the body that the file fixes to the world (or leaves free) floats in the plane.
     projected : bool
         Whether joints that leave the x–z plane are locked.
+    lenient : bool
+        Whether masses and inertias that no body can have pass, mended as MuJoCo mends them. For
+        looking at the file, not for simulating the robot.
 
     Raises
     ------
@@ -97,13 +107,16 @@ def parse(source: Path | str, *, floating: bool = False, projected: bool = False
     try:
         with _warnings_into(remarks):
             urdf = xml is not None and xml.tag == "robot"
-            if urdf or floating or projected:
+            if urdf or floating or projected or lenient:
                 spec = _parsed(source, xml, label)
+                if lenient:
+                    spec.compiler.balanceinertia = True
+                    let_massless_links_pass(spec)
                 if floating:
                     float_in_plane(spec, label)
                 if projected:
                     project(spec, label)
-                model = spec.compile()
+                model = compiled(spec, remarks)
             elif isinstance(source, Path):
                 model = mujoco.MjModel.from_xml_path(str(source))
             else:
@@ -118,6 +131,49 @@ def parse(source: Path | str, *, floating: bool = False, projected: bool = False
     for remark in remarks:
         warn(f"{label}: {remark}")
     return MujocoFile(model, pose, xml, label)
+
+
+def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
+    """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
+
+    Bodies that do not move, and those that leave their inertia to their geoms, are not among them.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read.
+    """
+    import mujoco
+
+    label = str(path)
+    xml = screen(path, label)
+    try:
+        with _warnings_into([]), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            spec = _parsed(path, xml, label)
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise RobotError(f"{label}: MuJoCo's parser cannot read this robot: {error}") from error
+    result = []
+    for body in spec.bodies:
+        if not body.explicitinertial or body.id == 0:
+            continue
+        full = np.array(body.fullinertia, dtype=np.float64)
+        if np.isnan(full[0]):  # given by its principal moments
+            tensor = np.diag(np.array(body.inertia, dtype=np.float64))
+        else:
+            xx, yy, zz, xy, xz, yz = full
+            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        result.append((body.name, float(body.mass), tensor))
+    return result
+
+
+def compiled(spec: Any, remarks: list[str]) -> Any:
+    """Compile a parsed file; what MuJoCo warns of goes to `remarks`."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model = spec.compile()
+    remarks += [str(one.message) for one in caught]
+    return model
 
 
 def _parsed(source: Path | str, xml: Element | None, label: str) -> Any:

@@ -45,9 +45,10 @@ def _warn_of_fixed_root(file: MujocoFile) -> None:
     if file.xml is None or not file.is_urdf:
         return
     children = {child.get("link") for child in file.xml.iterfind("joint/child")}
+    moving = {file.name("body", int(body)) for body in file.model.jnt_bodyid}
     for link in file.xml.iterfind("link"):
         mass = link.find("inertial/mass")
-        if link.get("name") not in children and mass is not None:
+        if link.get("name") not in children | moving and mass is not None:
             warn(
                 f"{file.source}: link {link.get('name')!r} is fixed to the world, for no joint "
                 "moves it. If the robot floats, load it with floating=True, or put it on a link "

@@ -257,7 +257,7 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         If the file cannot be written.
     """
     model = robot.model
-    q = _legs_apart(robot)
+    q = legs_apart(robot)
     poses = link_poses(robot, q)
     if robot.floating and robot.nc:  # stand on z = 0
         q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
@@ -304,7 +304,7 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         return save_figure(figure, path)
 
 
-def _legs_apart(robot: Robot) -> Floats:
+def legs_apart(robot: Robot) -> Floats:
     """Reference configuration with mirrored legs spread, so that both are seen, feet level."""
     model = robot.model
     q = model.reference.copy()
