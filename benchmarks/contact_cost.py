@@ -21,7 +21,7 @@ from heelstrike.compilation import kernel
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.workspace import SHORTCUTS, contact_workspace
-from heelstrike.dynamics.queries import bias_force, mass_matrix, point_jacobian
+from heelstrike.dynamics import bias_force, mass_matrix, point_jacobian
 
 
 @kernel

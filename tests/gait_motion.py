@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heelstrike.dynamics import queries
+from heelstrike import dynamics
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
 
@@ -45,7 +45,7 @@ def middle(robot: Robot, foot: int) -> np.ndarray:
 
 def place(robot: Robot, q: np.ndarray, foot: int) -> np.ndarray:
     """World position of the middle of a sole."""
-    poses = queries.link_poses(robot, q)
+    poses = dynamics.link_poses(robot, q)
     link = robot.feet[foot].link
     c, s = np.cos(poses.angle[link]), np.sin(poses.angle[link])
     x, z = middle(robot, foot)
@@ -56,14 +56,14 @@ def standing(robot: Robot, joints: np.ndarray, foot: int) -> np.ndarray:
     """Position with a foot flat and the middle of its sole at the origin."""
     q = robot.model.reference.copy()
     q[robot.model.actuator_joint] = joints
-    q[2] -= queries.link_poses(robot, q).angle[robot.feet[foot].link]
+    q[2] -= dynamics.link_poses(robot, q).angle[robot.feet[foot].link]
     q[:2] -= place(robot, q, foot)
     return q
 
 
 def foot_jacobian(robot: Robot, q: np.ndarray, foot: int) -> np.ndarray:
     """Jacobian of the middle of a sole, (3, nv)."""
-    return queries.point_jacobian(robot, q, robot.feet[foot].link, middle(robot, foot))
+    return dynamics.point_jacobian(robot, q, robot.feet[foot].link, middle(robot, foot))
 
 
 def instant(robot: Robot, gait: Gait, t: float, *, end: bool = False) -> Instant:
@@ -87,10 +87,10 @@ def instant(robot: Robot, gait: Gait, t: float, *, end: bool = False) -> Instant
         return full
 
     v = completed(joints[1], np.zeros(3))
-    drift = queries.point_bias_acceleration(robot, q, v, robot.feet[foot].link, middle(robot, foot))
+    drift = dynamics.point_bias_acceleration(robot, q, v, robot.feet[foot].link, middle(robot, foot))
     acceleration = completed(joints[2], -drift)
-    force = queries.inverse_dynamics(robot, q, v, acceleration)
-    force -= queries.passive_force(robot, q, v)
+    force = dynamics.inverse_dynamics(robot, q, v, acceleration)
+    force -= dynamics.passive_force(robot, q, v)
     solution = np.linalg.solve(np.hstack([selection(robot), jacobian.T]), force)
     return Instant(q, v, acceleration, solution[: robot.nu], solution[robot.nu :])
 
@@ -98,7 +98,7 @@ def instant(robot: Robot, gait: Gait, t: float, *, end: bool = False) -> Instant
 def contact_heights(robot: Robot, q: np.ndarray, foot: int) -> np.ndarray:
     """Heights of the lowest points of the contact discs of a foot."""
     contacts = list(robot.feet[foot].contacts)
-    return queries.contact_positions(robot, q)[contacts, 1] - robot.model.contact_radius[contacts]
+    return dynamics.contact_positions(robot, q)[contacts, 1] - robot.model.contact_radius[contacts]
 
 
 def contact_rates(robot: Robot, q: np.ndarray, v: np.ndarray, foot: int) -> np.ndarray:
@@ -106,7 +106,7 @@ def contact_rates(robot: Robot, q: np.ndarray, v: np.ndarray, foot: int) -> np.n
     link = robot.feet[foot].link
     return np.array(
         [
-            queries.point_jacobian(robot, q, link, robot.model.contact_position[i])[1] @ v
+            dynamics.point_jacobian(robot, q, link, robot.model.contact_position[i])[1] @ v
             for i in robot.feet[foot].contacts
         ]
     )

@@ -121,12 +121,12 @@ def compass_gait(gravity: float = 9.8) -> Robot:
     """
     tiny = "1e-12 1e-12 1e-12"
     legs = "".join(
-        f"""<body name="{name}">
-          <joint name="{name}" type="hinge" axis="0 1 0"/>
+        f"""<body name="{side}_leg">
+          <joint name="{side}_hip" type="hinge" axis="0 1 0"/>
           <inertial pos="0 0 -0.5" mass="5" diaginertia="{tiny}"/>
           <geom type="sphere" size="1e-12" pos="0 0 -1"/>
         </body>"""
-        for name in ("leg_a", "leg_b")
+        for side in ("left", "right")
     )
     return _robot(
         "compass_gait",

@@ -26,7 +26,13 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
+    from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
+    from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
+    from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
+    from heelstrike.contact import contact_kinematics as contact_kinematics
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import ComputedTorque as ComputedTorque
@@ -36,11 +42,13 @@ if TYPE_CHECKING:
     from heelstrike.errors import GaitError as GaitError
     from heelstrike.errors import HeelstrikeError as HeelstrikeError
     from heelstrike.errors import InfeasibleGaitError as InfeasibleGaitError
+    from heelstrike.errors import LimitCycleError as LimitCycleError
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
+    from heelstrike.gait import PiecewiseGait as PiecewiseGait
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
@@ -66,31 +74,39 @@ __version__ = "0.1.0"
 # Public name -> the package that defines it. The imports above repeat this for type checkers,
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
-    "compare": "heelstrike.experiments.comparison",
-    "builtin_robots": "heelstrike.robot",
-    "RobotWarning": "heelstrike.robot",
-    "Encoder": "heelstrike.control",
-    "Scheme": "heelstrike.sim",
-    "KelvinVoigt": "heelstrike.sim",
-    "HuntCrossley": "heelstrike.sim",
-    "EventDriven": "heelstrike.sim",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
+    "Encoder": "heelstrike.control",
+    "EventDriven": "heelstrike.sim",
+    "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
+    "HuntCrossley": "heelstrike.sim",
     "InfeasibleGaitError": "heelstrike.errors",
+    "KelvinVoigt": "heelstrike.sim",
+    "LimitCycle": "heelstrike.analysis.limit_cycle",
+    "LimitCycleError": "heelstrike.errors",
+    "PiecewiseGait": "heelstrike.gait",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
+    "RobotWarning": "heelstrike.robot",
     "Run": "heelstrike.sim",
     "RunFileError": "heelstrike.errors",
+    "Scheme": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "builtin_robots": "heelstrike.robot",
+    "compare": "heelstrike.experiments.comparison",
+    "contact_forward_dynamics": "heelstrike.contact",
+    "contact_inverse_dynamics": "heelstrike.contact",
+    "contact_kinematics": "heelstrike.contact",
+    "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "human": "heelstrike.robot",
     "inspect_robot": "heelstrike.robot",
     "load_gait": "heelstrike.gait",

@@ -8,6 +8,7 @@ compiled code as in Python.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any, dataclass_transform
@@ -112,7 +113,8 @@ class BundleType(types.Type):
     def __init__(self, name: str, members: tuple[tuple[str, Any], ...]) -> None:
         self.members = dict(members)
         described = ", ".join(f"{member}: {kind}" for member, kind in members)
-        super().__init__(name=f"{name}({described})")
+        # The name goes into every symbol of the machine code: short, but never that of another.
+        super().__init__(name=f"{name}_{hashlib.sha256(described.encode()).hexdigest()[:12]}")
 
     def place(self, name: str) -> int:
         """Where in the table a member begins."""

@@ -31,5 +31,9 @@ class SimulationError(HeelstrikeError, ValueError):
     """The arguments of a simulation are not usable (before anything is simulated)."""
 
 
+class LimitCycleError(HeelstrikeError, RuntimeError):
+    """No limit cycle was found: the robot does not walk on, or its steps do not converge."""
+
+
 class RunFileError(HeelstrikeError, ValueError):
     """A saved run cannot be read."""

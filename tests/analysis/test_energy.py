@@ -128,3 +128,37 @@ def test_walk() -> None:
     finer = energy_balance(walking.walk(steps=4, step=5e-4))
     ratio = np.abs(balance.residual).max() / np.abs(finer.residual).max()
     assert ratio == pytest.approx(2.0, abs=0.2)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.6])
+def test_impacts_between_events_take_their_energy(restitution: float) -> None:
+    """A falling box loses (1 − e²) of its energy at the first impact, which is in an event."""
+    robot = box(height=0.05 + 0.2)
+    fall = np.sqrt(2.0 * 0.2 / G)
+    run = hs.simulate(
+        robot,
+        state=robot.reference_state(),
+        duration=1.2 * fall,
+        method=hs.EventDriven(),
+        ground=hs.Ground(restitution=restitution),
+        stop_when_fallen=False,
+    )
+    balance = energy_balance(run)
+    lost = (1.0 - restitution**2) * 2.0 * G * 0.2
+    assert balance.contacts[-1] == pytest.approx(-lost, rel=1e-8)
+    np.testing.assert_allclose(balance.residual, 0.0, atol=1e-8)
+
+
+def test_event_driven_walk_balances() -> None:
+    """Motors put in what impacts take out; the trapezium over 1 ms is the only error."""
+    run = hs.simulate(
+        walking.bravo7(),
+        hs.ComputedTorque(walking.bravo7(), walking.gait()),
+        state=walking.gait().initial_state,
+        duration=1.5,
+        method=hs.EventDriven(),
+    )
+    balance = energy_balance(run)
+    assert balance.contacts[-1] < -1.0
+    assert np.all(np.diff(balance.contacts) <= 1e-9)
+    np.testing.assert_allclose(balance.residual, 0.0, atol=2e-3)

@@ -39,6 +39,6 @@ def test_tree_factor_has_no_fill_in() -> None:
     factor = np.zeros_like(matrix)
     kernels.factorize(robot.model, matrix, factor)
     unit = np.tril(factor, -1) + np.eye(robot.nv)
-    np.testing.assert_allclose(unit.T @ np.diag(np.diag(factor)) @ unit, matrix, atol=1e-12)
+    np.testing.assert_allclose(unit.T @ np.diag(1.0 / np.diag(factor)) @ unit, matrix, atol=1e-12)
     # The legs do not know of each other.
     assert np.all(factor[6:, 3:6] == 0.0)

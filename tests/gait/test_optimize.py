@@ -20,7 +20,7 @@ from gait_motion import (
 from robot_cases import builtin_xml
 
 import heelstrike as hs
-from heelstrike.dynamics import queries
+from heelstrike import dynamics
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait import ClearanceProfile
 from heelstrike.gait.program import lobatto
@@ -140,7 +140,7 @@ def test_the_impact_gives_the_next_steps_velocity(walked: Walked) -> None:
     """Eq. 22 in closed form, mirrored, is the velocity at which the step began."""
     robot, gait, q, v = walked.robot, walked.gait, walked.last.q, walked.last.v
     jacobian = foot_jacobian(robot, q, 1)
-    inverse = np.linalg.inv(queries.mass_matrix(robot, q))
+    inverse = np.linalg.inv(dynamics.mass_matrix(robot, q))
     impulse = -np.linalg.solve(jacobian @ inverse @ jacobian.T, jacobian @ v)
     after = v + inverse @ jacobian.T @ impulse
     mirror = robot.mirror
@@ -172,10 +172,10 @@ def test_the_contact_problem_agrees_that_the_rear_foot_lifts(
     last = instant(bravo7, gait, gait.step_duration, end=True)
     rows = []
     for link, local in zip(bravo7.model.contact_link, bravo7.model.contact_position, strict=True):
-        x_row, z_row, _ = queries.point_jacobian(bravo7, last.q, int(link), local)
+        x_row, z_row, _ = dynamics.point_jacobian(bravo7, last.q, int(link), local)
         rows += [z_row, x_row]
     jacobian = np.array(rows)
-    inverse = np.linalg.inv(queries.mass_matrix(bravo7, last.q))
+    inverse = np.linalg.inv(dynamics.mass_matrix(bravo7, last.q))
     solved = hs.solve_contact(jacobian @ inverse @ jacobian.T, jacobian @ last.v, gait.friction)
     impulse = solved.impulse
     np.testing.assert_allclose(impulse[:2], 0.0, atol=1e-8)

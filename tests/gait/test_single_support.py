@@ -10,7 +10,7 @@ import pytest
 from gait_motion import contact_rates, foot_jacobian, place, selection, standing
 
 import heelstrike as hs
-from heelstrike.dynamics import queries
+from heelstrike import dynamics
 from heelstrike.dynamics.symbolic import expression, symbols
 from heelstrike.gait.impact import Impact
 from heelstrike.gait.single_support import SingleSupport
@@ -77,12 +77,12 @@ def test_torques_and_wrench_satisfy_the_equations_of_motion(robot: hs.Robot, see
     found = evaluated(robot, *motion)
     jacobian = foot_jacobian(robot, found.q, 0)
     force = selection(robot) @ found.torque + jacobian.T @ found.wrench
-    force += queries.passive_force(robot, found.q, found.v)
-    acceleration = queries.forward_dynamics(robot, found.q, found.v, force)
+    force += dynamics.passive_force(robot, found.q, found.v)
+    acceleration = dynamics.forward_dynamics(robot, found.q, found.v, force)
     scale = np.abs(acceleration).max()
     np.testing.assert_allclose(acceleration[3:], motion[2], atol=1e-10 * scale)
     link, point = robot.feet[0].link, sole(robot, 0).point
-    drift = queries.point_bias_acceleration(robot, found.q, found.v, link, point)
+    drift = dynamics.point_bias_acceleration(robot, found.q, found.v, link, point)
     np.testing.assert_allclose(jacobian @ acceleration, -drift, atol=1e-10 * scale)
 
 
@@ -92,7 +92,7 @@ def test_the_momentum_balance_of_the_impact(robot: hs.Robot, seed: int) -> None:
     found = evaluated(robot, *random_motion(robot, seed))
     jacobian = foot_jacobian(robot, found.q, 1)
     np.testing.assert_allclose(jacobian @ found.after, 0.0, atol=1e-12)
-    momentum = queries.mass_matrix(robot, found.q) @ (found.after - found.v)
+    momentum = dynamics.mass_matrix(robot, found.q) @ (found.after - found.v)
     exerted = jacobian.T @ found.impulse + selection(robot) @ found.joint_impulse
     np.testing.assert_allclose(momentum, exerted, atol=1e-11 * np.abs(momentum).max())
 
@@ -103,7 +103,7 @@ def test_without_joint_impulses_it_is_the_plastic_impact(robot: hs.Robot, seed: 
     position, velocity, acceleration, _ = random_motion(robot, seed)
     before = evaluated(robot, position, velocity, acceleration, velocity)
     jacobian = foot_jacobian(robot, before.q, 1)
-    inverse = np.linalg.inv(queries.mass_matrix(robot, before.q))
+    inverse = np.linalg.inv(dynamics.mass_matrix(robot, before.q))
     delassus = jacobian @ inverse @ jacobian.T
     impulse = -np.linalg.solve(delassus, jacobian @ before.v)
     after = before.v + inverse @ jacobian.T @ impulse
@@ -111,7 +111,7 @@ def test_without_joint_impulses_it_is_the_plastic_impact(robot: hs.Robot, seed: 
     np.testing.assert_allclose(found.after, after, atol=1e-10 * np.abs(after).max())
     np.testing.assert_allclose(found.impulse, impulse, atol=1e-10 * np.abs(impulse).max())
     np.testing.assert_allclose(found.joint_impulse, 0.0, atol=1e-10 * np.abs(impulse).max())
-    mass = queries.mass_matrix(robot, before.q)
+    mass = dynamics.mass_matrix(robot, before.q)
     lost = before.v @ mass @ before.v - after @ mass @ after
     # What is lost is the energy of the difference (a projection in the metric of A): never a gain.
     difference = before.v - after

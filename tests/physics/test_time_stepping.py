@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mechanisms
 import numpy as np
 import pytest
 
@@ -141,6 +142,124 @@ def test_disc_rolls_down_a_slope() -> None:
     # Friction along the slope: ⅓ m g sin θ, uphill.
     force = run.contact_force[500].sum(axis=0)
     assert abs(force[1]) == pytest.approx(3.0 * G * np.sin(angle) / 3.0, rel=1e-6)
+
+
+STEPS = np.array([2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4])
+
+
+def order(errors: list[float]) -> float:
+    """Slope of the errors at `STEPS`: where in a step an impact falls makes single ones jump."""
+    return float(np.polyfit(np.log(STEPS), np.log(errors), 1)[0])
+
+
+def touchdowns(run: hs.Run) -> list[float]:
+    return [event.time for event in run.events if event.kind is EventKind.TOUCHDOWN]
+
+
+def test_bounces_end_at_their_limit_at_first_order() -> None:
+    """A point from 1 m with e = 0.5 rests from 1.35457092 s on."""
+    errors = []
+    for step in STEPS:
+        run = drop(Scheme.MOREAU_JEAN, step, restitution=0.5, duration=1.6)
+        moving = np.flatnonzero(np.abs(run.velocity[:, 1]) > 1e-9)
+        errors.append(abs(run.time[moving[-1]] - 1.35457092))
+        assert abs(run.velocity[-1, 1]) <= 1e-12
+    assert order(errors) >= 0.9, errors
+
+
+def test_sliding_disc_comes_to_roll_at_first_order() -> None:
+    """From v without spin it slides for v / (3 μ g), then rolls on at 2 v / 3.
+
+    Steps are such that sliding ends in the middle of one.
+    """
+    speed, mu = 3.0, 0.2
+    end = speed / (3.0 * mu * G)
+    errors, steps = [], []
+    for count in (250, 500, 1000, 2000):
+        step = end / (count + 0.5)
+        run = hs.simulate(
+            mechanisms.disc(0.2),
+            state=hs.State(np.array([0.0, 0.2, 0.0]), np.array([speed, 0.0, 0.0])),
+            duration=(2 * count + 1) * step,
+            method=hs.TimeStepping(step=step),
+            ground=hs.Ground(friction=mu),
+        )
+        exact = (speed - 0.5 * mu * G * end) * end + 2.0 / 3.0 * speed * end
+        errors.append(abs(run.position[-1, 0] - exact))
+        steps.append(step)
+        np.testing.assert_allclose(run.velocity[-1], [2.0, 0.0, 10.0], atol=1e-9)
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] >= 0.9, errors
+
+
+def test_rimless_wheel_at_first_order() -> None:
+    """Speed after the third impact of a wheel that starts on its limit cycle."""
+    inertia, slope, spoke = 0.1, 0.08, np.pi / 8.0
+    kept = (inertia + np.cos(2.0 * spoke)) / (inertia + 1.0)
+    gain = 4.0 * G * np.sin(spoke) * np.sin(slope) / (inertia + 1.0)
+    speed = kept * np.sqrt(gain / (1.0 - kept**2))
+    hub = np.cos(spoke) * np.array([np.sin(slope), np.cos(slope)])
+    arm = np.array([-np.sin(spoke - slope), np.cos(spoke - slope)])
+    start = hs.State(np.array([*hub, slope]), np.array([speed * arm[1], -speed * arm[0], speed]))
+    errors = []
+    for step in STEPS:
+        run = hs.simulate(
+            mechanisms.rimless_wheel(inertia=inertia),
+            state=start,
+            duration=3.5,
+            method=hs.TimeStepping(step=step),
+            ground=hs.Ground(friction=3.0, slope=-slope),
+            stop_when_fallen=False,
+        )
+        after = int(np.searchsorted(run.time, touchdowns(run)[2] + 1e-9)) + 1
+        errors.append(abs(run.velocity[after, 2] - speed))
+    assert order(errors) >= 0.9, errors
+
+
+def test_rocking_block_at_first_order() -> None:
+    """An impact leaves 1 - (3/2) sin² α of the angular speed (Housner 1963)."""
+    width, height = 0.2, 1.0
+    angle = np.arctan(width / height)
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    corner = 0.5 * np.array([c * width - s * height, -s * width - c * height])
+    start = np.array([0.5 * width - corner[0], -corner[1], 0.5 * angle])
+    errors = []
+    for step in STEPS:
+        run = hs.simulate(
+            mechanisms.block(width, height),
+            state=hs.State(start, np.zeros(3)),
+            duration=0.5,
+            method=hs.TimeStepping(step=step),
+            ground=hs.Ground(friction=5.0),
+            stop_when_fallen=False,
+        )
+        impact = int(np.searchsorted(run.time, touchdowns(run)[0] - 1e-9))
+        ratio = run.velocity[impact + 2, 2] / run.velocity[impact - 2, 2]
+        errors.append(abs(ratio - (1.0 - 1.5 * np.sin(angle) ** 2)))
+    assert order(errors) >= 0.9, errors
+
+
+def test_painleve_rod_is_stopped_by_an_impulse() -> None:
+    """Beyond μ = 5/3 at 45° no force will do; the first step's impulse stops the sliding end."""
+    pitch = 0.25 * np.pi
+    a, b = 0.5 * np.sin(pitch), 0.5 * np.cos(pitch)
+    inverse_mass = np.diag([1.0, 1.0, 12.0])
+    rows = np.array([[0.0, 1.0, a], [1.0, 0.0, -b]])
+    impulse = np.linalg.solve(rows @ inverse_mass @ rows.T, [0.0, 1.0])
+    before = np.array([-1.0, 0.0, 0.0])
+    exact = before + inverse_mass @ rows.T @ impulse
+    errors = []
+    for step in STEPS:
+        run = hs.simulate(
+            mechanisms.rod(),
+            state=hs.State(np.array([a, b, pitch]), before),
+            duration=10.0 * step,
+            method=hs.TimeStepping(step=step),
+            ground=hs.Ground(friction=5.0 / 3.0 + 1e-2),
+        )
+        assert run.completed
+        assert run.solver.failures == 0
+        errors.append(np.abs(run.velocity[1] - exact).max())
+    assert order(errors) >= 0.9, errors
 
 
 PENDULUM = """

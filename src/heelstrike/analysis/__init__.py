@@ -9,6 +9,7 @@ from heelstrike.analysis.actuation import (
 )
 from heelstrike.analysis.energy import EnergyBalance, energy_balance
 from heelstrike.analysis.friction import FrictionUse, friction_use
+from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
 from heelstrike.analysis.slip import max_slip, slip_distance
@@ -40,6 +41,7 @@ __all__ = [
     "CostOfTransport",
     "EnergyBalance",
     "FrictionUse",
+    "LimitCycle",
     "Motion",
     "ReferenceMotion",
     "Sole",
@@ -53,6 +55,7 @@ __all__ = [
     "distance_travelled",
     "double_support_fraction",
     "energy_balance",
+    "find_limit_cycle",
     "foot_wrenches",
     "friction_use",
     "max_slip",

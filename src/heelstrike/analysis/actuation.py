@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.sim.run import Run
 
@@ -16,10 +17,10 @@ Floats = NDArray[np.float64]
 def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> float:
     """∫ ΓᵀΓ dt over the rows from `start` to `end` (s), in N²m²s (paper eq. 40).
 
-    Torques are held from row to row, so that the sum is the integral.
+    Where torques are held from row to row, the sum is the integral.
     """
     held = np.diff(run.time)
-    square = (run.torque[:-1] ** 2).sum(axis=1)
+    square = mean_over_intervals(run, run.torque**2).sum(axis=1)
     inside = (run.time[:-1] >= start) & (run.time[:-1] < end)
     return float((square * held)[inside].sum())
 
@@ -30,7 +31,7 @@ def actuator_power(run: Run) -> Floats:
     The velocity is the mean of the two rows, which makes the work of an impulsive step exact.
     """
     speed = run.velocity[:, run.robot.model.actuator_joint]
-    return np.asarray(run.torque[:-1] * 0.5 * (speed[:-1] + speed[1:]))
+    return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.actuation import actuator_power
+from heelstrike.analysis.intervals import event_impulse, impulses_in_events, mean_over_intervals
 from heelstrike.analysis.motion import motion, run_motion
 from heelstrike.sim.run import Run
 
@@ -57,27 +58,35 @@ class EnergyBalance:
 def energy_balance(run: Run) -> EnergyBalance:
     """Balance the energy of a run against the work done on its robot.
 
-    Work over a step is force times the mean of the velocities at its two ends, which for an
-    impulse is exactly the change of kinetic energy. With ``record_every`` above 1 rows stand for
-    the steps between them, and the balance is only as good as the sampling.
+    Work between two rows is impulse times the mean of the velocities at the two, which for an
+    impact is exactly the change of kinetic energy. With ``record_every`` above 1 rows stand for
+    the steps between them, and the balance is only as good as the sampling; that of an
+    event-driven run is of second order in its `output_period`.
     """
     robot, model = run.robot, run.robot.model
     held = np.diff(run.time)
     mean = 0.5 * (run.velocity[:-1] + run.velocity[1:])
     at_rows = run_motion(run)
     over_steps = motion(robot, run.position[:-1], mean, run.contact_point[:-1])
-    contact_power = (run.world_force[:-1] * over_steps.contact_velocity).sum(axis=(1, 2))
-    damper_power = -(mean * run.velocity[:-1]) @ model.damping
+    if impulses_in_events(run):
+        at_instants = (run.world_force * at_rows.contact_velocity).sum(axis=(1, 2))
+        contact_work = mean_over_intervals(run, at_instants) * held
+        jumps = event_impulse(run)
+    else:
+        contact_work = np.zeros_like(held)
+        jumps = run.world_force[:-1] * held[:, None, None]
+    contact_work = contact_work + (jumps * over_steps.contact_velocity).sum(axis=(1, 2))
+    damper_power = -(mean * mean_over_intervals(run, run.velocity)) @ model.damping
 
-    def work(power: Floats) -> Floats:
-        return np.concatenate(([0.0], np.cumsum(power * held)))[: len(run.time)]
+    def summed(work: Floats) -> Floats:
+        return np.concatenate(([0.0], np.cumsum(work)))[: len(run.time)]
 
     return EnergyBalance(
         time=run.time,
         kinetic=at_rows.kinetic,
         potential=at_rows.potential,
-        actuators=work(actuator_power(run).sum(axis=1)),
-        dampers=work(damper_power),
-        contacts=work(contact_power),
-        stops=work((run.stop_torque[:-1] * mean).sum(axis=1)),
+        actuators=summed(actuator_power(run).sum(axis=1) * held),
+        dampers=summed(damper_power * held),
+        contacts=summed(contact_work),
+        stops=summed((mean_over_intervals(run, run.stop_torque) * mean).sum(axis=1) * held),
     )

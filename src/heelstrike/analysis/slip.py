@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.analysis.intervals import mean_over_intervals
 from heelstrike.analysis.support import pushing
 from heelstrike.sim.run import Run
 
@@ -15,12 +16,13 @@ def slip_distance(run: Run) -> Floats:
     """Distance that every contact point has slid while pressed, up to each row, (nt, nc), in m.
 
     The sum over steps of |tangential velocity at the end of the step| times the step, taken over
-    steps in which the point pushes. It never decreases: sliding there and back counts twice. With
-    ``record_every`` above 1, rows stand for the steps between them.
+    steps in which the point pushes; in event-driven runs the mean of the two rows' velocities. It
+    never decreases: sliding there and back counts twice. With ``record_every`` above 1, rows stand
+    for the steps between them.
     """
     speed = np.where(pushing(run), np.abs(run.slip_velocity), 0.0)
     slid = np.zeros_like(speed)
-    slid[1:] = np.cumsum(speed[:-1] * np.diff(run.time)[:, None], axis=0)
+    slid[1:] = np.cumsum(mean_over_intervals(run, speed) * np.diff(run.time)[:, None], axis=0)
     return slid
 
 

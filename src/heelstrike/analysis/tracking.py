@@ -62,25 +62,18 @@ def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
         If the gait does not fit the robot of the run.
     """
     gait.check_joints(run.robot)
-    from heelstrike.gait import cubic  # the optimiser behind it is slow to load
-
     starts = _step_starts(run, gait)
     step = np.searchsorted(np.array(starts) - SAME_TIME, run.time, side="right") - 1
     step = np.maximum(step, 0)
     stance = (gait.stance_foot + step) % 2
     phase = run.time - np.array(starts)[step]
-    followed = np.minimum(phase, LATEST * gait.step_duration)[:, None]
+    followed = np.minimum(phase, LATEST * gait.step_duration)
     late = (phase > LATEST * gait.step_duration)[:, None]
-    position = np.zeros((len(run.time), run.robot.nu))
-    velocity = np.zeros_like(position)
-    polynomials = (
-        (gait.stance_foot, list(gait.coefficients)),
-        (1 - gait.stance_foot, list(gait.mirrored_coefficients(run.robot))),
-    )
-    for foot, coefficients in polynomials:
-        standing = (stance == foot)[:, None]
-        position += standing * cubic.position(coefficients, followed)
-        velocity += standing * ~late * cubic.velocity(coefficients, followed)
+    position, velocity = gait.in_step(followed), gait.in_step(followed, order=1)
+    other = (stance != gait.stance_foot)[:, None]
+    position = np.where(other, gait.mirrored(position), position)
+    velocity = np.where(other, gait.mirrored(velocity, order=1), velocity)
+    velocity = np.where(late, 0.0, velocity)
     return ReferenceMotion(position, velocity, stance, phase, tuple(starts))
 
 

@@ -25,6 +25,7 @@ from heelstrike.contact.workspace import (
     PIVOT_ROW,
     POINT,
     RESIDUAL,
+    REST_TOLERANCE,
     ROW_LABEL,
     SCALE,
     SETTINGS,
@@ -54,9 +55,6 @@ ROUNDING = 2e-15
 
 CONSISTENT = 1e-12
 """Equations that are left with less than this, relative to the largest, are met."""
-
-REST_TOLERANCE = 1e-10
-"""Velocities below this, relative to what they are summed from, count as zero."""
 
 SHARP = 1e-13
 """Residuals above this are worth a step of iterative refinement."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.compilation import kernel
-from heelstrike.contact.active_set import REST_TOLERANCE, evaluate, label
+from heelstrike.contact.active_set import evaluate, label
 from heelstrike.contact.certificate import Certificate, certify
 from heelstrike.contact.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.gauss_seidel import gauss_seidel
@@ -32,6 +32,7 @@ from heelstrike.contact.modes import (
     SolveStatus,
 )
 from heelstrike.contact.reduction import reduce_problem, scale_matrix
+from heelstrike.contact.repetition import repeat
 from heelstrike.contact.workspace import (
     FAILURES,
     FALLBACKS,
@@ -40,6 +41,7 @@ from heelstrike.contact.workspace import (
     LAST_FALLBACKS,
     PRESCRIBED,
     RESIDUAL,
+    REST_TOLERANCE,
     SETTINGS,
     SHORTCUTS,
     SIZE,
@@ -135,6 +137,12 @@ def solve_contact_kernel(
     counters[ITERATIONS] = 0
     counters[LAST_FALLBACKS] = 0
     counters[SUCCEEDED] = WARM_START
+    clean = min(tolerance, CLEAN)
+    if vectors[SETTINGS, SKEWED] == 0.0 and repeat(
+        count, delassus, free, friction, mode, impulse, velocity, residual, clean, work
+    ):
+        counters[SHORTCUTS] += 1
+        return SOLVED
     for contact in range(count):
         labels[TRIAL_MODE, contact] = mode[contact]
     for i in range(2 * count):
@@ -144,7 +152,6 @@ def solve_contact_kernel(
         residual[i] = math.inf
     unknowns = reduce_problem(count, delassus, free, friction, mode, work)
 
-    clean = min(tolerance, CLEAN)
     status = UNCERTIFIED
     best = math.inf
     for attempt in range(-1, order.shape[0]):

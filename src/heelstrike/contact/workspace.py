@@ -56,7 +56,11 @@ EQUATIONS = 13  # unknown: what the iterate leaves of the equations
 PROGRESS = 14  # an iterative solver's own numbers
 SIZE = 15  # row of the data: the scale of its velocity
 SETTINGS = 16  # what the caller may choose: TOLERANCE and SKEWED
-VECTORS = 17
+SHARERS = 17  # equation: how many rows share it
+VECTORS = 18
+
+REST_TOLERANCE = 1e-10
+"""Velocities below this, relative to what they are summed from, count as zero."""
 
 # Matrices of ``ContactWorkspace.squares``.
 MATRIX = 0  # the scaled problem

@@ -23,6 +23,7 @@ from heelstrike.dynamics.kernels import (
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -362,6 +363,10 @@ def computed_torque(
 class ComputedTorque:
     """Follow a gait by computed torque, on either foot, step after step.
 
+    On point feet (a `PiecewiseGait`) the joints follow the gait and the trunk's pitch, which no
+    motor reaches, follows from them. Nothing then brings the pitch back to the gait: a disturbance
+    of it lasts, and most gaits are unstable under this law.
+
     The phase of the gait restarts, and left and right change places, when the swing foot meets the
     ground in the second half of a step; until that foot has stopped, velocities are not fed back. A
     step that lasts longer than planned goes on along its
@@ -398,6 +403,7 @@ class ComputedTorque:
         self.encoder = encoder
         self.kp = _gains("kp", kp, robot)
         self.kd = _gains("kd", kd, robot)
+        self._kernel = computed_torque
         self._parameters = self._packed_parameters()
         self.reset()
 
@@ -409,7 +415,7 @@ class ComputedTorque:
 
     def compiled(self) -> CompiledController:
         """Return the controller in the form that runs inside the compiled loop."""
-        return CompiledController(computed_torque, self._parameters, self._initial_memory())
+        return CompiledController(self._kernel, self._parameters, self._initial_memory())
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
         """Return the joint torques (nu,), in N m."""
@@ -418,7 +424,7 @@ class ComputedTorque:
         forward_kinematics(self.robot.model, state.q, self._tree)
         link_velocities(self.robot.model, state.v, self._tree)
         torque = np.zeros(self.robot.nu)
-        computed_torque(
+        self._kernel(
             t,
             state.q,
             state.v,
@@ -434,7 +440,12 @@ class ComputedTorque:
 
     def _initial_memory(self) -> NDArray[np.float64]:
         nv, nu = self.robot.nv, self.robot.nu
-        memory = np.zeros(MEMORY_HEADER + SAMPLES_KEPT * nu + 8 * nv)
+        size = MEMORY_HEADER + SAMPLES_KEPT * nu + 8 * nv
+        if isinstance(self.gait, PiecewiseGait):
+            from heelstrike.control.point_feet import memory_size
+
+            size = memory_size(self.robot)
+        memory = np.zeros(size)
         memory[STANCE] = self.gait.stance_foot
         memory[LANDED] = 1.0
         return memory
@@ -455,17 +466,11 @@ class ComputedTorque:
                 f"computed torque on a flat foot needs every joint but the trunk's x, z and pitch "
                 f"actuated; robot {robot.name!r} leaves {names} without a motor"
             )
-        if gait.coefficients.shape != (4, robot.nu):
+        if len(gait.joint_names) != robot.nu:
             raise ControllerError(
-                f"the gait has {gait.coefficients.shape[1]} joints, robot {robot.name!r} has "
+                f"the gait has {len(gait.joint_names)} joints, robot {robot.name!r} has "
                 f"{robot.nu} actuators"
             )
-        both = np.zeros((2, 4, robot.nu))
-        both[gait.stance_foot] = gait.coefficients
-        both[1 - gait.stance_foot] = gait.mirrored_coefficients(robot)
-        side = np.full(robot.nc, -1.0)
-        for index, foot in enumerate(robot.feet):
-            side[list(foot.contacts)] = index
         pitch = int(unactuated[np.flatnonzero(model.axis[unactuated, 0])[0]])
         header = np.zeros(HEADER)
         header[EARLIEST] = 0.5 * gait.step_duration
@@ -475,6 +480,15 @@ class ComputedTorque:
         header[LANDING] = 0.02 * gait.step_duration
         header[PITCH] = pitch
         header[PITCH_SIGN] = model.axis[pitch, 0]
+        if isinstance(gait, PiecewiseGait):
+            blocks = self._point_foot_blocks(gait, unactuated)
+            return np.concatenate([header, self.kp, self.kd, blocks])
+        both = np.zeros((2, 4, robot.nu))
+        both[gait.stance_foot] = gait.coefficients
+        both[1 - gait.stance_foot] = gait.mirrored_coefficients(robot)
+        side = np.full(robot.nc, -1.0)
+        for index, foot in enumerate(robot.feet):
+            side[list(foot.contacts)] = index
         return np.concatenate(
             [
                 header,
@@ -486,6 +500,27 @@ class ComputedTorque:
                 side,
             ]
         )
+
+    def _point_foot_blocks(
+        self, gait: PiecewiseGait, unactuated: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        # Compiled only by those who walk on points.
+        from heelstrike.control.point_feet import packed_blocks, point_foot_torque
+
+        robot = self.robot
+        gait.check_joints(robot)
+        if any(len(foot.contacts) != 1 for foot in robot.feet):
+            raise ControllerError(
+                f"the gait is one on point feet; the feet of robot {robot.name!r} have several "
+                "contact points"
+            )
+        if self.encoder is not None:
+            raise ControllerError(
+                "on point feet the trunk's pitch does not follow from the joints, so joint "
+                "encoders alone cannot measure the state; leave encoder out"
+            )
+        self._kernel = point_foot_torque
+        return packed_blocks(robot, gait, unactuated)
 
 
 def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:

@@ -1,35 +1,81 @@
-"""Kinematics and dynamics of planar trees: kernels, queries in numpy, symbolic traces."""
+"""Kinematics and dynamics of planar trees: kernels, queries in numpy, CasADi functions."""
 
-from heelstrike.dynamics.queries import (
-    LinkPoses,
+from __future__ import annotations
+
+from typing import Any
+
+from heelstrike.dynamics.energies import energy, kinetic_energy, potential_energy
+from heelstrike.dynamics.equations_of_motion import (
+    applied_force,
     bias_force,
-    center_of_mass,
-    contact_positions,
-    energy,
+    coriolis_force,
     forward_dynamics,
     gravity_force,
     inverse_dynamics,
-    link_poses,
     mass_matrix,
-    momentum,
     passive_force,
+)
+from heelstrike.dynamics.linearization import Linearization, linearize
+from heelstrike.dynamics.momenta import (
+    angular_momentum,
+    center_of_mass,
+    center_of_mass_bias_acceleration,
+    center_of_mass_jacobian,
+    center_of_mass_velocity,
+    momentum,
+    momentum_matrix,
+)
+from heelstrike.dynamics.points import (
+    contact_bias_acceleration,
+    contact_jacobian,
+    contact_positions,
     point_bias_acceleration,
     point_jacobian,
+    point_position,
+    point_velocity,
 )
+from heelstrike.dynamics.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
 
 __all__ = [
+    "CasadiDynamics",
+    "Linearization",
     "LinkPoses",
+    "LinkVelocities",
+    "angular_momentum",
+    "applied_force",
     "bias_force",
     "center_of_mass",
+    "center_of_mass_bias_acceleration",
+    "center_of_mass_jacobian",
+    "center_of_mass_velocity",
+    "contact_bias_acceleration",
+    "contact_jacobian",
     "contact_positions",
+    "coriolis_force",
     "energy",
     "forward_dynamics",
     "gravity_force",
     "inverse_dynamics",
+    "kinetic_energy",
+    "linearize",
     "link_poses",
+    "link_velocities",
     "mass_matrix",
     "momentum",
+    "momentum_matrix",
     "passive_force",
     "point_bias_acceleration",
     "point_jacobian",
+    "point_position",
+    "point_velocity",
+    "potential_energy",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # CasADi is loaded only by those who ask for it.
+    if name == "CasadiDynamics":
+        from heelstrike.dynamics.casadi_functions import CasadiDynamics
+
+        return CasadiDynamics
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

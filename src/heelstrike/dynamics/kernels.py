@@ -210,7 +210,7 @@ def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
 def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
     """Factorise A = Lᵀ D L along the tree, without fill-in (Featherstone 2008, section 6.5).
 
-    `factor` receives D on its diagonal and the strictly lower part of the unit matrix L, nonzero
+    `factor` receives D⁻¹ on its diagonal and the strictly lower part of the unit matrix L, nonzero
     only where the column is an ancestor of the row.
     """
     count = model.parent.shape[0]
@@ -221,9 +221,11 @@ def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
             factor[i, j] = matrix[i, j]
             j = model.parent[j]
     for k in range(count - 1, -1, -1):
+        inverse = 1.0 / factor[k, k]
+        factor[k, k] = inverse
         i = model.parent[k]
         while i >= 0:
-            ratio = factor[k, i] / factor[k, k]
+            ratio = factor[k, i] * inverse
             j = i
             while j >= 0:
                 factor[i, j] -= ratio * factor[k, j]
@@ -257,7 +259,7 @@ def solve_factorized(model: Model, factor: Floats, x: Floats) -> None:
     """Replace x by A⁻¹ x."""
     solve_upper(model, factor, x)
     for i in range(model.parent.shape[0]):
-        x[i] /= factor[i, i]
+        x[i] *= factor[i, i]
     solve_lower(model, factor, x)
 
 
@@ -399,3 +401,36 @@ def momentum(model: Model, work: Workspace, result: Floats) -> None:
     result[0] = px
     result[1] = pz
     result[2] = moment - (hz * px - hx * pz) / mass
+
+
+@kernel
+def momentum_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
+    """Centroidal momentum matrix, (3, nv): :func:`momentum` per unit velocity of every joint.
+
+    A joint moves its subtree as one rigid body. Rows x and z over the mass of the robot are the
+    Jacobian of the centre of mass.
+    """
+    count = model.parent.shape[0]
+    mass = 0.0
+    hx = 0.0
+    hz = 0.0
+    for i in range(count):
+        mass = mass + work.inertia[i, 0]
+        hx = hx + work.inertia[i, 1]
+        hz = hz + work.inertia[i, 2]
+        for k in range(4):
+            work.composite[i, k] = work.inertia[i, k]
+    for i in range(count - 1, -1, -1):
+        m0 = work.motion[i, 0]
+        m1 = work.motion[i, 1]
+        m2 = work.motion[i, 2]
+        px = work.composite[i, 0] * m1 + m0 * work.composite[i, 2]
+        pz = work.composite[i, 0] * m2 - m0 * work.composite[i, 1]
+        moment = work.composite[i, 3] * m0 + work.composite[i, 2] * m1 - work.composite[i, 1] * m2
+        matrix[0, i] = px
+        matrix[1, i] = pz
+        matrix[2, i] = moment - (hz * px - hx * pz) / mass
+        parent = model.parent[i]
+        if parent >= 0:
+            for k in range(4):
+                work.composite[parent, k] += work.composite[i, k]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compilation import uncompiled
 from heelstrike.dynamics import kernels
+from heelstrike.dynamics.equations_of_motion import weightless
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 
@@ -76,6 +77,24 @@ class TracedDynamics:
         """Centrifugal, Coriolis and gravitational forces, (nv,)."""
         return self.inverse_dynamics(np.zeros(self.robot.nv, dtype=object))
 
+    def gravity_force(self) -> NDArray[np.object_]:
+        """Gravitational part of the bias force, (nv,)."""
+        return TracedDynamics(self.robot, self.q).bias_force()
+
+    def coriolis_force(self) -> NDArray[np.object_]:
+        """Centrifugal and Coriolis part of the bias force, (nv,)."""
+        force = np.zeros(self.robot.nv, dtype=object)
+        traced(kernels.bias_force)(weightless(self.model), self.work, force)
+        return force
+
+    def forward_dynamics(self, force: NDArray[np.object_]) -> NDArray[np.object_]:
+        """Acceleration A⁻¹ (force − H) without contact, (nv,)."""
+        n = self.robot.nv
+        matrix, factor = np.zeros((n, n), dtype=object), np.zeros((n, n), dtype=object)
+        acceleration = np.zeros(n, dtype=object)
+        traced(kernels.forward_dynamics)(self.model, matrix, factor, force, self.work, acceleration)
+        return acceleration
+
     def passive_force(self) -> NDArray[np.object_]:
         """Force of joint dampers and springs on the robot, (nv,)."""
         force = np.zeros(self.robot.nv, dtype=object)
@@ -100,6 +119,27 @@ class TracedDynamics:
         traced(kernels.point_bias_acceleration)(self.work, link, position, acceleration)
         return acceleration
 
+    def contact_jacobian(self, contacts: Sequence[int]) -> NDArray[np.object_]:
+        """Rows (normal, tangent) of contact points on level ground, contact by contact, (2k, nv)."""
+        rows = np.zeros((2 * len(contacts), self.robot.nv), dtype=object)
+        for place, contact in enumerate(contacts):
+            link = int(self.model.contact_link[contact])
+            position = self.point_position(link, self.model.contact_position[contact])
+            position[1] = position[1] - self.model.contact_radius[contact]
+            rows[2 * place : 2 * place + 2] = self.point_jacobian(link, position)[[1, 0]]
+        return rows
+
+    def contact_bias_acceleration(self, contacts: Sequence[int]) -> NDArray[np.object_]:
+        """J̇v of :meth:`contact_jacobian`, of the gap and the sliding velocity of discs, (2k,)."""
+        result = np.zeros(2 * len(contacts), dtype=object)
+        for place, contact in enumerate(contacts):
+            link = int(self.model.contact_link[contact])
+            center = self.point_position(link, self.model.contact_position[contact])
+            x, z, turn = self.point_bias_acceleration(link, center)
+            result[2 * place] = z
+            result[2 * place + 1] = x - self.model.contact_radius[contact] * turn
+        return result
+
     def energies(self) -> tuple[Any, Any]:
         """Kinetic and potential energy (J)."""
         kinetic = np.zeros(1, dtype=object)
@@ -119,3 +159,9 @@ class TracedDynamics:
         result = np.zeros(3, dtype=object)
         traced(kernels.momentum)(self.model, self.work, result)
         return result
+
+    def momentum_matrix(self) -> NDArray[np.object_]:
+        """Centroidal momentum matrix, (3, nv)."""
+        matrix = np.zeros((3, self.robot.nv), dtype=object)
+        traced(kernels.momentum_matrix)(self.model, self.work, matrix)
+        return matrix

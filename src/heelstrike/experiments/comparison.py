@@ -17,10 +17,11 @@ from heelstrike.analysis import (
     stances,
     zero_moment_point,
 )
+from heelstrike.analysis.intervals import IMPULSIVE, impulses_in_events
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.robot import Robot, State
-from heelstrike.sim import CompiledController, Controller, EventKind, Run, simulate
+from heelstrike.sim import CompiledController, Controller, Run, simulate
 from heelstrike.sim.engine import Method
 
 if TYPE_CHECKING:
@@ -33,8 +34,6 @@ GRID = 1e-3
 
 LANDING = 0.02
 """Impulses are added up over this time from a touchdown, in s: compliant ground needs it."""
-
-IN_EVENTS = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.ZENO, EventKind.PAINLEVE)
 
 
 @dataclass(frozen=True)
@@ -248,11 +247,11 @@ def _landing_impulse(run: Run, contacts: list[int], touchdown: float) -> float:
     rows = (run.time[1:] > touchdown - 1e-12) & (run.time[:-1] < end)
     force = run.contact_force[:-1, contacts, 0].sum(axis=1)
     total = float(np.sum((force * spans)[rows]))
-    if getattr(run.method, "impulses_in_events", False):
+    if impulses_in_events(run):
         total += sum(
             event.impulse[0]
             for event in run.events
-            if event.kind in IN_EVENTS
+            if event.kind in IMPULSIVE
             and event.contact in contacts
             and touchdown - 1e-12 <= event.time < end
         )

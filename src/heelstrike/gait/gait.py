@@ -178,23 +178,44 @@ class Gait:
             (eq. 41): the walk goes on with the mirrored step, then with the first again, and so
             also back in time.
         """
-        return self._walk(cubic.position, t, offset=self.mirror_offset)
+        return self._walk(t, 0, offset=self.mirror_offset)
 
     def velocity(self, t: ArrayLike) -> Floats:
         """Joint velocities at times of the walk, (..., nu), in rad/s.
 
         At a touchdown this is the velocity just after the impact. See :meth:`position`.
         """
-        return self._walk(cubic.velocity, t)
+        return self._walk(t, 1)
 
     def acceleration(self, t: ArrayLike) -> Floats:
         """Joint accelerations at times of the walk, (..., nu), in rad/s². See :meth:`position`."""
-        return self._walk(cubic.acceleration, t)
+        return self._walk(t, 2)
 
-    def _walk(self, polynomial: Any, t: ArrayLike, *, offset: Floats | float = 0.0) -> Floats:
+    def in_step(self, t: ArrayLike, *, order: int = 0) -> Floats:
+        """Joint motion of the first step, (..., nu), its polynomials going on beyond the ends.
+
+        Parameters
+        ----------
+        t : array_like
+            Times in s, of any shape.
+        order : int
+            0 for positions, 1 for velocities, 2 for accelerations.
+        """
+        polynomial: Any = (cubic.position, cubic.velocity, cubic.acceleration)[order]
+        value: Floats = polynomial(
+            self.coefficients, np.asarray(t, dtype=np.float64)[..., None]
+        ) + np.zeros(len(self.joint_names))
+        return value
+
+    def mirrored(self, joints: Floats, *, order: int = 0) -> Floats:
+        """Mirror image of joint positions, or of a derivative of them, (..., nu)."""
+        image: Floats = self.mirror_sign * joints[..., self.mirror_joint]
+        return image + self.mirror_offset if order == 0 else image
+
+    def _walk(self, t: ArrayLike, order: int, *, offset: Floats | float = 0.0) -> Floats:
         time = np.asarray(t, dtype=np.float64)
         step = np.floor(time / self.step_duration)
-        value = polynomial(self.coefficients, (time - step * self.step_duration)[..., None])
+        value = self.in_step(time - step * self.step_duration, order=order)
         mirrored = self.mirror_sign * value[..., self.mirror_joint] + offset
         result: Floats = np.where((step % 2 == 1)[..., None], mirrored, value)
         return result

@@ -31,7 +31,7 @@ def optimize_gait(
     force_margin: float | None = None,
     joint_speed_limit: float = math.inf,
     impact: bool = True,
-    intervals: int = 26,
+    intervals: int | None = None,
     starts: int = 3,
     progress: Callable[[float], None] | None = None,
 ) -> Gait:
@@ -49,11 +49,18 @@ def optimize_gait(
     reserve for that. At the impact the rear foot may have a velocity of 1e-6 m/s into the ground.
     Only the feet are kept off the ground, not knees or hands.
 
+    On point feet (one contact point each) the ground exerts no moment and the robot is
+    underactuated: not every motion of the joints is possible. There, joints and the trunk's pitch
+    follow piecewise polynomials of degree 5, which satisfy the equation of motion that no motor
+    enters at the Gauss points of every interval (direct collocation), and the result is a
+    :class:`PiecewiseGait`. Controllers that follow it in time need not be stable.
+
     Parameters
     ----------
     robot : Robot
-        A floating, mirror-symmetric robot with two feet that can stand flat (two contact points or
-        more each) and a motor at every joint. Its joint ranges and torque limits are respected.
+        A floating, mirror-symmetric robot with two feet and a motor at every joint. The feet can
+        stand flat (two contact points or more each) or are points (one each). Joint ranges and
+        torque limits are respected.
     step_length : float, optional
         Distance between the feet when both are on the ground (m): the body moves so far a step.
     step_duration : float, optional
@@ -78,8 +85,9 @@ def optimize_gait(
         Whether the swing foot may land with velocity: the landing is then a plastic impact, whose
         impulse is unilateral, inside the friction cone and the sole, and leaves the rear foot free
         to lift (eq. 20-22). Otherwise it must come to rest as it lands.
-    intervals : int
-        Intervals of the Gauss-Lobatto grid for quadrature and constraints.
+    intervals : int, optional
+        Intervals of the Gauss-Lobatto grid for quadrature and constraints, 26 by default; on point
+        feet, intervals of the collocation mesh, 12 by default.
     starts : int
         Starting points; the best of the optima reached from them is kept.
     progress : callable, optional
@@ -121,10 +129,14 @@ def optimize_gait(
         intervals=intervals,
         starts=starts,
     )
+    report = _Forward(progress)
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
+    if request.point_feet:
+        from heelstrike.gait.collocation import collocated_gait
+
+        return collocated_gait(request, report)
     from heelstrike.gait.transcription import Transcription
 
-    report = _Forward(progress)
     transcription = Transcription(request)
     *others, last = request.profiles
     for profile in others:

@@ -9,11 +9,16 @@ import numpy as np
 
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.sole import Sole, sole
+from heelstrike.gait.sole import Sole, point_sole, sole
 from heelstrike.robot.robot import Robot
 
 STANCE_FOOT = 0
 """Index of the foot that stands during the first step."""
+
+NODES = 26
+"""Default intervals of the Gauss-Lobatto grid of a step on flat feet."""
+MESH = 12
+"""Default intervals of the mesh of a step on point feet."""
 
 SHORTEST, LONGEST = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
@@ -68,6 +73,11 @@ class Request:
     starts: int
 
     @property
+    def point_feet(self) -> bool:
+        """Whether the robot stands on points, without a moment of the ground."""
+        return self.stance.half_length == 0.0
+
+    @property
     def pendulum_time(self) -> float:
         """Time scale sqrt(height / gravity), in s."""
         return float(np.sqrt(self.height / np.hypot(*self.robot.model.gravity)))
@@ -117,7 +127,7 @@ def checked_request(
     force_margin: float | None,
     joint_speed_limit: float,
     impact: bool,
-    intervals: int,
+    intervals: int | None,
     starts: int,
 ) -> Request:
     """Check the arguments of :func:`heelstrike.gait.optimize_gait` and fill in defaults.
@@ -130,7 +140,9 @@ def checked_request(
         If the step is longer than the legs reach.
     """
     _check_robot(robot)
-    stance, swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
+    points = all(len(foot.contacts) == 1 for foot in robot.feet)
+    find = point_sole if points else sole
+    stance, swing = find(robot, STANCE_FOOT), find(robot, 1 - STANCE_FOOT)
     _positive("step_length", step_length, "m")
     _positive("step_duration", step_duration, "s")
     _positive("speed", speed, "m/s")
@@ -148,9 +160,14 @@ def checked_request(
     _not_negative("friction", friction)
     _not_negative("clearance", clearance)
     _positive("joint_speed_limit", joint_speed_limit, "rad/s", infinite=True)
+    if points and zmp_margin is not None:
+        raise GaitError(
+            f"robot {robot.name!r} has point feet: the zero moment point is where they stand, and "
+            "zmp_margin means nothing. Leave it out."
+        )
     zmp_margin = 0.2 * stance.half_length if zmp_margin is None else zmp_margin
     _not_negative("zmp_margin", zmp_margin)
-    if zmp_margin >= stance.half_length:
+    if zmp_margin >= stance.half_length and not points:
         raise GaitError(
             f"zmp_margin = {zmp_margin:g} m leaves nothing of the sole, which reaches "
             f"{stance.half_length:g} m to each side of its middle."
@@ -162,7 +179,9 @@ def checked_request(
             f"force_margin = {force_margin:g} N is more than the robot's weight, "
             f"{robot.weight:g} N, which the ground carries on average."
         )
-    _whole("intervals", intervals, 10, 1000)
+    if intervals is None:
+        intervals = MESH if points else NODES
+    _whole("intervals", intervals, 4 if points else 10, 1000)
     _whole("starts", starts, 1, 100)
     height = _standing_height(robot, stance)
     request = Request(

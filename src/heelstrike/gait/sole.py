@@ -60,7 +60,7 @@ def sole(robot: Robot, foot: int) -> Sole:
     if len(contacts) < 2:
         raise GaitError(
             f"robot {robot.name!r}: foot {name!r} has {len(contacts)} contact point(s). A flat "
-            "foot needs a heel and a toe; gaits on point feet are not available."
+            "foot needs a heel and a toe; for a gait on points, give each foot a single one."
         )
     center = robot.model.contact_position[list(contacts)]
     radius = robot.model.contact_radius[list(contacts)]
@@ -83,6 +83,14 @@ def sole(robot: Robot, foot: int) -> Sole:
     angle, heel, toe, ground = best
     point = np.array(_rotated(np.array([[0.5 * (heel + toe), ground]]), -angle)).ravel()
     return Sole(foot, robot.feet[foot].link, angle, point, 0.5 * (toe - heel), contacts)
+
+
+def point_sole(robot: Robot, foot: int) -> Sole:
+    """Return the sole of a foot with a single contact disc: the bottom of it, without length."""
+    (contact,) = robot.feet[foot].contacts
+    radius = float(robot.model.contact_radius[contact])
+    point = robot.model.contact_position[contact] - np.array([0.0, radius])
+    return Sole(foot, robot.feet[foot].link, 0.0, point, 0.0, (contact,))
 
 
 def _rotated(points: Floats, angle: float) -> tuple[Floats, Floats]:

@@ -35,7 +35,7 @@ def starting_points(request: Request) -> Iterator[Floats]:
     Each draws two postures, both feet on the ground and the swing foot passing the stance foot,
     and takes the boundary velocities from the cubic through them.
     """
-    length, duration = _typical_step(request)
+    length, duration = typical_step(request)
     kinematics = _Kinematics(request)
     bends = (1.0, -1.0) if kinematics.bend_is_free else (1.0,)
     for lean, height, bend in product(LEANS, HEIGHTS, bends):
@@ -50,7 +50,7 @@ def starting_points(request: Request) -> Iterator[Floats]:
         yield np.concatenate([end, 0.5 * (change - bow), 0.5 * (change + bow), [duration, length]])
 
 
-def _typical_step(request: Request) -> tuple[float, float]:
+def typical_step(request: Request) -> tuple[float, float]:
     """Length and duration to start from; as given, or as usual for the robot's size."""
     length, duration = request.step_length, request.step_duration
     usual = TYPICAL_DURATION * request.pendulum_time

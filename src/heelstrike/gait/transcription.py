@@ -35,6 +35,7 @@ class Group(enum.Enum):
 
     NORMAL_FORCE = ("normal force on the stance foot", "N")
     FRICTION = ("friction cone of the stance foot", "N")
+    ANKLE = ("no moment on the point foot", "N m")
     ZERO_MOMENT_POINT = ("zero moment point inside the sole", "m")
     CLEARANCE = ("clearance of the swing foot", "m")
     JOINT_RANGE = ("joint range", "rad")
@@ -111,7 +112,7 @@ class Differentiable:
     hessian: casadi.Function
 
 
-class _Constraints:
+class Constraints:
     """Expressions and their meaning, collected one by one."""
 
     def __init__(self) -> None:
@@ -207,7 +208,7 @@ class Transcription:
             - model.contact_radius[i]
             for i in request.swing.contacts
         ]
-        constraints = _Constraints()
+        constraints = Constraints()
         self._add_forces(constraints, support)
         for i, height in zip(request.swing.contacts, heights, strict=True):
             constraints.add(Group.CLEARANCE, height, subject=robot.contact_names[i])
@@ -233,7 +234,7 @@ class Transcription:
         )
         self.start = casadi.Function("start", [x], at_start(x, 0.0))
 
-    def _add_forces(self, constraints: _Constraints, support: SingleSupport) -> None:
+    def _add_forces(self, constraints: Constraints, support: SingleSupport) -> None:
         """Ground wrench unilateral, in the friction cone, centred inside the sole."""
         request = self.request
         weight = self.robot.weight
@@ -249,7 +250,7 @@ class Transcription:
 
     def _add_cone(
         self,
-        constraints: _Constraints,
+        constraints: Constraints,
         wrench: tuple[Any, Any, Any],
         groups: tuple[Group, Group],
         unit: float,
@@ -274,7 +275,7 @@ class Transcription:
             )
 
     def _add_limits(
-        self, constraints: _Constraints, position: Symbols, velocity: Symbols, torque: Symbols
+        self, constraints: Constraints, position: Symbols, velocity: Symbols, torque: Symbols
     ) -> None:
         """Ranges, speeds and torques of the joints, where the robot has limits."""
         robot, model = self.robot, self.robot.model
@@ -325,7 +326,7 @@ class Transcription:
             for i in request.stance.contacts
         ]
 
-        constraints = _Constraints()
+        constraints = Constraints()
         place = support.point(swing.link, swing.point)
         exact: dict[str, Any] = {"lower": 0.0, "upper": 0.0}
         constraints.add(Group.TOUCHDOWN_PLACE, place[0] - self._length, subject="x", **exact)
@@ -368,7 +369,7 @@ class Transcription:
 
 
 def _differentiated(
-    constraints: _Constraints, arguments: list[casadi.SX], cost: casadi.SX
+    constraints: Constraints, arguments: list[casadi.SX], cost: casadi.SX
 ) -> Differentiable:
     """Functions of a cost and constraints with derivatives by the first argument."""
     x = arguments[0]

@@ -308,7 +308,9 @@ def sample(
             h = max(taken * met, SHORTEST)
             continue
         # At the sample itself the controller is called by the one who takes it.
-        evaluate(model, ground, laws, control, not final, start + elapsed + taken, memory, work)
+        evaluate(
+            model, ground, laws, control, not final, False, start + elapsed + taken, memory, work
+        )
         account(model, start + elapsed, taken, memory, work)
         memory.residual[1] = max(memory.residual[1], cone_residual(model, memory, work))
         memory.tally[STEPS] += 1
@@ -458,7 +460,7 @@ def _advance(
             )
             if not limit_torque(model, memory):
                 return BAD_CONTROLLER
-        evaluate(model, ground, laws, held, True, time, memory, work)
+        evaluate(model, ground, laws, held, True, False, time, memory, work)
         recorded = k % span[RECORD_EVERY] == 0 or k == last
         row = record.row_count[0]
         if recorded:

@@ -59,6 +59,10 @@ PERTURBATION = 1e-6
 # Steps for which the gains of a controller are taken to last, as long as none fails.
 GAINS_LAST = 20
 
+# In steps shorter than this (s), which only a controller that changes its mind can bring about, it
+# is taken at its word wherever it is asked: it decides once, not to and fro.
+DECISIVE = 1e-8
+
 # A bristle bent less than this (m) is straight.
 NO_BEND = 1e-30
 
@@ -325,6 +329,7 @@ def evaluate(
     laws: Laws,
     control: Control,
     accepted: bool,
+    decisive: bool,
     time: float,
     memory: Memory,
     work: CompliantWorkspace,
@@ -332,7 +337,8 @@ def evaluate(
     """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.bristle``.
 
     A controller that acts continuously is called: for good, with the contact forces of this very
-    state, if the state is `accepted`; otherwise to see what it would do.
+    state, if the state is `accepted`; for good also if it must be `decisive`; otherwise to see what
+    it would do.
     """
     observe(model, ground, memory)
     push_contacts(model, laws, memory, work)
@@ -342,6 +348,7 @@ def evaluate(
             for contact in range(model.contact_link.shape[0]):
                 memory.contacts.force[contact, 0] = work.force[contact, 0]
                 memory.contacts.force[contact, 1] = work.force[contact, 1]
+        if accepted or decisive:
             command(control, control.memory, time, model, memory, memory.torque)
         else:
             try_command(control, time, model, memory, memory.torque)
@@ -601,7 +608,17 @@ def attempt_step(
                 work.bristle[i] = work.base_bristle[i]
                 for k in range(stage):
                     work.bristle[i] += A[stage, k] * work.stage_bristle[k, i]
-            evaluate(model, ground, laws, control, False, time + TIMES[stage] * h, memory, work)
+            evaluate(
+                model,
+                ground,
+                laws,
+                control,
+                False,
+                h <= DECISIVE,
+                time + TIMES[stage] * h,
+                memory,
+                work,
+            )
         for i in range(nv):
             work.right_q[i] = work.base_v[i] if stage == 0 else memory.v[i]
             work.right_v[i] = work.base_acceleration[i] if stage == 0 else work.acceleration[i]

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.kernels import (
     forward_kinematics,
     link_velocities,
     point_position,
-    solve_upper,
+    solve_lower,
 )
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.memory import Memory
 
@@ -29,6 +32,18 @@ def locate_contacts(model: Model, ground: GroundModel, memory: Memory) -> None:
         memory.restitution[i] = restitution
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
+
+
+@kernel
+def contact_velocity(
+    link: int, position: Floats, normal: Floats, tree: Workspace
+) -> tuple[float, float]:
+    """Normal and tangential velocity of a point of a link."""
+    x = position[0] - tree.pivot[0]
+    z = position[1] - tree.pivot[1]
+    vx = tree.velocity[link, 1] + tree.velocity[link, 0] * z
+    vz = tree.velocity[link, 2] - tree.velocity[link, 0] * x
+    return normal[0] * vx + normal[1] * vz, normal[1] * vx - normal[0] * vz
 
 
 @kernel
@@ -65,20 +80,51 @@ def row_product(memory: Memory, row: int, v: Floats) -> float:
 
 @kernel
 def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
-    """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates, from the factor of A."""
+    """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates, from the factor of A.
+
+    With A = Lᵀ D L it is the square of ``memory.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are
+    coordinates, so that the inner loops run over the candidates.
+    """
     nv = model.parent.shape[0]
-    half = memory.half
-    for row in range(2 * count):
+    rows = 2 * count
+    half, factor, delassus = memory.half, memory.factor, memory.delassus
+    for j in range(nv):
+        for row in range(rows):
+            half[j, row] = memory.jacobian[row, j]
+    for i in range(nv - 1, -1, -1):
+        j = model.parent[i]
+        while j >= 0:
+            entry = factor[i, j]
+            for row in range(rows):
+                half[j, row] -= entry * half[i, row]
+            j = model.parent[j]
+        root = math.sqrt(factor[i, i])
+        memory.root[i] = root
+        # Rows below hang on this one only through the loop above: it is finished.
+        for row in range(rows):
+            half[i, row] *= root
+    for row in range(rows):
+        for column in range(rows):
+            delassus[row, column] = 0.0
         for j in range(nv):
-            half[row, j] = memory.jacobian[row, j]
-        solve_upper(model, memory.factor, half[row])
-    for row in range(2 * count):
-        for column in range(row + 1):
-            entry = 0.0
-            for j in range(nv):
-                entry += half[row, j] * half[column, j] / memory.factor[j, j]
-            memory.delassus[row, column] = entry
-            memory.delassus[column, row] = entry
+            entry = half[j, row]
+            if entry != 0.0:
+                for column in range(rows):
+                    delassus[row, column] += entry * half[j, column]
+
+
+@kernel
+def add_impulse(model: Model, memory: Memory, count: int, v: Floats) -> None:
+    """Add A⁻¹ Jᵀ λ to a velocity, after :func:`assemble_delassus`."""
+    change = memory.rate
+    for j in range(model.parent.shape[0]):
+        total = 0.0
+        for row in range(2 * count):
+            total += memory.half[j, row] * memory.impulse[row]
+        change[j] = memory.root[j] * total
+    solve_lower(model, memory.factor, change)
+    for j in range(model.parent.shape[0]):
+        v[j] += change[j]
 
 
 @kernel

@@ -24,7 +24,7 @@ from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mom
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.contact_geometry import locate_contacts
+from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
 from heelstrike.sim.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.engine import (
@@ -39,9 +39,11 @@ from heelstrike.sim.engine import (
     Setting,
     solver_order,
 )
-from heelstrike.sim.event_dynamics import contact_velocity, evaluate, project
+from heelstrike.sim.event_dynamics import evaluate, project
+from heelstrike.sim.event_gaps import gap_now, gap_velocity
 from heelstrike.sim.event_location import integrate, total_weight
 from heelstrike.sim.event_modes import (
+    JOINT_STOP,
     adopt_modes,
     form_groups,
     log_event,
@@ -106,6 +108,8 @@ NUDGE = 1e-10
 JUMP = 1e-7
 # An event is followed by another in the same instant when less than this (s) lies between.
 INSTANT = 1e-10
+# Mark of a point that touches the ground without force or speed, until it is known what happens.
+UNPRESSED = 2
 # So many in a row are switched by what fired; so many end the run.
 INSISTENT = 8
 TOO_MANY = 100
@@ -124,6 +128,10 @@ JUMPED = 2
 
 # Seconds between two calls of a Python controller that has no period of its own.
 PYTHON_PERIOD = 1e-3
+
+# Places in the life of a simulation: the first contact modes are being decided; they have been.
+BEGUN = 1
+WALKING = 2
 
 # Why the loop gave up.
 STEP_TOO_SHORT = 1
@@ -206,6 +214,7 @@ def copy_row(
     for i in range(nv):
         record.q[row, i] = state[i]
         record.v[row, i] = state[nv + i]
+        record.stop_torque[row, i] = 0.0
     for i in range(torque.shape[0]):
         record.torque[row, i] = torque[i]
     for i in range(contacts.gap.shape[0]):
@@ -251,11 +260,18 @@ def write_row(
         note_residual(memory.residual, memory.extreme)
     row = record.row_count[0]
     copy_row(row, time, phase.trial, memory.torque, contacts, memory.residual, record)
-    for contact in range(phase.closed.shape[0]):
+    points = contacts.gap.shape[0]
+    for contact in range(points):
         if phase.passing[contact] == 0:
             memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -contacts.gap[contact])
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= points:
+            stop = contact - points
+            record.stop_torque[row, phase.stop_joint[stop]] += (
+                phase.stop_side[stop] * memory.impulse[2 * place]
+            )
+            continue
         record.force[row, contact, 0] = memory.impulse[2 * place]
         record.force[row, contact, 1] = memory.impulse[2 * place + 1]
         _, record.slip[row, contact] = contact_velocity(
@@ -316,6 +332,7 @@ def decide(
     """
     time = phase.clock[TIME]
     contacts = phase.closed.shape[0]
+    points = model.contact_link.shape[0]
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
         extrapolate(ahead, phase.begin, phase.slopes[0], phase.trial)
@@ -349,7 +366,12 @@ def decide(
             solved, _ = collide(model, memory, phase, order, phase.begin, NUDGE)
             for contact in range(contacts):
                 phase.plastic[contact] = 0
-                if phase.impulse[contact, 0] > 0.0:
+                if phase.impulse[contact, 0] > 0.0 and contact >= points:
+                    log_event(
+                        record, time, JOINT_STOP, phase.stop_joint[contact - points],
+                        phase.impulse[contact, 0], 0.0,
+                    )  # fmt: skip
+                elif phase.impulse[contact, 0] > 0.0:
                     log_event(
                         record, time, PAINLEVE, contact, phase.impulse[contact, 0],
                         phase.impulse[contact, 1],
@@ -382,7 +404,7 @@ def decide(
             memory.tree.angle, phase,
         )  # fmt: skip
         project(model, ground, memory, phase, phase.begin)
-        report_modes(time, phase.closed, phase.slide, memory.closed, memory.slipping, record)
+        report_modes(time, phase, memory, record, phase.count[STARTED] == BEGUN)
         return True
     return False
 
@@ -390,7 +412,7 @@ def decide(
 @kernel
 def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> bool:
     """Whether a point is behind one on the ground and, by the rule, may pass below it."""
-    for other in range(phase.closed.shape[0]):
+    for other in range(contacts.gap.shape[0]):
         ahead = contacts.position[other, 0] - contacts.position[contact, 0]
         if phase.closed[other] == 1 and direction * ahead > 0.0:
             return phase.count[LET_PASS] == 1
@@ -401,34 +423,41 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
 def find_what_happened(
     starting: bool,
     direction: float,
-    link: Integers,
-    contacts: Contacts,
+    model: Model,
     memory: Memory,
     phase: Phase,
 ) -> tuple[bool, bool]:
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
-    Points that touch the ground without speed are closed, sliding ones that stop are at rest. At
-    the start of a run every point near the ground touches it.
+    Points that touch the ground without speed are closed, sliding ones that stop are at rest; an
+    impact goes through those that touch without force. At the start of a run every point near the
+    ground touches it.
     """
     impact = False
     forced = False
+    contacts = memory.contacts
+    points = contacts.gap.shape[0]
     rest = ON_THE_GROUND if starting else REST
     for contact in range(phase.closed.shape[0]):
         phase.hit[contact] = 0
         first = phase.fired[2 * contact] == 1
         second = phase.fired[2 * contact + 1] == 1
         if phase.closed[contact] == 0:
-            gap = contacts.gap[contact]
-            normal, tangent = contact_velocity(
-                link[contact], contacts.position[contact], contacts.normal[contact], memory.tree
+            gap = gap_now(contact, contacts, phase, phase.begin)
+            normal, tangent = gap_velocity(
+                contact, model, contacts, memory.tree, phase, phase.begin
             )
             if starting:
                 phase.group[contact] = contact
                 first = gap <= ON_THE_GROUND and normal <= rest
             if phase.passing[contact] == 1:
                 phase.passing[contact] = 0 if first else 1
-            elif first and not starting and behind(contact, direction, contacts, phase):
+            elif (
+                first
+                and not starting
+                and contact < points
+                and behind(contact, direction, contacts, phase)
+            ):
                 phase.passing[contact] = 1
             elif normal < -rest and (first or gap <= TOGETHER):
                 phase.hit[contact] = 1
@@ -438,12 +467,17 @@ def find_what_happened(
                 phase.slide[contact] = 0
                 if abs(tangent) > rest:
                     phase.slide[contact] = 1 if tangent > 0.0 else -1
+            elif gap <= TOGETHER and normal <= rest:
+                phase.hit[contact] = UNPRESSED
         elif second and phase.slide[contact] != 0:
             for other in range(phase.closed.shape[0]):
                 if phase.group[other] == phase.group[contact]:
                     phase.slide[other] = 0
         elif first or second:
             forced = True
+    for contact in range(phase.closed.shape[0]):
+        if phase.hit[contact] == UNPRESSED:
+            phase.hit[contact] = 1 if impact else 0
     return impact, forced and not impact
 
 
@@ -504,11 +538,14 @@ def end_step(memory: Memory, record: Record, phase: Phase) -> None:
         clock[TIME] = stop
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
-    for contact in range(phase.closed.shape[0]):
+    points = memory.contacts.gap.shape[0]
+    for contact in range(points):
         memory.contacts.force[contact, 0] = phase.end_force[contact, 0]
         memory.contacts.force[contact, 1] = phase.end_force[contact, 1]
+    for contact in range(phase.closed.shape[0]):
         if phase.accumulation[contact] <= clock[TIME]:
-            log_event(record, phase.accumulation[contact], ZENO, contact, 0.0, 0.0)
+            if contact < points:
+                log_event(record, phase.accumulation[contact], ZENO, contact, 0.0, 0.0)
             phase.accumulation[contact] = np.inf
     phase.count[FINISHED] = 0
     memory.tally[STEPS] += 1
@@ -544,7 +581,7 @@ def _advance(
     weight = total_weight(model.mass, model.gravity)
     rows, events = record.row_count, record.event_count
     row_room = record.time.shape[0] - 4
-    event_room = record.event_time.shape[0] - 8 * link.shape[0] - 8
+    event_room = record.event_time.shape[0] - 8 * phase.closed.shape[0] - 8
     period = clock[OUTPUT_PERIOD] * count[ROW_EVERY]
     while True:
         if rows[0] > row_room or events[0] > event_room:
@@ -558,7 +595,7 @@ def _advance(
             touch = False
             if count[FIRED] == 1:
                 last -= 1e-12
-                for contact in range(link.shape[0]):
+                for contact in range(phase.closed.shape[0]):
                     touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
             due = period > 0.0 and count[ROW] * period <= last
             while due or touch:
@@ -593,9 +630,7 @@ def _advance(
                 phase.begin, phase.slopes[0], True,
             )  # fmt: skip
             momentum(model, memory.tree, phase.scratch[0])
-            impact, forced = find_what_happened(
-                starting, phase.scratch[0, 0], link, contacts, memory, phase
-            )
+            impact, forced = find_what_happened(starting, phase.scratch[0, 0], model, memory, phase)
             if impact:
                 if not strike(model, ground, memory, record, phase, order):
                     count[REASON] = NO_CONSISTENT_FORCE
@@ -605,7 +640,7 @@ def _advance(
                     if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
                         contacts.force[contact, 0] = phase.impulse[contact, 0]
                         contacts.force[contact, 1] = phase.impulse[contact, 1]
-            count[STARTED] = 1
+            count[STARTED] = BEGUN if starting else WALKING
             count[UNDECIDED] = 1
             count[FORCED] = 1 if forced else 0
         for i in range(nv):

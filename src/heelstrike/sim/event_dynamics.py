@@ -21,30 +21,18 @@ from heelstrike.dynamics.kernels import (
     link_velocities,
     mass_matrix,
     passive_force,
-    point_bias_acceleration,
     solve_factorized,
 )
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, contact_rows, locate_contacts
+from heelstrike.sim.contact_geometry import assemble_delassus, contact_velocity, locate_contacts
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
-
-
-@kernel
-def contact_velocity(
-    link: int, position: Floats, normal: Floats, tree: Workspace
-) -> tuple[float, float]:
-    """Normal and tangential velocity of a point of a link."""
-    x = position[0] - tree.pivot[0]
-    z = position[1] - tree.pivot[1]
-    vx = tree.velocity[link, 1] + tree.velocity[link, 0] * z
-    vz = tree.velocity[link, 2] - tree.velocity[link, 0] * x
-    return normal[0] * vx + normal[1] * vz, normal[1] * vx - normal[0] * vz
 
 
 @kernel
@@ -139,38 +127,6 @@ def constraint_matrix(
 
 
 @kernel
-def free_contact_acceleration(
-    place: int,
-    link: int,
-    position: Floats,
-    normal: Floats,
-    radius: float,
-    jacobian: Floats,
-    tree: Workspace,
-    acceleration: Floats,
-    scratch: Floats,
-    free: Floats,
-) -> None:
-    """Acceleration b = J v̇ + J̇ v of a contact point in the candidates' `place`.
-
-    It is that of the gap and of the sliding velocity: for a rolling disc the acceleration of its
-    centre and not of the material point that touches the ground.
-    """
-    scratch[0, 0] = position[0] + radius * normal[0]
-    scratch[0, 1] = position[1] + radius * normal[1]
-    point_bias_acceleration(tree, link, scratch[0], scratch[1])
-    ax = scratch[1, 0]
-    az = scratch[1, 1]
-    along_normal = normal[0] * ax + normal[1] * az
-    along_tangent = normal[1] * ax - normal[0] * az - radius * scratch[1, 2]
-    for j in range(acceleration.shape[0]):
-        along_normal += jacobian[2 * place, j] * acceleration[j]
-        along_tangent += jacobian[2 * place + 1, j] * acceleration[j]
-    free[2 * place] = along_normal
-    free[2 * place + 1] = along_tangent
-
-
-@kernel
 def add_contact_force(
     count: int,
     model: Model,
@@ -227,31 +183,31 @@ def share_forces(
 
 @kernel
 def watch_geometry(
-    link: Integers,
-    contacts: Contacts,
-    tree: Workspace,
-    closed: Integers,
-    slide: Integers,
-    group: Integers,
-    passing: Integers,
-    value: Floats,
-    rate: Floats,
+    model: Model, contacts: Contacts, tree: Workspace, phase: Phase, state: Floats
 ) -> None:
     """Event functions that need no forces: gaps of open points, speeds of sliding ones.
 
     That of a point that is let pass below the ground is its depth.
     """
-    for contact in range(closed.shape[0]):
+    nv = state.shape[0] // 2
+    points = contacts.gap.shape[0]
+    for stop in range(phase.stop_joint.shape[0]):
+        if phase.closed[points + stop] == 0:
+            joint = phase.stop_joint[stop]
+            side = phase.stop_side[stop]
+            phase.value[2 * (points + stop)] = side * (state[joint] - phase.stop_limit[stop])
+            phase.rate[2 * (points + stop)] = side * state[nv + joint]
+    for contact in range(points):
         normal, tangent = contact_velocity(
-            link[contact], contacts.position[contact], contacts.normal[contact], tree
+            model.contact_link[contact], contacts.position[contact], contacts.normal[contact], tree
         )
-        value[2 * contact + 1] = 1.0
-        if closed[contact] == 0:
-            side = 1.0 - 2.0 * passing[contact]
-            value[2 * contact] = side * contacts.gap[contact]
-            rate[2 * contact] = side * normal
-        elif slide[contact] != 0 and group[contact] == contact:
-            value[2 * contact + 1] = slide[contact] * tangent
+        phase.value[2 * contact + 1] = 1.0
+        if phase.closed[contact] == 0:
+            side = 1.0 - 2.0 * phase.passing[contact]
+            phase.value[2 * contact] = side * contacts.gap[contact]
+            phase.rate[2 * contact] = side * normal
+        elif phase.slide[contact] != 0 and phase.group[contact] == contact:
+            phase.value[2 * contact + 1] = phase.slide[contact] * tangent
 
 
 @kernel
@@ -299,12 +255,12 @@ def free_acceleration(model: Model, memory: Memory, state: Floats) -> None:
 
 
 @kernel
-def gather_closed(model: Model, memory: Memory, closed: Integers) -> int:
+def gather_closed(model: Model, memory: Memory, phase: Phase) -> int:
     """Jacobian rows and Delassus matrix of the closed contact points; return their number."""
     count = 0
-    for contact in range(closed.shape[0]):
-        if closed[contact] == 1:
-            contact_rows(model, memory, contact, count)
+    for contact in range(phase.closed.shape[0]):
+        if phase.closed[contact] == 1:
+            gap_rows(model, memory, phase, contact, count)
             memory.candidate[count] = contact
             count += 1
     if count > 0:
@@ -337,10 +293,7 @@ def evaluate(
     forward_kinematics(model, state[:nv], memory.tree)
     link_velocities(model, state[nv:], memory.tree)
     locate_contacts(model, ground, memory)
-    watch_geometry(
-        model.contact_link, contacts, memory.tree, phase.closed, phase.slide, phase.group,
-        phase.passing, phase.value, phase.rate,
-    )  # fmt: skip
+    watch_geometry(model, contacts, memory.tree, phase, state)
     if not forces:
         return
     if phase.clock[SAMPLE_PERIOD] == 0.0:
@@ -355,15 +308,10 @@ def evaluate(
                 max(memory.torque[i], model.torque_lower[i]), model.torque_upper[i]
             )
     free_acceleration(model, memory, state)
-    count = gather_closed(model, memory, phase.closed)
+    count = gather_closed(model, memory, phase)
     phase.count[CLOSED] = count
     for place in range(count):
-        contact = memory.candidate[place]
-        free_contact_acceleration(
-            place, model.contact_link[contact], contacts.position[contact],
-            contacts.normal[contact], model.contact_radius[contact], memory.jacobian, memory.tree,
-            memory.rate, phase.scratch, memory.free,
-        )  # fmt: skip
+        free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
         memory.impulse[2 * place] = 0.0
         memory.impulse[2 * place + 1] = 0.0
     if count > 0:
@@ -412,7 +360,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
         if attempt == 0:
             mass_matrix(model, memory.tree, memory.mass_matrix)
             factorize(model, memory.mass_matrix, memory.factor)
-        count = gather_closed(model, memory, phase.closed)
+        count = gather_closed(model, memory, phase)
         if count == 0:
             return
         size = list_unknowns(
@@ -424,7 +372,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
             contact = memory.candidate[phase.row[i] // 2]
             error = 0.0
             if phase.row[i] % 2 == 0:
-                error = contacts.gap[contact]
+                error = gap_now(contact, contacts, phase, state)
             elif phase.stuck[contact] == 1:
                 error = -phase.anchor[contact] + tangential_place(
                     contacts.position[contact], contacts.normal[contact],

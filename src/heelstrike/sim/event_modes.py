@@ -23,6 +23,7 @@ LIFTOFF = int(EventKind.LIFTOFF)
 SLIP = int(EventKind.SLIP)
 STICK_EVENT = int(EventKind.STICK)
 REVERSAL = int(EventKind.SLIP_REVERSAL)
+JOINT_STOP = int(EventKind.JOINT_STOP)
 
 # Two normals are one when the sine of the angle between them is below this.
 PARALLEL = 1e-9
@@ -92,12 +93,15 @@ def adopt_modes(
     count: int, candidate: Integers, found: Integers, mode: Integers, phase: Phase
 ) -> None:
     """Let every closed contact point do what the acceleration-level problem says."""
+    points = phase.closed.shape[0] - phase.stop_joint.shape[0]
     for place in range(count):
         contact = candidate[place]
         mode[contact] = found[place]
         if found[place] == OPEN:
             phase.closed[contact] = 0
             phase.slide[contact] = 0
+        elif contact >= points:
+            continue
         elif found[place] == SLIP_FORWARD:
             phase.slide[contact] = 1
         elif found[place] == SLIP_BACKWARD:
@@ -114,7 +118,10 @@ def form_groups(
     phase: Phase,
 ) -> None:
     """Find which closed points hold the same constraints, and which of them carry the forces."""
-    contacts = phase.closed.shape[0]
+    contacts = position.shape[0]
+    for stop in range(contacts, phase.closed.shape[0]):
+        phase.group[stop] = stop
+        phase.carrier[stop] = phase.closed[stop]
     for contact in range(contacts):
         phase.group[contact] = contact
         phase.carrier[contact] = 0
@@ -170,24 +177,27 @@ def form_groups(
 
 
 @kernel
-def report_modes(
-    time: float,
-    closed: Integers,
-    slide: Integers,
-    was_closed: Integers,
-    was_sliding: Integers,
-    record: Record,
-) -> None:
-    """Append an event for every contact point whose mode is not the one reported last."""
+def report_modes(time: float, phase: Phase, memory: Memory, record: Record, starting: bool) -> None:
+    """Append an event for every contact point whose mode is not the one reported last.
+
+    Points that stand on the ground when the run begins do not touch down.
+    """
+    closed, was_closed = phase.closed, memory.closed
+    points = closed.shape[0] - phase.stop_joint.shape[0]
     for contact in range(closed.shape[0]):
-        now = slide[contact]
-        before = was_sliding[contact]
-        if closed[contact] == 0 and was_closed[contact] == 1:
+        now = phase.slide[contact]
+        before = memory.slipping[contact]
+        landed = closed[contact] == 1 and was_closed[contact] == 0
+        if contact >= points:
+            if landed and not starting:
+                log_event(record, time, JOINT_STOP, phase.stop_joint[contact - points], 0.0, 0.0)
+        elif closed[contact] == 0 and was_closed[contact] == 1:
             log_event(record, time, LIFTOFF, contact, 0.0, 0.0)
         elif closed[contact] == 1:
-            if was_closed[contact] == 0:
-                log_event(record, time, TOUCHDOWN, contact, 0.0, 0.0)
+            if landed:
                 before = 0
+                if not starting:
+                    log_event(record, time, TOUCHDOWN, contact, 0.0, 0.0)
             if now != 0 and before == 0:
                 log_event(record, time, SLIP, contact, 0.0, 0.0)
             elif now == 0 and before != 0:
@@ -195,4 +205,4 @@ def report_modes(
             elif now != before:
                 log_event(record, time, REVERSAL, contact, 0.0, 0.0)
         was_closed[contact] = closed[contact]
-        was_sliding[contact] = now if closed[contact] == 1 else 0
+        memory.slipping[contact] = now if closed[contact] == 1 else 0

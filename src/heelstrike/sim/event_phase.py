@@ -30,7 +30,7 @@ LAST_ROW = 13  # time of the last row of the record
 CLOCKS = 14
 
 # Places in ``Phase.count``.
-STARTED = 0  # whether the first contact modes have been decided
+STARTED = 0  # whether the first contact modes are being, or have been, decided
 FINISHED = 1  # whether a step is finished but its rows and events are not dealt with
 FIRED = 2  # whether the finished step ends in an event
 CLOSED = 3  # closed contact points at the last evaluation
@@ -53,12 +53,16 @@ class Phase(Bundle):
 
     A contact point that is closed and does not slide sticks. Closed points of one link on the same
     straight piece of ground form a group, told by its first point: only the outermost two of them
-    carry normal force, and one tangential force stands for all.
+    carry normal force, and one tangential force stands for all. Joint stops are numbered on from
+    the contact points; in the shapes below nc counts both.
 
     Attributes
     ----------
+    stop_joint : (ns,) int
+    stop_side, stop_limit : (ns,) float
+        Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     closed : (nc,) int
-        Whether each contact point is on the ground.
+        Whether each contact point is on the ground, each joint at its stop.
     slide : (nc,) int
         Direction in which it slides along the tangent: -1, 0 or 1.
     group : (nc,) int
@@ -90,7 +94,7 @@ class Phase(Bundle):
     value, rate, end_value, end_rate : (2 nc,) float
     before, before_rate, sample, sample_rate : (2 nc,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
-        the step, at the sample before, at this one.
+        the step, at the sample before, at this one. Of a joint stop the second is always 1.
     fired : (2 nc,) int
         Event functions that ended the step.
     scratch : (2, 3) float
@@ -107,6 +111,9 @@ class Phase(Bundle):
         Their places are module constants.
     """
 
+    stop_joint: Integers
+    stop_side: Floats
+    stop_limit: Floats
     closed: Integers
     slide: Integers
     group: Integers
@@ -149,13 +156,19 @@ class Phase(Bundle):
 
 def allocate_phase(robot: Robot) -> Phase:
     """Allocate the memory of an event-driven simulation of `robot`."""
-    nv, nu, nc = robot.nv, robot.nu, robot.nc
+    model, nv, nu = robot.model, robot.nv, robot.nu
+    lower = np.flatnonzero(np.isfinite(model.lower))
+    upper = np.flatnonzero(np.isfinite(model.upper))
+    nc = robot.nc + len(lower) + len(upper)
     size = robot.nq + nv
 
     def integers(count: int) -> Integers:
         return np.zeros(count, dtype=np.int64)
 
     return Phase(
+        stop_joint=np.concatenate((lower, upper)).astype(np.int64),
+        stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
+        stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         closed=integers(nc),
         slide=integers(nc),
         group=integers(nc),
@@ -176,7 +189,7 @@ def allocate_phase(robot: Robot) -> Phase:
         system=np.zeros((2 * nc, 2 * nc + 1)),
         unknown=np.zeros(2 * nc),
         column=integers(2 * nc),
-        value=np.zeros(2 * nc),
+        value=np.ones(2 * nc),
         rate=np.zeros(2 * nc),
         end_value=np.zeros(2 * nc),
         end_rate=np.zeros(2 * nc),

@@ -7,14 +7,13 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, contact_rows, locate_contacts
+from heelstrike.sim.contact_geometry import assemble_delassus, locate_contacts
 from heelstrike.sim.event_dynamics import (
     add_contact_force,
-    contact_velocity,
     free_acceleration,
-    free_contact_acceleration,
     gather_closed,
 )
+from heelstrike.sim.event_gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_modes import log_event, note_residual, solve_candidates
 from heelstrike.sim.event_phase import LAST_IMPACT, TIME, Phase
 from heelstrike.sim.memory import Memory, Record
@@ -23,6 +22,7 @@ from heelstrike.sim.status import EventKind
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
+JOINT_STOP = int(EventKind.JOINT_STOP)
 
 # Velocities (m/s) up to which a point on the ground is at rest.
 REST = 1e-9
@@ -66,7 +66,7 @@ def collide(
         phase.impulse[contact, 1] = 0.0
         if phase.closed[contact] == 0 and phase.hit[contact] == 0:
             continue
-        contact_rows(model, memory, contact, count)
+        gap_rows(model, memory, phase, contact, count)
         normal = row_velocity(2 * count, memory.jacobian, state)
         if normal < 0.0 and phase.plastic[contact] == 0:
             normal += memory.restitution[contact] * normal
@@ -118,20 +118,14 @@ def short_bounces(
     series gives the time at which they end.
     """
     nv = model.parent.shape[0]
-    contacts = memory.contacts
     time = phase.clock[TIME]
     forward_kinematics(model, state[:nv], memory.tree)
     link_velocities(model, state[nv:], memory.tree)
     locate_contacts(model, ground, memory)
     free_acceleration(model, memory, state)
-    count = gather_closed(model, memory, phase.closed)
+    count = gather_closed(model, memory, phase)
     for place in range(count):
-        contact = memory.candidate[place]
-        free_contact_acceleration(
-            place, model.contact_link[contact], contacts.position[contact],
-            contacts.normal[contact], model.contact_radius[contact], memory.jacobian, memory.tree,
-            memory.rate, phase.scratch, memory.free,
-        )  # fmt: skip
+        free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
     if count > 0:
         solve_candidates(count, memory, phase.slide, True, order)
         add_contact_force(
@@ -142,16 +136,9 @@ def short_bounces(
         touched = phase.hit[contact] == 1 or memory.closed[contact] == 1
         if phase.closed[contact] == 1 or not touched:
             continue
-        contact_rows(model, memory, contact, count)
-        free_contact_acceleration(
-            count, model.contact_link[contact], contacts.position[contact],
-            contacts.normal[contact], model.contact_radius[contact], memory.jacobian, memory.tree,
-            memory.rate, phase.scratch, memory.free,
-        )  # fmt: skip
-        normal, _ = contact_velocity(
-            model.contact_link[contact], contacts.position[contact], contacts.normal[contact],
-            memory.tree,
-        )  # fmt: skip
+        gap_rows(model, memory, phase, contact, count)
+        free_gap_acceleration(model, memory, phase, contact, count)
+        normal, _ = gap_velocity(contact, model, memory.contacts, memory.tree, phase, state)
         pull = -memory.free[2 * count]
         if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
@@ -179,6 +166,7 @@ def strike(
     """
     state, before = phase.begin, phase.end
     contacts = phase.closed.shape[0]
+    points = contacts - phase.stop_joint.shape[0]
     time = phase.clock[TIME]
     for i in range(state.shape[0]):
         before[i] = state[i]
@@ -202,6 +190,12 @@ def strike(
         phase.plastic[contact] = 0
         if phase.hit[contact] == 1:
             phase.last_impact[contact] = time
+        if contact >= points:
+            if normal > 0.0:
+                memory.closed[contact] = 1
+                joint = phase.stop_joint[contact - points]
+                log_event(record, time, JOINT_STOP, joint, normal, 0.0)
+            continue
         if normal > phase.impulse[largest, 0]:
             largest = contact
         if normal > 0.0 and memory.closed[contact] == 0:

@@ -53,13 +53,13 @@ class Memory(Bundle):
         Kinematics of the state now; a second one for controllers.
     contacts : Contacts
         Contact points now; their forces are those of the last solve.
-    friction, restitution : (nc,) float
-        Coefficients of the ground under each contact point.
+    friction, restitution : (capacity,) float
+        Coefficients of the ground under each contact point; zero for the joint stops after them.
     slip : (nc,) float
         Tangential velocity of each contact point at the end of the step.
-    mode : (nc,) int
+    mode : (capacity,) int
         Contact mode found by the last solve, the guess of the next.
-    closed, slipping : (nc,) int
+    closed, slipping : (capacity,) int
         Whether each contact point is on the ground, and whether it slips.
     stop_torque : (nv,) float
         Generalised force of the joint stops in the last solve.
@@ -68,8 +68,11 @@ class Memory(Bundle):
     candidate : (capacity,) int
         Contact points in the contact problem of this step; after them the joint stops, numbered
         on from nc: twice the joint, plus one for its upper end. The capacity has room for all.
-    jacobian, half : (2 capacity, nv) float
-        Contact Jacobian of the candidates and L⁻ᵀ Jᵀ.
+    jacobian : (2 capacity, nv) float
+        Contact Jacobian of the candidates.
+    root : (nv,) float
+    half : (nv, 2 capacity) float
+        D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
     delassus : (2 capacity, 2 capacity) float
     free, impulse, velocity : (2 capacity,) float
         The contact problem and its solution.
@@ -107,6 +110,7 @@ class Memory(Bundle):
     stopped: Integers
     candidate: Integers
     jacobian: Floats
+    root: Floats
     half: Floats
     delassus: Floats
     free: Floats
@@ -139,17 +143,18 @@ def allocate_memory(robot: Robot) -> Memory:
         tree=workspace(nv),
         scratch=workspace(nv),
         contacts=Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2))),
-        friction=np.zeros(nc),
-        restitution=np.zeros(nc),
+        friction=np.zeros(capacity),
+        restitution=np.zeros(capacity),
         slip=np.zeros(nc),
-        mode=np.zeros(nc, dtype=np.int64),
-        closed=np.zeros(nc, dtype=np.int64),
-        slipping=np.zeros(nc, dtype=np.int64),
+        mode=np.zeros(capacity, dtype=np.int64),
+        closed=np.zeros(capacity, dtype=np.int64),
+        slipping=np.zeros(capacity, dtype=np.int64),
         stop_torque=np.zeros(nv),
         stopped=np.zeros(nv, dtype=np.int64),
         candidate=np.zeros(capacity, dtype=np.int64),
         jacobian=np.zeros((2 * capacity, nv)),
-        half=np.zeros((2 * capacity, nv)),
+        root=np.zeros(nv),
+        half=np.zeros((nv, 2 * capacity)),
         delassus=np.zeros((2 * capacity, 2 * capacity)),
         free=np.zeros(2 * capacity),
         impulse=np.zeros(2 * capacity),

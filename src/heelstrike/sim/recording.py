@@ -5,6 +5,7 @@ from __future__ import annotations
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.robot.model import Model
+from heelstrike.sim.contact_geometry import contact_velocity
 from heelstrike.sim.memory import (
     BAD_TORQUE,
     COMPLEMENTARITY,
@@ -27,6 +28,8 @@ JOINT_STOP = int(EventKind.JOINT_STOP)
 # A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
 LIFTOFF_GAP = 1e-7
 SLIP_SPEED = 1e-6
+# A point that comes down faster than this (m/s) when the run begins touches down; others stand.
+STANDING_SPEED = 1e-6
 INFINITY = float("inf")
 
 
@@ -75,7 +78,8 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
     An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
-    Points that already stand on the ground when the run begins do not touch down.
+    Points that already stand on the ground when the run begins do not touch down, and joints that
+    rest at a stop do not reach it.
     """
     for contact in range(model.contact_link.shape[0]):
         pushed = memory.contacts.force[contact, 0] > 0.0
@@ -84,6 +88,14 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             memory.closed[contact] = 1
             memory.slipping[contact] = 0
             stood = memory.tally[STEPS] == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
+            if stood:
+                normal, _ = contact_velocity(
+                    model.contact_link[contact],
+                    memory.contacts.position[contact],
+                    memory.contacts.normal[contact],
+                    memory.tree,
+                )
+                stood = normal >= -STANDING_SPEED
             if not stood:
                 note_event(record, time + step, TOUCHDOWN, contact, memory)
         elif (
@@ -107,7 +119,13 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             record.event_impulse[place, 1] *= step
     for joint in range(model.parent.shape[0]):
         pushed = memory.stop_torque[joint] != 0.0
-        if pushed and memory.stopped[joint] == 0:
+        way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
+        stood = (
+            memory.tally[STEPS] == 0
+            and way <= LIFTOFF_GAP
+            and abs(memory.v[joint]) <= STANDING_SPEED
+        )
+        if pushed and memory.stopped[joint] == 0 and not stood:
             place = record.event_count[0]
             record.event_time[place] = time + step
             record.event_kind[place] = JOINT_STOP
@@ -115,7 +133,10 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
             record.event_impulse[place, 1] = 0.0
             record.event_count[0] = place + 1
-        memory.stopped[joint] = 1 if pushed else 0
+        if pushed:
+            memory.stopped[joint] = 1
+        elif way > LIFTOFF_GAP:
+            memory.stopped[joint] = 0
 
 
 @kernel

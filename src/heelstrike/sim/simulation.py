@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
-from heelstrike.dynamics.queries import center_of_mass
+from heelstrike.dynamics import center_of_mass
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -197,7 +197,7 @@ class _Loop:
     def _new_record(self) -> None:
         rows = min(CHUNK, self.engine.rows_left + 2)
         self.records.append(
-            allocate_record(self.robot, rows, max(256, 8 * (self.robot.nc + self.robot.nv)))
+            allocate_record(self.robot, rows, max(256, 16 * (self.robot.nc + 2 * self.robot.nv)))
         )
 
     def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:

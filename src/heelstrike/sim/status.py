@@ -33,7 +33,8 @@ class EventKind(enum.IntEnum):
     ``ENERGY_GAIN``
         Newton's restitution with friction made energy in an impact (Kane's paradox).
     ``JOINT_STOP``
-        A joint reached the end of its range; the event's `contact` is the index of the joint.
+        A joint reached the end of its range, with the impulse that took, or was pressed against it
+        by an impact elsewhere; the event's `contact` is the index of the joint.
     """
 
     TOUCHDOWN = 0

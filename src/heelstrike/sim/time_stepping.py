@@ -40,6 +40,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contact_geometry import (
+    add_impulse,
     assemble_delassus,
     contact_rows,
     observe,
@@ -279,14 +280,7 @@ def solve_contacts(
         memory.residual,
         memory.solver,
     )
-    for j in range(nv):
-        total = 0.0
-        for row in range(2 * count):
-            total += memory.jacobian[row, j] * memory.impulse[row]
-        memory.rate[j] = total
-    solve_factorized(model, memory.factor, memory.rate)
-    for j in range(nv):
-        memory.next_v[j] += memory.rate[j]
+    add_impulse(model, memory, count, memory.next_v)
     for place in range(count):
         contact = memory.candidate[place]
         if contact >= points:

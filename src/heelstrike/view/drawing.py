@@ -20,7 +20,7 @@ from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics.queries import link_poses
+from heelstrike.dynamics import link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.view.style import (
     FOOT_COLORS,

@@ -1,0 +1,54 @@
+"""What acted between two rows of a run, whichever way it went through time.
+
+Time stepping holds forces and torques from row to row, impacts included, and compliant runs record
+the mean over what follows. In event-driven runs the rows are instants of a continuous motion:
+forces are averaged over the two ends, and the impulses of impacts stand apart, in the events.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.sim.run import Run
+from heelstrike.sim.status import EventKind
+
+Floats = NDArray[np.float64]
+
+IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.ZENO, EventKind.PAINLEVE)
+"""Events whose impulses are not in the forces of an event-driven run."""
+
+SAME_INSTANT = 1e-9
+"""Rows and events closer than this (s) belong together."""
+
+
+def impulses_in_events(run: Run) -> bool:
+    """Whether the impulses of impacts are in the run's events, not in its forces."""
+    return bool(getattr(run.method, "impulses_in_events", False))
+
+
+def mean_over_intervals(run: Run, values: Floats) -> Floats:
+    """Mean from each row to the next of a force or torque, (nt, ...) to (nt − 1, ...)."""
+    if impulses_in_events(run):
+        return np.asarray(0.5 * (values[:-1] + values[1:]))
+    return values[:-1]
+
+
+def event_impulse(run: Run) -> Floats:
+    """Impulse (x, z) of impacts that only the events know, (nt − 1, nc, 2), in N s.
+
+    World axes, on the robot, at the contact points; each stands in the interval, of no length, in
+    which its velocities jump.
+    """
+    impulse = np.zeros((max(len(run.time) - 1, 0), run.robot.nc, 2))
+    if not impulses_in_events(run) or not len(impulse):
+        return impulse
+    for event in run.events:
+        if event.kind not in IMPULSIVE or event.impulse == (0.0, 0.0):
+            continue
+        first = int(np.searchsorted(run.time, event.time - SAME_INSTANT))
+        row = min(first, len(impulse) - 1)
+        nx, nz = run.contact_normal[row, event.contact]
+        normal, tangent = event.impulse
+        impulse[row, event.contact] += (normal * nx + tangent * nz, normal * nz - tangent * nx)
+    return impulse

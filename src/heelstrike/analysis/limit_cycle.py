@@ -1,0 +1,201 @@
+"""Limit cycles of walking: fixed points of the Poincaré map, and their stability.
+
+A gait that repeats is a fixed point of the map from touchdown to touchdown; the eigenvalues of the
+map's derivative there, its Floquet multipliers, tell how small disturbances grow or die from step
+to step (Goswami, Thuilot, Espiau 1998; Strogatz, *Nonlinear Dynamics and Chaos*, section 8.7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.poincare_map import Chart, PoincareMap, Section
+from heelstrike.contact.ground import Ground
+from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.controller import CompiledController, Controller
+from heelstrike.sim.event_driven import EventDriven
+
+Floats = NDArray[np.float64]
+
+# Disturbance (m, rad, m/s, rad/s) of the central differences. The derivative's error is its square
+# times a third derivative of the map, plus the error of the map itself, some 1e-11, over it.
+DISTURBANCE = 1e-4
+# How often a Newton step is halved when the walk does not go on after it.
+HALVINGS = 6
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LimitCycle:
+    """A walk that repeats from step to step.
+
+    Attributes
+    ----------
+    state : State
+        State just after touchdown, relabelled so that the same foot stands at every step; the
+        first contact point that stands is level with the world's origin.
+    period : float
+        Duration of a step in s.
+    step_length : float
+        Distance along the ground (m) by which a step moves the robot on.
+    multipliers : (m,) complex
+        Floquet multipliers of a step, largest first: factors by which small disturbances of the
+        state grow from one touchdown to the next. m is the number of disturbances that the feet
+        on the ground allow; shifts along the ground are not among them.
+    residual : float
+        Largest difference between `state` and its image one step later (m, rad, m/s, rad/s).
+    iterations : int
+        Newton steps taken.
+    """
+
+    state: State
+    period: float
+    step_length: float
+    multipliers: NDArray[np.complex128]
+    residual: float
+    iterations: int
+
+    @property
+    def stable(self) -> bool:
+        """Whether every small disturbance dies out."""
+        return bool(np.all(np.abs(self.multipliers) < 1.0))
+
+    def __repr__(self) -> str:
+        largest = np.abs(self.multipliers).max(initial=0.0)
+        return (
+            f"LimitCycle({self.step_length:.9g} m in {self.period:.9g} s, largest multiplier "
+            f"{largest:.6g}: {'stable' if self.stable else 'unstable'})"
+        )
+
+
+def find_limit_cycle(
+    robot: Robot,
+    state: State,
+    controller: Controller | CompiledController | None = None,
+    *,
+    ground: Ground | None = None,
+    method: EventDriven | None = None,
+    landing: Sequence[int] | None = None,
+    symmetry: Callable[[State], State] | None = None,
+    longest_step: float = 3.0,
+    tolerance: float = 1e-10,
+    max_iterations: int = 20,
+) -> LimitCycle:
+    """Find a limit cycle of a walking robot near a state, and its Floquet multipliers.
+
+    Newton's method on the map from touchdown to touchdown, differentiated by central differences.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot; its first two coordinates are the world position x, z of one of its points.
+    state : State
+        Where to begin, anywhere in a step; the search starts at the first touchdown after it.
+    controller : object with ``torque(t, state, contacts)``, or None
+        Begins afresh at every touchdown: at time 0, with the memory it starts with.
+    ground : Ground
+        Flat or sloping ground; ``Ground()`` by default.
+    method : EventDriven
+        Way through time, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default. Passive walkers
+        whose swing foot scuffs need ``swing_feet_pass=True``.
+    landing : sequence of int, optional
+        Contact points all of which must have come down to complete a step. By default those of
+        either foot if the robot has a mirror image, else any point.
+    symmetry : callable, optional
+        Takes a state just after touchdown to that of the same robot with its legs relabelled. By
+        default the exchange of left and right for a robot that has a mirror image, the turn by
+        whole spokes for a wheel, and nothing if `landing` is given.
+    longest_step : float
+        Seconds after which a step without touchdown has failed.
+    tolerance : float
+        Largest difference between the state found and its image (m, rad, m/s, rad/s).
+    max_iterations : int
+        Newton steps after which the search has failed.
+
+    Returns
+    -------
+    LimitCycle
+
+    Raises
+    ------
+    LimitCycleError
+        If the robot does not complete its steps, if other contact points stand at the end of a
+        step than at its beginning, or if Newton's method does not converge.
+    SimulationError
+        If an argument is not usable.
+
+    Notes
+    -----
+    Where the order of contacts is different for different disturbances - a flat foot comes down
+    heel first or toe first - the map has a kink: multipliers are then those of a mean of its sides.
+    """
+    ground = Ground() if ground is None else ground
+    method = EventDriven(rtol=1e-12, atol=1e-13) if method is None else method
+    if not isinstance(method, EventDriven):
+        raise SimulationError(
+            f"limit cycles need the event-driven method, got {type(method).__name__}: no other "
+            "finds touchdowns sharply enough"
+        )
+    if len(ground.model().friction) > 1:
+        raise SimulationError("limit cycles need flat or sloping ground, the same at every step")
+    if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
+        raise SimulationError(
+            f"limit cycles need a robot that is free to move along the ground; the first two "
+            f"coordinates of {robot.name!r} are not its position x, z"
+        )
+    section = Section(robot, ground)
+    step = PoincareMap(section, controller, method, landing, symmetry, longest_step)
+    state = step(state).state
+    residual = np.inf
+    for iteration in range(max_iterations + 1):
+        chart = Chart(section, state)
+        end = step(state)
+        change = chart.coordinates(end.state)
+        residual = float(np.abs(change).max(initial=0.0))
+        derivative = _derivative(step, chart)
+        if residual <= tolerance:
+            multipliers = np.linalg.eigvals(derivative).astype(np.complex128)
+            return LimitCycle(
+                state=state,
+                period=end.time,
+                step_length=end.length,
+                multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
+                residual=residual,
+                iterations=iteration,
+            )
+        newton = np.asarray(np.linalg.lstsq(np.eye(chart.size) - derivative, change)[0], np.float64)
+        state = _moved_on(step, chart, newton)
+    raise LimitCycleError(
+        f"no limit cycle of robot {robot.name!r} in {max_iterations} iterations: its state still "
+        f"changes by {residual:.3g} from step to step; begin nearer to the cycle"
+    )
+
+
+def _derivative(step: PoincareMap, chart: Chart) -> Floats:
+    """Derivative of the map at the origin of a chart, (m, m), by central differences."""
+
+    def image(coordinates: Floats) -> Floats:
+        return chart.coordinates(step(chart.state(coordinates)).state)
+
+    columns = [
+        (image(change) - image(-change)) / (2.0 * DISTURBANCE)
+        for change in DISTURBANCE * np.eye(chart.size)
+    ]
+    return np.array(columns).reshape(chart.size, chart.size).T
+
+
+def _moved_on(step: PoincareMap, chart: Chart, newton: Floats) -> State:
+    """Return the state after a Newton step, shortened until the walk goes on from there."""
+    for halving in range(HALVINGS):
+        try:
+            state = chart.state(0.5**halving * newton)
+            chart.coordinates(step(state).state)
+        except LimitCycleError:
+            continue
+        return state
+    return chart.state(0.5**HALVINGS * newton)

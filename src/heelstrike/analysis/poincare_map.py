@@ -1,0 +1,322 @@
+"""The Poincaré map of a walk: from just after one touchdown to just after the next.
+
+Between the two the legs change their parts. So that a walk which repeats is a fixed point, the
+state after touchdown is relabelled - left and right exchanged, a wheel turned by whole spokes - and
+moved back along the ground.
+
+On this section the feet obey equations: points on the ground have no gap, those that stand have no
+velocity, and where along the ground they are does not matter. A :class:`Chart` numbers what these
+leave free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.contact.ground import Ground
+from heelstrike.dynamics import kernels
+from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.contact_geometry import observe
+from heelstrike.sim.controller import CompiledController, Controller
+from heelstrike.sim.event_driven import EventDriven
+from heelstrike.sim.memory import allocate_memory
+from heelstrike.sim.run import Run
+from heelstrike.sim.simulation import simulate
+from heelstrike.sim.status import EventKind
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# A contact point is on the ground up to this gap (m), and at rest up to this speed (m/s).
+ON_THE_GROUND = 1e-9
+AT_REST = 1e-8
+# Rows of a run within this time (s) of an event belong to it.
+SAME_INSTANT = 1e-11
+# Steps of a walk differ by less than this factor in time: what is simulated beyond a touchdown.
+SLACK = 1.2
+# Disturbance (m, rad, m/s, rad/s) by which the equations of the section are differentiated.
+DISTURBANCE = 1e-5
+# Two directions are one when the sine of the angle between them is below this.
+RANK_TOLERANCE = 1e-7
+# How far (m, m/s) a state may be off the equations of the section.
+ON_THE_SECTION = 1e-8
+
+
+@dataclass(frozen=True)
+class Section:
+    """States just after a touchdown, as the contact points see them."""
+
+    robot: Robot
+    ground: Ground
+
+    @property
+    def along(self) -> Floats:
+        """Unit vector (x, z) along the ground."""
+        left, right = self.ground.model().vertices[:2]
+        direction: Floats = (right - left) / np.hypot(*(right - left))
+        return direction
+
+    def contacts(self, state: State) -> tuple[Floats, Floats, Floats]:
+        """Places along the ground, gaps and velocities (normal, tangent) of the contact points."""
+        model = self.robot.model
+        memory = allocate_memory(self.robot)
+        memory.q[:] = state.q
+        memory.v[:] = state.v
+        observe(model, self.ground.model(), memory)
+        velocity = np.empty((self.robot.nc, 2))
+        jacobian = np.zeros((3, self.robot.nv))
+        for i, position in enumerate(memory.contacts.position):
+            kernels.point_jacobian(
+                model, memory.tree, int(model.contact_link[i]), position, jacobian
+            )
+            vx, vz, _ = jacobian @ state.v
+            nx, nz = memory.contacts.normal[i]
+            velocity[i] = nx * vx + nz * vz, nz * vx - nx * vz
+        return memory.contacts.position @ self.along, memory.contacts.gap, velocity
+
+    def standing(self, state: State) -> tuple[Flags, Flags]:
+        """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""
+        _, gap, velocity = self.contacts(state)
+        touching = np.abs(gap) <= ON_THE_GROUND
+        at_rest = np.abs(velocity) <= AT_REST
+        at_rest[:, 0] &= touching
+        at_rest[:, 1] &= at_rest[:, 0]
+        return touching, at_rest
+
+    def foothold(self, state: State) -> int:
+        """First contact point that stands, or else the lowest."""
+        _, gap, _ = self.contacts(state)
+        _, at_rest = self.standing(state)
+        return int(np.argmax(at_rest[:, 0]) if at_rest.any() else np.argmin(gap))
+
+    def moved_back(self, state: State) -> tuple[State, float]:
+        """Return the state with its foothold level with the world's origin, and how far it was."""
+        place, _, _ = self.contacts(state)
+        distance = float(place[self.foothold(state)])
+        q = state.q.copy()
+        q[:2] -= distance * self.along
+        return State(q, state.v), distance
+
+
+class Chart:
+    """Coordinates of the states on the section near one of them, which is their origin.
+
+    Points on the ground stay there, points at rest stay at rest, and the foothold keeps its place.
+    """
+
+    def __init__(self, section: Section, origin: State) -> None:
+        self._section = section
+        self._nq = len(origin.q)
+        self._origin = np.concatenate((origin.q, origin.v))
+        self._touching, self._at_rest = section.standing(origin)
+        self._foothold = section.foothold(origin)
+        size = len(self._origin)
+        columns = [
+            (self._equations(self._origin + e) - self._equations(self._origin - e))
+            / (2.0 * DISTURBANCE)
+            for e in DISTURBANCE * np.eye(size)
+        ]
+        gradient = np.array(columns).T
+        _, singular, directions = np.linalg.svd(gradient)
+        rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
+        self._normal = directions[:rank].T
+        self._tangent = directions[rank:].T
+        self._correction = self._normal @ np.linalg.pinv(
+            gradient @ self._normal, rcond=RANK_TOLERANCE
+        )
+
+    @property
+    def size(self) -> int:
+        """Number of coordinates."""
+        return int(self._tangent.shape[1])
+
+    def _equations(self, x: Floats) -> Floats:
+        """What vanishes on the section."""
+        place, gap, velocity = self._section.contacts(State(x[: self._nq], x[self._nq :]))
+        return np.concatenate(
+            (gap[self._touching], velocity[self._at_rest], [place[self._foothold]])
+        )
+
+    def state(self, coordinates: Floats) -> State:
+        """Return the state on the section that has the coordinates."""
+        x = self._origin + self._tangent @ coordinates
+        for _ in range(20):
+            change = self._correction @ self._equations(x)
+            x = x - change
+            if np.abs(change).max() <= 1e-15:
+                break
+        if np.abs(self._equations(x)).max() > ON_THE_SECTION:
+            raise LimitCycleError("the step leads too far from the states just after touchdown")
+        return State(x[: self._nq], x[self._nq :])
+
+    def coordinates(self, state: State) -> Floats:
+        """Return the coordinates of a state on the section."""
+        x = np.concatenate((state.q, state.v))
+        off = np.abs(self._equations(x)).max()
+        if off > ON_THE_SECTION:
+            raise LimitCycleError(
+                "the contact points that stand after the step are not those that stood before it "
+                f"({off:.3g} m or m/s between the two)"
+            )
+        coordinates: Floats = (x - self._origin) @ self._tangent
+        return coordinates
+
+
+@dataclass(frozen=True)
+class Landing:
+    """The end of a step: the state on the section, the time it took (s), its length (m)."""
+
+    state: State
+    time: float
+    length: float
+
+
+class PoincareMap:
+    """Steps of a walk, one at a time.
+
+    Parameters
+    ----------
+    section : Section
+    controller : object with ``torque(t, state, contacts)``, or None
+    method : EventDriven
+    landing : sequence of int, optional
+        Contact points all of which must have come down to complete a step.
+    symmetry : callable, optional
+        Relabels the legs after a step.
+    longest : float
+        Seconds after which a step has failed.
+
+    Raises
+    ------
+    SimulationError
+        If it does not tell when a step is complete and what comes after it.
+    """
+
+    def __init__(
+        self,
+        section: Section,
+        controller: Controller | CompiledController | None,
+        method: EventDriven,
+        landing: Sequence[int] | None,
+        symmetry: Callable[[State], State] | None,
+        longest: float,
+    ) -> None:
+        robot = section.robot
+        self._section = section
+        self._controller = controller
+        # Only the rows of events are looked at.
+        self._method = replace(method, output_period=longest)
+        self._longest = longest
+        self._expected = longest
+        if landing is not None and not (landing and set(landing) <= set(range(robot.nc))):
+            raise SimulationError(
+                f"landing must name contact points from 0 to {robot.nc - 1}, got {landing}"
+            )
+        if landing is not None:
+            self._feet = [frozenset(landing)]
+        elif robot.mirror is not None:
+            self._feet = [frozenset(foot.contacts) for foot in robot.feet]
+        else:
+            self._feet = [frozenset((i,)) for i in range(robot.nc)]
+        self._relabelled: Callable[[State, int], State]
+        if symmetry is not None:
+            self._relabelled = lambda state, _: symmetry(state)
+        elif landing is not None:
+            self._relabelled = lambda state, _: state
+        elif robot.mirror is not None:
+            self._relabelled = lambda state, _: exchanged(robot, state)
+        elif is_wheel(robot):
+            self._relabelled = lambda state, contact: turned(robot, state, contact)
+        else:
+            raise SimulationError(
+                f"robot {robot.name!r} has no mirror image: say which contact points complete a "
+                "step (landing) and, if legs change their parts, how (symmetry)"
+            )
+
+    def __call__(self, state: State) -> Landing:
+        """Take one step.
+
+        Raises
+        ------
+        LimitCycleError
+            If it is not completed.
+        """
+        run, time, contact = self._walk(state)
+        row = np.flatnonzero(run.time <= time + SAME_INSTANT)[-1]
+        after = self._relabelled(State(run.position[row], run.velocity[row]), contact)
+        after, end = self._section.moved_back(after)
+        _, begin = self._section.moved_back(state)
+        return Landing(after, time, abs(end - begin))
+
+    def _walk(self, state: State) -> tuple[Run, float, int]:
+        """Simulate beyond the end of a step; return the run, that time and the point that landed.
+
+        Steps take about as long as the one before; where that is too short, they get the longest.
+        """
+        for duration in (min(SLACK * self._expected, self._longest), self._longest):
+            run = simulate(
+                self._section.robot,
+                self._controller,
+                state=state,
+                duration=duration,
+                method=self._method,
+                ground=self._section.ground,
+            )
+            down: set[int] = set()
+            for event in run.events:
+                if event.kind is EventKind.TOUCHDOWN and event.time > 0.0:
+                    down.add(event.contact)
+                elif event.kind is EventKind.LIFTOFF:
+                    down.discard(event.contact)
+                if any(foot <= down for foot in self._feet):
+                    self._expected = event.time
+                    return run, event.time, event.contact
+            if not run.completed:
+                break
+        raise LimitCycleError(
+            f"robot {run.robot.name!r} did not complete a step in {run.time[-1]:.6g} s "
+            f"({run.message}); begin nearer to the cycle"
+        )
+
+
+def exchanged(robot: Robot, state: State) -> State:
+    """Return a state with left and right exchanged."""
+    mirror = robot.mirror
+    if mirror is None:
+        raise LimitCycleError(f"robot {robot.name!r} has no mirror image")
+    return State(mirror.position(state.q, robot.model.reference), mirror.velocity(state.v))
+
+
+def is_wheel(robot: Robot) -> bool:
+    """Whether all contact points are spokes of one wheel: evenly spaced, balanced on its hinge."""
+    model = robot.model
+    links = np.unique(model.contact_link)
+    if len(links) != 1 or robot.nc < 3:
+        return False
+    (link,) = links
+    spokes = model.contact_position @ np.array([1j, 1.0])  # angles about +y, from the vertical
+    gaps = np.diff(np.sort(np.angle(spokes)), append=np.sort(np.angle(spokes))[0] + 2.0 * np.pi)
+    return bool(
+        model.axis[link, 0] != 0.0
+        and np.ptp(np.abs(spokes)) < 1e-9
+        and np.ptp(gaps) < 1e-9
+        and np.ptp(model.contact_radius) < 1e-9
+        and np.abs(model.center_of_mass[link]).max() < 1e-9
+    )
+
+
+def turned(robot: Robot, state: State, contact: int) -> State:
+    """Return the state of a wheel turned by whole spokes: point 0 takes the place of `contact`."""
+    model = robot.model
+    link = int(model.contact_link[0])
+    spokes = model.contact_position @ np.array([1j, 1.0])
+    turn = float(np.angle(spokes[contact] / spokes[0]))
+    q = state.q.copy()
+    q[link] += model.axis[link, 0] * turn
+    return State(q, state.v)

@@ -1,0 +1,144 @@
+"""The linear system that a robot is in the neighbourhood of a state, exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.dynamics.evaluation import Floats, contact_indices, joint_vector, torque_vector
+from heelstrike.robot.robot import Robot
+
+if TYPE_CHECKING:
+    import casadi
+
+
+@dataclass(frozen=True, eq=False)
+class Linearization:
+    """d/dt (δq, δv) = A (δq, δv) + B δΓ about a state and torque.
+
+    Attributes
+    ----------
+    A : (nq + nv, nq + nv) float
+        Derivative of (v, v̇) with respect to (q, v).
+    B : (nq + nv, nu) float
+        Derivative of (v, v̇) with respect to the joint torques.
+    state_derivative : (nq + nv,) float
+        (v, v̇) at the state itself, zero at an equilibrium.
+    contact_force : (k, 2) float
+        Force (normal, tangent) of the ground on the robot at the held contact points, in N.
+    contact_force_state : (k, 2, nq + nv) float
+        Its derivative with respect to (q, v).
+    contact_force_torque : (k, 2, nu) float
+        Its derivative with respect to the joint torques.
+    """
+
+    A: Floats
+    B: Floats
+    state_derivative: Floats
+    contact_force: Floats
+    contact_force_state: Floats
+    contact_force_torque: Floats
+
+
+def linearize(
+    robot: Robot,
+    q: ArrayLike,
+    v: ArrayLike,
+    torque: ArrayLike,
+    *,
+    contacts: Iterable[int | str] = (),
+) -> Linearization:
+    """Linearise the equations of motion about a state, with derivatives exact to rounding.
+
+    The derivatives come from the traced kernels (algorithmic differentiation), not from
+    differences. Dampers and springs are part of the system.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, v : (nq,) and (nv,) array
+        State.
+    torque : (nu,) array
+        Joint torques.
+    contacts : iterable of int or str
+        Contact points (index or name) that the ground holds: they neither leave level ground nor
+        slide, discs roll. The constraint is J v̇ + J̇v = 0, so that A also tells how the velocity of
+        a perturbation that breaks the contact would go on. Redundant points, such as heel and toe
+        of one flat foot, are welcome: A and B are unique, forces are those of least norm.
+
+    Returns
+    -------
+    Linearization
+        A, B, and the same for the contact forces.
+
+    Raises
+    ------
+    RobotError
+        If a vector has the wrong length or there is no such contact point.
+    """
+    held = contact_indices(robot, contacts)
+    position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
+    gamma = torque_vector(robot, torque)
+    n, k = robot.nv, 2 * len(held)
+    equations, derivatives = _equations(robot, held)
+    nothing = np.zeros(n + k)
+    constant = np.array(equations(position, velocity, nothing, gamma)).ravel()
+    system = np.array(derivatives(position, velocity, nothing, gamma)[0])
+    solution = _solved(system, -constant[:, None], n)[:, 0]
+    slopes = [np.array(part) for part in derivatives(position, velocity, solution, gamma)]
+    # Implicit differentiation: the equations stay satisfied.
+    rates = _solved(system, -np.hstack(slopes[1:]), n)
+    by_state, by_torque = rates[:, : 2 * n], rates[:, 2 * n :]
+    upper = np.hstack([np.zeros((n, n)), np.eye(n)])
+    return Linearization(
+        A=np.vstack([upper, by_state[:n]]),
+        B=np.vstack([np.zeros((n, robot.nu)), by_torque[:n]]),
+        state_derivative=np.concatenate([velocity, solution[:n]]),
+        contact_force=solution[n:].reshape(-1, 2),
+        contact_force_state=by_state[n:].reshape(len(held), 2, 2 * n),
+        contact_force_torque=by_torque[n:].reshape(len(held), 2, robot.nu),
+    )
+
+
+def _solved(system: Floats, right: Floats, n: int) -> Floats:
+    """Solve for n accelerations, which are unique, and contact forces, the shortest there are.
+
+    Accelerations are scaled by the mass matrix's diagonal, so that light links count as heavy ones.
+    """
+    scale = np.ones(len(system))
+    scale[:n] = 1.0 / np.sqrt(np.diag(system)[:n])
+    scaled = scale[:, None] * system * scale
+    solution: Floats = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=1e-12)[0]
+    return scale[:, None] * solution
+
+
+@lru_cache(maxsize=32)
+def _equations(robot: Robot, contacts: tuple[int, ...]) -> tuple[casadi.Function, casadi.Function]:
+    """Equations of motion and of contact as functions of (q, v, (v̇, λ), Γ), and their Jacobians.
+
+    The Jacobians are those with respect to (v̇, λ), (q, v) and Γ.
+    """
+    import casadi
+
+    from heelstrike.dynamics.casadi_functions import contact_equations
+
+    n = robot.nv
+    q, v = casadi.SX.sym("q", n), casadi.SX.sym("v", n)
+    unknown = casadi.SX.sym("unknown", n + 2 * len(contacts))
+    torque = casadi.SX.sym("torque", robot.nu)
+    residual = contact_equations(robot, contacts, q, v, unknown[:n], unknown[n:], torque)
+    jacobians = [
+        casadi.densify(casadi.jacobian(residual, x))
+        for x in (unknown, casadi.vertcat(q, v), torque)
+    ]
+    arguments = [q, v, unknown, torque]
+    return (
+        casadi.Function("equations", arguments, [residual]),
+        casadi.Function("derivatives", arguments, jacobians),
+    )

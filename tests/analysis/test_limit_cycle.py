@@ -1,0 +1,185 @@
+"""Limit cycles and Floquet multipliers against closed forms and published ones.
+
+Fixed points and periods hold to 1e-8, the digits that are published; multipliers to 1e-5, the
+accuracy of central differences of a map known to 1e-11.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import mechanisms
+import numpy as np
+import pytest
+import walking
+from numpy.typing import NDArray
+
+import heelstrike as hs
+
+SPOKE = np.pi / 8.0  # half the angle between two spokes
+SLOPE = np.deg2rad(3.0)
+PASSIVE = hs.EventDriven(rtol=1e-12, atol=1e-13, swing_feet_pass=True)
+
+
+def wheel_state(slope: float, speed: float) -> hs.State:
+    """State of the wheel just after the impact of a spoke, rolling downhill."""
+    hub = np.cos(SPOKE) * np.array([np.sin(slope), np.cos(slope)])
+    arm = np.array([-np.sin(SPOKE - slope), np.cos(SPOKE - slope)])
+    return hs.State(np.array([*hub, slope]), np.array([speed * arm[1], -speed * arm[0], speed]))
+
+
+def wheel_cycle(gravity: float, slope: float, inertia: float) -> tuple[float, float]:
+    """Speed just after an impact on the limit cycle, and multiplier, in closed form.
+
+    An impact keeps the part (I + cos 2α)/(I + 1) of the speed; rolling adds 4 g sin α sin γ/(I + 1)
+    to its square. The map of the square is linear, and so its slope the multiplier.
+    """
+    kept = (inertia + np.cos(2.0 * SPOKE)) / (inertia + 1.0)
+    gain = 4.0 * gravity * np.sin(SPOKE) * np.sin(slope) / (inertia + 1.0)
+    return float(kept * np.sqrt(gain / (1.0 - kept**2))), float(kept**2)
+
+
+@cache
+def roll(gravity: float, slope: float, inertia: float) -> hs.LimitCycle:
+    """Limit cycle of a wheel that begins a tenth too fast."""
+    speed, _ = wheel_cycle(gravity, slope, inertia)
+    return hs.find_limit_cycle(
+        mechanisms.rimless_wheel(inertia=inertia, gravity=gravity),
+        wheel_state(slope, 1.1 * speed),
+        ground=hs.Ground(friction=3.0, slope=-slope),
+    )
+
+
+@pytest.mark.parametrize(
+    ("gravity", "slope", "speed", "period"),
+    [(9.81, 0.08, 1.0954628396, 1.0345498114), (9.8, 0.15, 1.4972474413, 0.5266577771)],
+)
+def test_rimless_wheel(gravity: float, slope: float, speed: float, period: float) -> None:
+    """A wheel with inertia in closed form; without, the published one by extrapolation.
+
+    Without inertia about its hub the wheel has a singular mass matrix. All figures are smooth in
+    the inertia, so that two small ones tell the limit up to their square, 1e-10.
+    """
+    cycle = roll(gravity, slope, 0.01)
+    exact, multiplier = wheel_cycle(gravity, slope, 0.01)
+    assert cycle.state.v[2] == pytest.approx(exact, abs=1e-8)
+    np.testing.assert_allclose(cycle.multipliers, [multiplier], atol=1e-5)
+    assert cycle.step_length == pytest.approx(2.0 * np.sin(SPOKE), abs=1e-12)
+    assert cycle.residual <= 1e-10
+    assert cycle.stable
+
+    def figures(cycle: hs.LimitCycle) -> NDArray[np.float64]:
+        return np.array([cycle.state.v[2], cycle.period, cycle.multipliers[0].real])
+
+    limit = 2.0 * figures(roll(gravity, slope, 1e-5)) - figures(roll(gravity, slope, 2e-5))
+    np.testing.assert_allclose(limit[:2], [speed, period], atol=1e-8)
+    assert limit[2] == pytest.approx(np.cos(2.0 * SPOKE) ** 2, abs=1e-5)
+
+
+def compass_state(stance: float, swing: float, stance_rate: float, swing_rate: float) -> hs.State:
+    """State of the compass gait with its left foot at the origin."""
+    hip = np.array([np.cos(stance), -np.sin(stance)]) * stance_rate
+    return hs.State(
+        np.array([np.sin(stance), np.cos(stance), stance, swing]),
+        np.array([*hip, stance_rate, swing_rate]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("gravity", "rates", "period"),
+    [
+        (9.8, (1.091826677, 0.377181558), 0.734720962),
+        (9.81, (1.092383590, 0.377373949), 0.734346391),
+    ],
+)
+def test_compass_gait(gravity: float, rates: tuple[float, float], period: float) -> None:
+    """The published passive walk, from a start a few hundredths away and in the middle of a step.
+
+    Multipliers do not depend on gravity, which only scales time.
+    """
+    cycle = hs.find_limit_cycle(
+        mechanisms.compass_gait(gravity),
+        compass_state(-0.2, 0.34, 1.05, 0.35),
+        ground=hs.Ground(friction=3.0, slope=-SLOPE),
+        method=PASSIVE,
+    )
+    stance = int(np.argmin(cycle.state.q[2:]))  # uphill of the hip's foot is the leading one
+    order = [2 + stance, 3 - stance]
+    np.testing.assert_allclose(cycle.state.q[order], [-0.218668803, 0.323388558], atol=1e-8)
+    np.testing.assert_allclose(cycle.state.v[order], rates, atol=1e-8)
+    assert cycle.period == pytest.approx(period, abs=1e-8)
+    assert cycle.step_length == pytest.approx(0.535445415, abs=1e-8)
+    multipliers = np.sort_complex(cycle.multipliers)
+    published = [-0.199726 - 0.544476j, -0.199726 + 0.544476j, 0.131573]
+    np.testing.assert_allclose(multipliers, published, atol=1e-5)
+    assert cycle.stable
+    assert "stable" in repr(cycle)
+
+
+def test_a_cycle_repeats_when_simulated() -> None:
+    """Ten steps from the state found: touchdowns a period apart, as far as multipliers < 1 keep."""
+    robot, ground = mechanisms.compass_gait(), hs.Ground(friction=3.0, slope=-SLOPE)
+    cycle = hs.find_limit_cycle(
+        robot, compass_state(-0.2, 0.34, 1.05, 0.35), ground=ground, method=PASSIVE
+    )
+    run = hs.simulate(
+        robot, state=cycle.state, duration=10.1 * cycle.period, method=PASSIVE, ground=ground
+    )
+    times = [e.time for e in run.events if e.kind.name == "TOUCHDOWN" and e.time > 0.0]
+    np.testing.assert_allclose(times, cycle.period * np.arange(1, 11), atol=1e-8)
+
+
+def test_a_stride_of_two_steps_has_squared_multipliers() -> None:
+    """Waiting for one foot alone needs no symmetry; both steps are the same."""
+    robot, ground = mechanisms.compass_gait(), hs.Ground(friction=3.0, slope=-SLOPE)
+    state = compass_state(-0.2186, 0.3233, 1.0918, 0.3771)
+    step = hs.find_limit_cycle(robot, state, ground=ground, method=PASSIVE)
+    stride = hs.find_limit_cycle(robot, state, ground=ground, method=PASSIVE, landing=[1])
+    assert stride.period == pytest.approx(2.0 * step.period, abs=1e-8)
+    assert stride.step_length == pytest.approx(2.0 * step.step_length, abs=1e-8)
+    np.testing.assert_allclose(
+        np.sort_complex(stride.multipliers), np.sort_complex(step.multipliers**2), atol=1e-5
+    )
+
+
+def test_bravo7_under_computed_torque() -> None:
+    """The designed gait is a fixed point, and the controller undoes disturbances within a step.
+
+    Joint errors die like (1 + c t) exp(-20 t) under kp = 400, kd = 40, that is by 1e-5 in 0.7 s.
+    """
+    gait = walking.gait()
+    cycle = hs.find_limit_cycle(
+        walking.bravo7(),
+        gait.initial_state,
+        hs.ComputedTorque(walking.bravo7(), gait),
+        ground=hs.Ground(friction=walking.FRICTION),
+    )
+    assert cycle.period == pytest.approx(gait.step_duration, abs=1e-8)
+    assert cycle.step_length == pytest.approx(gait.step_length, abs=1e-8)
+    np.testing.assert_allclose(cycle.state.q[1:], gait.initial_state.q[1:], atol=1e-8)
+    np.testing.assert_allclose(cycle.state.v, gait.initial_state.v, atol=1e-8)
+    assert np.abs(cycle.multipliers).max() <= 1e-3
+
+
+def test_a_robot_that_does_not_walk() -> None:
+    with pytest.raises(hs.LimitCycleError, match="did not complete a step"):
+        hs.find_limit_cycle(
+            mechanisms.compass_gait(),
+            compass_state(-0.2, 0.3, 0.0, 0.0),
+            method=PASSIVE,
+            ground=hs.Ground(friction=3.0, slope=-SLOPE),
+            longest_step=0.3,
+        )
+
+
+def test_usable_arguments() -> None:
+    robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
+    with pytest.raises(hs.SimulationError, match="event-driven"):
+        hs.find_limit_cycle(robot, state, method=hs.TimeStepping())  # type: ignore[arg-type]
+    stairs = hs.Ground.stairs(rise=-0.01, tread=0.3, count=3)
+    with pytest.raises(hs.SimulationError, match="flat or sloping"):
+        hs.find_limit_cycle(robot, state, ground=stairs)
+    with pytest.raises(hs.SimulationError, match="landing"):
+        hs.find_limit_cycle(robot, state, landing=[7])
+    with pytest.raises(hs.SimulationError, match="mirror image"):
+        hs.find_limit_cycle(mechanisms.block(), mechanisms.block().reference_state())
