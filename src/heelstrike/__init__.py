@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
+    from heelstrike.errors import ViewError as ViewError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PiecewiseGait as PiecewiseGait
@@ -101,6 +102,7 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "ViewError": "heelstrike.errors",
     "builtin_robots": "heelstrike.robot",
     "compare": "heelstrike.experiments.comparison",
     "contact_forward_dynamics": "heelstrike.contact",

@@ -27,6 +27,9 @@ from heelstrike.robot.warning import RobotWarning
 SAME_HEIGHT = 1e-4
 """Metres up to which two contact points are equally high."""
 
+ROUND_OFF = 1e-12
+"""Metres, of sums along a leg."""
+
 
 class FindingKind(enum.Enum):
     """What is wrong with a robot."""
@@ -219,8 +222,8 @@ def _inertias(robot: Robot) -> Iterator[Finding]:
         if gyration > size:
             yield Finding(
                 FindingKind.INERTIA,
-                f"link {robot.link_names[link]!r} has the radius of gyration {gyration:.3g} m, more "
-                f"than the robot's extent of {size:.3g} m. Is its inertia in kg m²?",
+                f"link {robot.link_names[link]!r} has the radius of gyration {gyration:.3g} m, "
+                f"more than the robot's extent of {size:.3g} m. Is its inertia in kg m²?",
             )
 
 
@@ -275,6 +278,7 @@ def _bottoms(robot: Robot) -> Floats:
     model = robot.model
     points: Floats = link_origins(model)[model.contact_link] + model.contact_position
     points[:, 1] -= model.contact_radius
+    points[np.abs(points) < ROUND_OFF] = 0.0
     return points
 
 
@@ -308,21 +312,21 @@ def _description(robot: Robot) -> str:
         "",
         *_table(robot),
         "",
-        "feet: " + (", ".join(_foot_words(robot, foot, points) for foot in robot.feet) or "none"),
+        "feet: " + (", ".join(_foot_words(foot, points) for foot in robot.feet) or "none"),
     ]
     if robot.nc:
         lines.append("contact points (x, z of the lowest point as the robot stands in its file)")
         for i, name in enumerate(robot.contact_names):
             radius = f", radius {robot.model.contact_radius[i]:g} m"
             lines.append(
-                f"  {name}: {points[i, 0] + 0.0:.4g}, {points[i, 1] + 0.0:.4g} m"
+                f"  {name}: {points[i, 0]:.4g}, {points[i, 1]:.4g} m"
                 + (radius if robot.model.contact_radius[i] else "")
                 + (f", friction {robot.contact_friction[i]:g}" if robot.contact_friction else "")
             )
     return "\n".join(lines)
 
 
-def _foot_words(robot: Robot, foot: Foot, points: Floats) -> str:
+def _foot_words(foot: Foot, points: Floats) -> str:
     length = np.ptp(points[list(foot.contacts), 0])
     return f"{foot.name} ({len(foot.contacts)} points, {length:.3g} m long)"
 
@@ -352,7 +356,7 @@ def _tree(robot: Robot) -> Iterator[tuple[int, str]]:
         yield joint, lead
         own = children.get(joint, [])
         for place, child in reversed(list(enumerate(own))):
-            if len(own) == 1 and len(children[int(robot.model.parent[joint])]) <= 1:
+            if len(own) == 1:
                 stack.append((child, below, below))  # a chain needs no lines
             else:
                 last = place == len(own) - 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.dynamics.queries import link_poses
+from heelstrike.dynamics import link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.view.drawing import extent, legs_apart, skeleton
 
