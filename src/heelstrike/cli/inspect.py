@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -46,9 +47,11 @@ def inspect(
         if inspection.robot is not None:
             from heelstrike.view.terminal import terminal_drawing
 
-            _print(terminal_drawing(inspection.robot))
+            _draw(terminal_drawing(inspection.robot))
         _print(inspection.text())
-    if picture is not None and inspection.robot is not None:
+    if picture is not None and inspection.robot is None:
+        tell(f"{picture} is not drawn, for there is no robot to draw")
+    elif picture is not None and inspection.robot is not None:
         from heelstrike.view.drawing import robot_picture
 
         robot_picture(inspection.robot, picture)
@@ -59,3 +62,12 @@ def inspect(
 
 def _print(text: str) -> None:
     output().print(Text(text), soft_wrap=True)
+
+
+def _draw(text: str) -> None:
+    """Print a drawing, unless the terminal or pipe has no letters for it."""
+    try:
+        text.encode(sys.stdout.encoding or "ascii")
+    except UnicodeEncodeError:
+        return
+    _print(text)

@@ -15,12 +15,13 @@ import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import link_origins
-from heelstrike.robot.library import load_robot
+from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.mjcf import read_mjcf
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.saving import body_links
+from heelstrike.robot.screening import is_readable
 from heelstrike.robot.urdf import MASSLESS
 from heelstrike.robot.warning import RobotWarning
 
@@ -76,11 +77,14 @@ class Inspection:
         robot with the nearest possible ones: to look at, not to simulate.
     findings : tuple of Finding
         What looks wrong, nothing for a sound robot.
+    loadable : bool
+        Whether :func:`load_robot` takes the file as it is.
     """
 
     source: str
     robot: Robot | None
     findings: tuple[Finding, ...]
+    loadable: bool = True
 
     @property
     def sound(self) -> bool:
@@ -94,6 +98,9 @@ class Inspection:
             parts.append("\n".join(["findings", *(f"  - {found}" for found in self.findings)]))
         else:
             parts.append("findings\n  none")
+        if not self.loadable:
+            shown = "" if self.robot is None else " Above, the inertias are the nearest possible."
+            parts.append(f"load_robot refuses this file as it is.{shown}")
         return "\n\n".join(parts)
 
     def __str__(self) -> str:
@@ -131,15 +138,17 @@ def inspect_robot(
     if isinstance(robot, Robot):
         return Inspection(robot.source or robot.name, robot, tuple(_of_robot(robot)))
     findings: list[Finding] = []
-    path = Path(os.fspath(robot)) if isinstance(robot, str | os.PathLike) else None
+    path = _file(robot)
+    loadable = True
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RobotWarning)
         found: Robot | None = None
         try:
             found = load_robot(robot, floating=floating, projected=projected)
         except RobotError as error:
-            if path is None or not path.is_file():
+            if path is None:
                 raise
+            loadable = False
             findings += _of_inertias(path)
             try:
                 found = read_mjcf(path, floating=floating, projected=projected, lenient=True)
@@ -148,7 +157,7 @@ def inspect_robot(
             if not findings:
                 raise error from None
         else:
-            if path is not None and path.is_file():
+            if path is not None:
                 findings += _of_inertias(path)
     said = dict.fromkeys(str(one.message) for one in caught if one.category is RobotWarning)
     findings += [
@@ -156,7 +165,15 @@ def inspect_robot(
     ]
     if found is not None:
         findings += _of_robot(found)
-    return Inspection(str(robot), found, tuple(dict.fromkeys(findings)))
+    return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), loadable)
+
+
+def _file(robot: str | os.PathLike[str]) -> Path | None:
+    """Path of a robot that comes from a file, None for a built-in robot or where none is."""
+    if not isinstance(robot, str | os.PathLike) or robot in builtin_robots():
+        return None
+    path = Path(os.fspath(robot))
+    return path if is_readable(path) else None
 
 
 def _of_inertias(path: Path) -> Iterator[Finding]:
@@ -413,6 +430,7 @@ def facts(inspection: Inspection) -> dict[str, Any]:
     robot = inspection.robot
     result: dict[str, Any] = {
         "source": inspection.source,
+        "loadable": inspection.loadable,
         "findings": [
             {"kind": found.kind.value, "message": found.message} for found in inspection.findings
         ],

@@ -126,8 +126,7 @@ def parse(
     except RobotError:
         raise
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
-        raise RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}") from error
+        raise _unreadable(label, error) from error
     for remark in remarks:
         warn(f"{label}: {remark}")
     return MujocoFile(model, pose, xml, label)
@@ -152,7 +151,7 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
             warnings.simplefilter("ignore")
             spec = _parsed(path, xml, label)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
-        raise RobotError(f"{label}: MuJoCo's parser cannot read this robot: {error}") from error
+        raise _unreadable(label, error) from error
     result = []
     for body in spec.bodies:
         if not body.explicitinertial or body.id == 0:
@@ -165,6 +164,11 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
             tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         result.append((body.name, float(body.mass), tensor))
     return result
+
+
+def _unreadable(label: str, error: Exception) -> RobotError:
+    reason = " ".join(str(error).split())
+    return RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}")
 
 
 def compiled(spec: Any, remarks: list[str]) -> Any:

@@ -52,7 +52,7 @@ def screen(source: Path | str, label: str) -> Element | None:
         tree = pending.pop()
         for include in () if tree is None else tree.iter("include"):
             path = directory / include.get("file", "")
-            if path not in seen and _is_readable(path):
+            if path not in seen and is_readable(path):
                 seen.add(path)
                 pending.append(_checked(path, f"{label}: included {path}", directory))
     return root
@@ -102,7 +102,7 @@ def _read(path: Path, label: str) -> str:
         raise RobotError(f"{label}: the file cannot be read: {error}.") from error
 
 
-def _is_readable(path: Path) -> bool:
+def is_readable(path: Path) -> bool:
     """Whether there is a regular file; an impossible name (too long, null character) is none."""
     try:
         return path.is_file()
