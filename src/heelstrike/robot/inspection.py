@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import math
 import os
 import warnings
 from collections.abc import Iterator
@@ -14,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.assembly import link_origins
+from heelstrike.robot.assembly import UNLIKELY, link_origins
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.mjcf import read_mjcf
 from heelstrike.robot.model import Floats
+from heelstrike.robot.plausibility import Unlikely, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.saving import body_links
 from heelstrike.robot.screening import is_readable
@@ -42,6 +42,7 @@ class FindingKind(enum.Enum):
     CONTACT = "contact points above the sole"
     FOOT = "feet"
     LIMIT = "limits"
+    UNIT = "units"
     FILE = "said by the reader"
 
 
@@ -160,8 +161,11 @@ def inspect_robot(
             if path is not None:
                 findings += _of_inertias(path)
     said = dict.fromkeys(str(one.message) for one in caught if one.category is RobotWarning)
+    told_below = ("left and right differ", UNLIKELY)
     findings += [
-        Finding(FindingKind.FILE, words) for words in said if "left and right differ" not in words
+        Finding(FindingKind.FILE, words)
+        for words in said
+        if not any(phrase in words for phrase in told_below)
     ]
     if found is not None:
         findings += _of_robot(found)
@@ -198,10 +202,9 @@ def _of_inertias(path: Path) -> Iterator[Finding]:
 def _of_robot(robot: Robot) -> Iterator[Finding]:
     yield from _asymmetries(robot)
     yield from _missing_masses(robot)
-    yield from _inertias(robot)
+    yield from _numbers(robot)
     yield from _frictions(robot)
     yield from _soles(robot)
-    yield from _limits(robot)
 
 
 def _asymmetries(robot: Robot) -> Iterator[Finding]:
@@ -226,21 +229,6 @@ def _missing_masses(robot: Robot) -> Iterator[Finding]:
                 FindingKind.MASS,
                 f"link {robot.link_names[link]!r} moves, by joint {robot.joint_names[link]!r}, and "
                 "has no mass.",
-            )
-
-
-def _inertias(robot: Robot) -> Iterator[Finding]:
-    """Find moments of inertia larger than the robot, or absent where a hinge needs one."""
-    model = robot.model
-    origin = link_origins(model)
-    size = float(np.ptp(origin + model.center_of_mass, axis=0).max(initial=0.0)) or math.inf
-    for link in np.flatnonzero(model.mass > 0.0):
-        gyration = math.sqrt(model.inertia[link] / model.mass[link])
-        if gyration > size:
-            yield Finding(
-                FindingKind.INERTIA,
-                f"link {robot.link_names[link]!r} has the radius of gyration {gyration:.3g} m, "
-                f"more than the robot's extent of {size:.3g} m. Is its inertia in kg m²?",
             )
 
 
@@ -299,21 +287,19 @@ def _bottoms(robot: Robot) -> Floats:
     return points
 
 
-def _limits(robot: Robot) -> Iterator[Finding]:
-    model = robot.model
-    for joint, name in enumerate(robot.joint_names):
-        low, start, high = model.lower[joint], model.reference[joint], model.upper[joint]
-        if not low <= start <= high:
-            yield Finding(
-                FindingKind.LIMIT,
-                f"{name} stands at {start:.4g} in the file, outside its range {low:.4g} … "
-                f"{high:.4g}. Degrees for radians?",
-            )
-        if model.axis[joint, 0] and min(abs(low), abs(high)) > 4.0 * np.pi and np.isfinite(high):
-            yield Finding(
-                FindingKind.LIMIT,
-                f"{name} may turn {high / (2 * np.pi):.3g} times around. Degrees for radians?",
-            )
+_ABOUT = {
+    Unlikely.INERTIA: FindingKind.INERTIA,
+    Unlikely.LIMIT: FindingKind.LIMIT,
+    Unlikely.UNIT: FindingKind.UNIT,
+}
+
+
+def _numbers(robot: Robot) -> Iterator[Finding]:
+    found = unlikely_numbers(
+        robot.model, link_origins(robot.model), robot.joint_names, robot.link_names
+    )
+    for about, words in found:
+        yield Finding(_ABOUT[about], words)
 
 
 # In words
@@ -349,10 +335,11 @@ def _foot_words(foot: Foot, points: Floats) -> str:
 
 
 def _table(robot: Robot) -> list[str]:
-    rows = [
+    headings = [
         ("joint", "moves", "kind", "mass kg", "inertia", "centre m", "range", "torque", "more"),
         ("", "", "", "", "kg m²", "x, z", "rad, m", "N m, N", ""),
     ]
+    rows: list[tuple[str, ...]] = [*headings]
     rows += [_row(robot, joint, indent) for joint, indent in _tree(robot)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [

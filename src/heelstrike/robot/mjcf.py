@@ -56,7 +56,12 @@ def read_mjcf(
     RobotWarning
         If the file says something that is not simulated, or left and right differ.
     """
-    file = parse(source, floating=floating, projected=projected, lenient=lenient)
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused in the end
+        file = parse(source, floating=floating, projected=projected, lenient=lenient)
+        return _robot(file, name or _model_name(file, source))
+
+
+def _robot(file: MujocoFile, name: str) -> Robot:
     model = file.model
     links = read_links(file)
     warn_of_unmodelled(file)
@@ -93,7 +98,7 @@ def read_mjcf(
         pivot=int(hinges[0]) if len(hinges) else 0,
     )
     return assembled(
-        name or _model_name(file, source),
+        name,
         arrays,
         joint_names=_joint_names(file),
         link_names=links.names,

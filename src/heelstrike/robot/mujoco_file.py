@@ -17,6 +17,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.flattening import float_in_plane, project
 from heelstrike.robot.screening import screen
 from heelstrike.robot.urdf import let_massless_links_pass, prepare_urdf, urdf_text
+from heelstrike.robot.urdf_check import check_urdf
 from heelstrike.robot.warning import warn
 
 
@@ -30,7 +31,7 @@ class MujocoFile:
         The compiled file.
     pose : mujoco.MjData
         World poses of joints, bodies and geoms in the reference configuration (``qpos0``).
-    xml : Element or None
+    xml : Element
         The file as it is written.
     source : str
         What to call the file in messages.
@@ -38,13 +39,13 @@ class MujocoFile:
 
     model: Any
     pose: Any
-    xml: Element | None
+    xml: Element
     source: str
 
     @property
     def is_urdf(self) -> bool:
         """Whether the file is URDF and not MJCF."""
-        return self.xml is not None and self.xml.tag == "robot"
+        return self.xml.tag == "robot"
 
     def given_name(self, kind: str, index: int) -> str:
         """Name that the file gives a body, joint, geom, actuator …, or the empty string."""
@@ -106,7 +107,9 @@ def parse(
     remarks: list[str] = []
     try:
         with _warnings_into(remarks):
-            urdf = xml is not None and xml.tag == "robot"
+            urdf = xml.tag == "robot"
+            if urdf and not lenient:
+                check_urdf(xml, label)
             if urdf or floating or projected or lenient:
                 spec = _parsed(source, xml, label)
                 if lenient:
@@ -180,11 +183,11 @@ def compiled(spec: Any, remarks: list[str]) -> Any:
     return model
 
 
-def _parsed(source: Path | str, xml: Element | None, label: str) -> Any:
+def _parsed(source: Path | str, xml: Element, label: str) -> Any:
     """Return a file as MuJoCo understands it, not yet compiled."""
     import mujoco
 
-    if xml is not None and xml.tag == "robot":
+    if xml.tag == "robot":
         directory = source.parent if isinstance(source, Path) else Path()
         spec = mujoco.MjSpec.from_string(urdf_text(xml, directory, label))
         prepare_urdf(spec)

@@ -42,7 +42,7 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
 
 def _warn_of_fixed_root(file: MujocoFile) -> None:
     """Warn of a URDF whose trunk MuJoCo fixes to the world, because nothing lets it float."""
-    if file.xml is None or not file.is_urdf:
+    if not file.is_urdf:
         return
     children = {child.get("link") for child in file.xml.iterfind("joint/child")}
     moving = {file.name("body", int(body)) for body in file.model.jnt_bodyid}

@@ -349,7 +349,7 @@ def legs_apart(robot: Robot) -> Floats:
         if not chain:
             continue
         turn = LEGS_APART if index else -LEGS_APART
-        for joint in dict.fromkeys((chain[0], foot.link)):
+        for joint in dict.fromkeys((int(chain[0]), foot.link)):
             sense = model.axis[joint, 0]
             if sense == 0.0:
                 continue
