@@ -13,6 +13,7 @@ from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.programs import straight_line_programs
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -42,8 +43,8 @@ class Memory(Bundle):
         Velocity at the end of the step.
     torque : (nu,) float
         Joint torques of this step, within their limits.
-    force, rate : (nv,) float
-        Generalised force without contact; scratch.
+    force, rate, bias : (nv,) float
+        Generalised force without contact; scratch; bias force H.
     stiffness, damping : (nv,) float
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
@@ -80,6 +81,12 @@ class Memory(Bundle):
     problem_mode : (capacity,) int
     residual : (3,) float
         Residuals of the certificate of the last solve.
+    programs : (5,) int
+        Addresses of straight-line code, zero for none; see :mod:`heelstrike.sim.programs`.
+    point_rows : (2 nc, nv) float
+    point_delassus : (2 nc, 2 nc) float
+    point_velocity, point_impulse : (nc, 2) float
+        Scratch, Delassus matrix, velocities and impulses of all contact points.
     solver : ContactWorkspace
         Memory of the contact solvers.
     tally : (3,) int
@@ -93,6 +100,7 @@ class Memory(Bundle):
     torque: Floats
     force: Floats
     rate: Floats
+    bias: Floats
     stiffness: Floats
     damping: Floats
     mass_matrix: Floats
@@ -119,6 +127,11 @@ class Memory(Bundle):
     problem_friction: Floats
     problem_mode: Integers
     residual: Floats
+    programs: Integers
+    point_rows: Floats
+    point_delassus: Floats
+    point_velocity: Floats
+    point_impulse: Floats
     solver: ContactWorkspace
     tally: Integers
     extreme: Floats
@@ -136,6 +149,7 @@ def allocate_memory(robot: Robot) -> Memory:
         torque=np.zeros(nu),
         force=np.zeros(nv),
         rate=np.zeros(nv),
+        bias=np.zeros(nv),
         stiffness=np.zeros(nv),
         damping=np.zeros(nv),
         mass_matrix=np.zeros((nv, nv)),
@@ -162,6 +176,11 @@ def allocate_memory(robot: Robot) -> Memory:
         problem_friction=np.zeros(capacity),
         problem_mode=np.zeros(capacity, dtype=np.int64),
         residual=np.zeros(3),
+        programs=straight_line_programs(robot.model),
+        point_rows=np.zeros((2 * nc, nv)),
+        point_delassus=np.zeros((2 * nc, 2 * nc)),
+        point_velocity=np.zeros((nc, 2)),
+        point_impulse=np.zeros((nc, 2)),
         solver=contact_workspace(max(capacity, 1)),
         tally=np.zeros(TALLIES, dtype=np.int64),
         extreme=np.zeros(EXTREMES),
