@@ -47,6 +47,7 @@ from heelstrike.sim.contact_geometry import (
     row_product,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
+from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
     DIVERGED,
@@ -253,8 +254,10 @@ def solve_contacts(
     """Turn the free velocity into the velocity at the end of the step; return success."""
     count = select_candidates(model, step, scheme, activation, memory)
     count = select_stops(model, step, scheme, activation, count, memory)
+    count = select_dry_joints(model, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
+    dry = points + 2 * nv
     for j in range(nv):
         memory.stop_torque[j] = 0.0
     contacts = memory.contacts
@@ -268,6 +271,7 @@ def solve_contacts(
     if count == 0:
         return True
     assemble_delassus(model, memory, count)
+    press_dry_joints(model, step, count, memory)
     status = solve_contact_kernel(
         count,
         memory.delassus,
@@ -283,6 +287,10 @@ def solve_contacts(
     add_impulse(model, memory, count, memory.next_v)
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= dry:
+            impulse = memory.impulse[2 * place + 1]
+            note_dry_joint(contact - dry, impulse, step, memory.problem_mode[place], memory)
+            continue
         if contact >= points:
             joint = (contact - points) // 2
             memory.stop_torque[joint] += (
@@ -331,7 +339,8 @@ def _advance(
     while True:
         if (
             record.row_count[0] >= record.time.shape[0]
-            or record.event_count[0] + 2 * model.contact_link.shape[0] > record.event_time.shape[0]
+            or record.event_count[0] + 2 * (model.contact_link.shape[0] + nv)
+            > record.event_time.shape[0]
         ):
             return RECORD_FULL
         k = span[0]
