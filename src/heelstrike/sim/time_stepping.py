@@ -48,6 +48,7 @@ from heelstrike.sim.contact_geometry import (
     locate_contacts,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
+from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
     DIVERGED,
@@ -285,12 +286,12 @@ def select_stops(
 
 @kernel
 def write_rows(model: Model, memory: Memory, count: int) -> None:
-    """Write the Jacobian rows of all candidates.
+    """Write the Jacobian rows of contact points and stops; those of dry joints are written.
 
     A stop has a normal row ±1 at its joint and a tangent row of zeros.
     """
     points = model.contact_link.shape[0]
-    for place in range(count):
+    for place in range(count - memory.dry_joint.shape[0]):
         candidate = memory.candidate[place]
         if candidate < points:
             contact_rows(model, memory, candidate, place)
@@ -349,8 +350,10 @@ def solve_contacts(
     """Turn the free velocity into the velocity at the end of the step; return success."""
     touching = select_candidates(model, step, scheme, activation, memory)
     count = select_stops(model, step, scheme, activation, touching, memory)
+    count = select_dry_joints(model, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
+    dry = points + 2 * nv
     for j in range(nv):
         memory.stop_torque[j] = 0.0
     contacts = memory.contacts
@@ -369,6 +372,7 @@ def solve_contacts(
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
+        press_dry_joints(model, step, count, memory)
     status = solve_contact_kernel(
         count,
         memory.delassus,
@@ -387,6 +391,10 @@ def solve_contacts(
         add_impulse(model, memory, count, memory.next_v)
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= dry:
+            impulse = memory.impulse[2 * place + 1]
+            note_dry_joint(contact - dry, impulse, step, memory.problem_mode[place], memory)
+            continue
         if contact >= points:
             joint = (contact - points) // 2
             sign = 1.0 - 2.0 * ((contact - points) % 2)
@@ -434,7 +442,8 @@ def _advance(
     while True:
         if (
             record.row_count[0] >= record.time.shape[0]
-            or record.event_count[0] + 2 * model.contact_link.shape[0] > record.event_time.shape[0]
+            or record.event_count[0] + 2 * (model.contact_link.shape[0] + nv)
+            > record.event_time.shape[0]
         ):
             return RECORD_FULL
         k = span[0]
