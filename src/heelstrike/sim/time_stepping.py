@@ -33,8 +33,6 @@ from heelstrike.dynamics.kernels import (
     factorize,
     mass_matrix,
     passive_force,
-    solve_factorized,
-    state_equations,
 )
 from heelstrike.dynamics.straight_line import play
 from heelstrike.errors import SimulationError
@@ -45,7 +43,9 @@ from heelstrike.sim.contact_geometry import (
     assemble_delassus,
     contact_rows,
     contact_velocity,
+    evaluate_equations,
     locate_contacts,
+    solve_mass_matrix,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
 from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
@@ -64,7 +64,7 @@ from heelstrike.sim.engine import (
 )
 from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
 from heelstrike.sim.point_contacts import point_velocities
-from heelstrike.sim.programs import DELASSUS, EQUATIONS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.programs import DELASSUS, PUSH, VELOCITIES
 from heelstrike.sim.recording import (
     center_height,
     limit_torque,
@@ -152,18 +152,7 @@ class TimeStepping:
 @kernel
 def evaluate_state(model: Model, ground: GroundModel, memory: Memory) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
-    if memory.programs[EQUATIONS] != 0:
-        play(
-            memory.programs[EQUATIONS],
-            (
-                model, memory.q, memory.v, memory.tree, memory.mass_matrix, memory.factor,
-                memory.bias,
-            ),
-        )  # fmt: skip
-    else:
-        state_equations(
-            model, memory.q, memory.v, memory.tree, memory.mass_matrix, memory.factor, memory.bias
-        )
+    evaluate_equations(model, memory.q, memory.v, memory)
     locate_contacts(model, ground, memory)
 
 
@@ -187,10 +176,7 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
         factorize(model, memory.mass_matrix, memory.factor)
     for i in range(nv):
         memory.rate[i] = step * (memory.force[i] - memory.bias[i])
-    if memory.programs[SOLVE] != 0:
-        play(memory.programs[SOLVE], (model, memory.factor, memory.rate))
-    else:
-        solve_factorized(model, memory.factor, memory.rate)
+    solve_mass_matrix(model, memory, memory.rate)
     for i in range(nv):
         memory.next_v[i] = memory.v[i] + memory.rate[i]
 
