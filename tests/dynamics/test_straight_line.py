@@ -16,7 +16,7 @@ from heelstrike.dynamics.straight_line import play
 from heelstrike.dynamics.tape import Tape, Value
 from heelstrike.dynamics.trigonometry import sine_and_cosine
 from heelstrike.dynamics.workspace import workspace
-from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs
+from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs, usual_points
 
 # Both sides do the same few hundred operations in another order, with products and sums fused.
 ROUNDING = 1e-11
@@ -41,13 +41,15 @@ def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
     position, normal = rng.uniform(-1.0, 1.0, (nc, 2)), rng.normal(size=(nc, 2))
     impulse = rng.uniform(-1.0, 1.0, (nc, 2))
     x, w = rng.uniform(-1.0, 1.0, (2, nv))
-    rows, delassus = np.zeros((2 * nc, nv)), np.zeros((2 * nc, 2 * nc))
+    points = usual_points(case.robot())
+    size = 2 * len(points)
+    rows, delassus = np.zeros((size, nv)), np.zeros((size, size))
     return [
         (model, q, v, tree, matrix, factor, np.zeros(nv)),
         (model, factor, x),
-        (model, tree, position, normal, factor, rows, delassus),
-        (model, tree, position, normal, v, np.zeros((nc, 2))),
-        (model, tree, position, normal, factor, impulse, np.zeros(nv), w),
+        (model, points, tree, position, normal, factor, rows, delassus),
+        (model, points, tree, position, normal, v, np.zeros((nc, 2))),
+        (model, points, tree, position, normal, factor, impulse, np.zeros(nv), w),
     ]
 
 
@@ -64,7 +66,7 @@ def results(arguments: list[tuple[Any, ...]]) -> dict[str, Any]:
 @fused
 @pytest.mark.parametrize("case", [*NAMED, *RANDOM[:6]], ids=lambda case: case.name)
 def test_equals_the_kernels(case: RobotCase) -> None:
-    programs = straight_line_programs(case.robot().model)
+    programs = straight_line_programs(case.robot().model, usual_points(case.robot()))
     if case.robot().nv > MOST_COORDINATES:
         assert not programs.any()
         return
@@ -85,9 +87,11 @@ def test_equals_the_kernels(case: RobotCase) -> None:
 
 @fused
 def test_robots_that_differ_in_numbers_share_their_code() -> None:
-    model = NAMED[0].robot().model
+    model, points = NAMED[0].robot().model, usual_points(NAMED[0].robot())
     heavier = dataclasses.replace(model, mass=1.5 * model.mass)
-    np.testing.assert_array_equal(straight_line_programs(model), straight_line_programs(heavier))
+    np.testing.assert_array_equal(
+        straight_line_programs(model, points), straight_line_programs(heavier, points)
+    )
 
 
 @fused

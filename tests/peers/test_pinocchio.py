@@ -135,9 +135,7 @@ def test_queries(case: RobotCase) -> None:
                 + np.cross(w, np.cross(w, arm))
             )
             drift = dynamics.point_bias_acceleration(robot, q, v, link, local)
-            check(
-                "Jacobian bias", drift, [at_point[0], at_point[2], acceleration.angular[1]]
-            )
+            check("Jacobian bias", drift, [at_point[0], at_point[2], acceleration.angular[1]])
             position = dynamics.point_position(robot, q, link, local)
             check("position", position, (origin + arm)[::2])
             moved = dynamics.point_velocity(robot, q, v, link, local)

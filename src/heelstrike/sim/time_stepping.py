@@ -192,23 +192,29 @@ def select_candidates(
     if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
         farthest = activation
     count = 0
+    usual = memory.programs[VELOCITIES] != 0
     for contact in range(model.contact_link.shape[0]):
         if contacts.gap[contact] <= farthest:
             memory.candidate[count] = contact
+            usual = usual and memory.usual_place[contact] >= 0
             count += 1
     if count == 0:
         return 0
     near = count
     velocity = memory.point_velocity
-    if memory.programs[VELOCITIES] != 0:
+    if usual:
         play(
             memory.programs[VELOCITIES],
-            (model, memory.tree, contacts.position, contacts.normal, memory.next_v, velocity),
-        )
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                memory.next_v, velocity,
+            ),
+        )  # fmt: skip
     else:
         point_velocities(
-            model, memory.tree, contacts.position, contacts.normal, memory.next_v, velocity
-        )
+            model, memory.every_point, memory.tree, contacts.position, contacts.normal,
+            memory.next_v, velocity,
+        )  # fmt: skip
     count = 0
     for place in range(near):
         contact = memory.candidate[place]
@@ -290,20 +296,32 @@ def write_rows(model: Model, memory: Memory, count: int) -> None:
 
 
 @kernel
+def are_usual(memory: Memory, count: int) -> bool:
+    """Whether there are programs for all candidates."""
+    if memory.programs[DELASSUS] == 0:
+        return False
+    for place in range(count):
+        candidate = memory.candidate[place]
+        if candidate >= memory.usual_place.shape[0] or memory.usual_place[candidate] < 0:
+            return False
+    return True
+
+
+@kernel
 def gather_delassus(model: Model, memory: Memory, count: int) -> None:
-    """Delassus matrix of the candidates, contact points all, out of that of all contact points."""
+    """Delassus matrix of the candidates out of that of all usual points."""
     contacts = memory.contacts
     play(
         memory.programs[DELASSUS],
         (
-            model, memory.tree, contacts.position, contacts.normal, memory.factor,
-            memory.point_rows, memory.point_delassus,
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_rows, memory.point_delassus,
         ),
     )  # fmt: skip
     for place in range(count):
-        row = 2 * memory.candidate[place]
+        row = 2 * memory.usual_place[memory.candidate[place]]
         for other in range(count):
-            column = 2 * memory.candidate[other]
+            column = 2 * memory.usual_place[memory.candidate[other]]
             for i in range(2):
                 for j in range(2):
                     entry = memory.point_delassus[row + i, column + j]
@@ -312,7 +330,7 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> None:
 
 @kernel
 def push_candidates(model: Model, memory: Memory, count: int) -> None:
-    """Add what the impulses of the candidates, contact points all, do to the velocity."""
+    """Add what the impulses of the candidates, usual points all, do to the velocity."""
     contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
         memory.point_impulse[contact, 0] = 0.0
@@ -323,8 +341,8 @@ def push_candidates(model: Model, memory: Memory, count: int) -> None:
     play(
         memory.programs[PUSH],
         (
-            model, memory.tree, contacts.position, contacts.normal, memory.factor,
-            memory.point_impulse, memory.rate, memory.next_v,
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_impulse, memory.rate, memory.next_v,
         ),
     )  # fmt: skip
 
@@ -334,8 +352,8 @@ def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
-    touching = select_candidates(model, step, scheme, activation, memory)
-    count = select_stops(model, step, scheme, activation, touching, memory)
+    count = select_candidates(model, step, scheme, activation, memory)
+    count = select_stops(model, step, scheme, activation, count, memory)
     count = select_dry_joints(model, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
@@ -352,7 +370,7 @@ def solve_contacts(
         memory.residual[i] = 0.0
     if count == 0:
         return True
-    straight = memory.programs[DELASSUS] != 0 and count == touching
+    straight = are_usual(memory, count)
     if straight:
         gather_delassus(model, memory, count)
     else:
