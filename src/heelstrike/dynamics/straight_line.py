@@ -89,8 +89,10 @@ class Recording:
                         },
                     )
                 )
-            else:
+            elif _is_floats(argument):
                 operands.append(self._symbols(name, argument, known or {}))
+            else:
+                operands.append(argument)
         uncompiled(kernel, replace={"sin": sine, "cos": cosine})(*operands)
         self._scratch = scratch
 
