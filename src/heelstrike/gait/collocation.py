@@ -352,7 +352,7 @@ def _effort(program: CollocationProgram, unknowns: Floats) -> float:
 def _margins(program: CollocationProgram, unknowns: Floats) -> Margins:
     """Worst values on the fine grid, from the motion itself."""
     transcription, request = program.transcription, program.request
-    robot, model = request.robot, request.robot.model
+    model = request.robot.model
     phases, q, v, a = fine_motion(program, unknowns)
     force, torque, height, _ = (
         np.array(part) for part in transcription.motion.map(phases.size)(q, v, a)
