@@ -17,12 +17,22 @@ from heelstrike.robot import Robot
 TOLERANCE = 1e-10
 
 WALKERS = [case for case in NAMED if case.robot().nu and len(case.robot().feet) == 2]
+SEEDS = 16
 CHOICES = [choice.value for choice in ForceDistribution]
 
 
-def standing(robot: Robot, ground: hs.Ground, contacts: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Posture with the given contact points on the ground, and a velocity that keeps them there."""
-    draw = np.random.default_rng(3)
+def soles(robot: Robot) -> list[int]:
+    """Return the contact points that carry the robot when it stands with both feet flat."""
+    bottom = dynamics.contact_positions(robot, robot.model.reference)[:, 1]
+    bottom = bottom - robot.model.contact_radius
+    return [int(i) for i in np.flatnonzero(bottom < bottom.min() + 1e-9)]
+
+
+def standing(
+    robot: Robot, ground: hs.Ground, contacts: list[int], seed: int = 3
+) -> tuple[np.ndarray, np.ndarray]:
+    """Draw a posture with the given contact points on the ground; also their Jacobian."""
+    draw = np.random.default_rng(seed)
     q = robot.model.reference + np.append([0.0, 0.0, 0.0], 0.2 * draw.normal(size=robot.nv - 3))
     q = np.clip(q, robot.model.lower, robot.model.upper)
     for _ in range(50):
@@ -45,7 +55,7 @@ def feasible_motion(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """State and acceleration that keep the contact points, gentle enough to be possible."""
     draw = np.random.default_rng(seed)
-    q, rows = standing(robot, ground, contacts)
+    q, rows = standing(robot, ground, contacts, seed)
     v = kept(rows, 0.2 * draw.normal(size=robot.nv))
     drift = hs.contact_kinematics(robot, q, v, ground).bias_acceleration[contacts].ravel()
     return q, v, kept(rows, 2.0 * draw.normal(size=robot.nv), -drift)
@@ -60,62 +70,73 @@ def test_forward_dynamics_returns_the_acceleration(
     """On both feet, in motion: the torques found make the robot accelerate as asked.
 
     The forward problem knows only the torques; it finds the contact forces by complementarity.
+    Rigid friction may allow a second motion beside the one asked for, when a foot that hardly
+    carries could lift instead: such seeds, with less than 5 % of the weight on a foot, are left
+    out.
     """
     robot = case.robot()
-    ground = hs.Ground(friction=2.0, slope=slope)
-    contacts = list(range(robot.nc))
+    ground = hs.Ground(friction=0.8, slope=slope)
+    contacts = soles(robot)
     done = 0
-    for seed in range(8):
+    for seed in range(SEEDS):
         q, v, a = feasible_motion(robot, ground, contacts, seed)
         inverse = hs.contact_inverse_dynamics(
             robot, q, v, a, distribution=distribution, ground=ground, contacts=contacts
         )
-        torque = dynamics.applied_force(robot, q, v, inverse.torque)
-        rows = hs.contact_kinematics(robot, q, v, ground).jacobian
-        ground_force = np.einsum("cdn,cd->n", rows, inverse.contact_force)
-        possible = torque + ground_force + inverse.missing_force
-        back = dynamics.forward_dynamics(robot, q, v, possible)
+        kinematics = hs.contact_kinematics(robot, q, v, ground)
+        pushed = np.einsum("cdn,cd->n", kinematics.jacobian, inverse.contact_force)
+        driven = dynamics.applied_force(robot, q, v, inverse.torque)
+        back = dynamics.forward_dynamics(robot, q, v, driven + pushed + inverse.missing_force)
         scale = max(1.0, float(np.abs(a).max()))
         assert np.abs(back - a).max() <= TOLERANCE * scale
         assert np.abs(inverse.contact_acceleration[contacts]).max() <= 1e-9
         if not inverse.feasible:
             assert inverse.message
             continue
+        loads = [inverse.contact_force[list(foot.contacts), 0].sum() for foot in robot.feet]
+        if min(loads) < 0.05 * robot.weight or kinematics.gap.min() < -1e-9:
+            continue
         forward = hs.contact_forward_dynamics(robot, q, v, inverse.torque, ground=ground)
         assert forward.certificate.valid
         assert np.abs(forward.acceleration - a).max() <= TOLERANCE * scale
         done += 1
-    assert done >= 2  # the motions are gentle: most are possible
+    assert done >= 2
 
 
 @pytest.mark.parametrize("name", ["rabbit", "rabbit_optimtraj"])
 def test_one_point_foot_lacks_a_moment(name: str) -> None:
     """On one point the five-link walker is underactuated: what is missing is the ankle's moment.
 
-    The missing force is a moment about the foot: it does no work on the motions of the foot's
-    translation alone, and with the pitch's acceleration left to the dynamics it vanishes.
+    The missing force does no work on motions that turn the robot otherwise than about its foot;
+    when the robot is allowed to turn about the foot as the dynamics demands, it vanishes.
     """
     robot = next(case for case in NAMED if case.name == name).robot()
     ground = hs.Ground(friction=2.0)
-    q, v, a = feasible_motion(robot, ground, [0], 1)
-    inverse = hs.contact_inverse_dynamics(robot, q, v, a, contacts=[0], ground=ground)
-    assert not inverse.feasible
-    assert "root_pitch" in inverse.message
-    assert np.abs(inverse.missing_force[:3]).max() > 1e-3
-    # Along the direction that turns the robot about its foot, all of it.
-    rows = hs.contact_kinematics(robot, q, v, ground).jacobian[0][:, :3]
-    about_foot = np.linalg.svd(rows)[2][2]
-    assert np.abs(rows @ inverse.missing_force[:3]).max() <= 1e-9
-    turning = np.zeros(robot.nv)
-    turning[:3] = about_foot
-    resisting = turning @ dynamics.mass_matrix(robot, q) @ turning
-    possible = a - turning * (about_foot @ inverse.missing_force[:3]) / resisting
-    again = hs.contact_inverse_dynamics(robot, q, v, possible, contacts=[0], ground=ground)
-    assert np.abs(again.missing_force).max() <= 1e-9
-    forward = hs.contact_forward_dynamics(robot, q, v, again.torque, ground=ground)
-    lifted = hs.contact_kinematics(robot, q, v, ground).gap
-    if again.feasible and lifted[1] > 1e-6:
-        assert np.abs(forward.acceleration - possible).max() <= 1e-9
+    done = 0
+    for seed in range(SEEDS):
+        q, v, a = feasible_motion(robot, ground, [0], seed)
+        kinematics = hs.contact_kinematics(robot, q, v, ground)
+        if kinematics.gap[1] < 0.01:
+            continue  # the other foot is under the ground
+        inverse = hs.contact_inverse_dynamics(robot, q, v, a, contacts=[0], ground=ground)
+        assert not inverse.feasible
+        assert "root_pitch" in inverse.message
+        assert np.abs(inverse.missing_force[:3]).max() > 1e-3
+        rows = kinematics.jacobian[0][:, :3]
+        turning = np.zeros(robot.nv)
+        turning[:3] = np.linalg.svd(rows)[2][2]
+        assert np.abs(rows @ inverse.missing_force[:3]).max() <= 1e-9
+        inertia = turning @ dynamics.mass_matrix(robot, q) @ turning
+        possible = a - turning * (turning @ inverse.missing_force) / inertia
+        again = hs.contact_inverse_dynamics(robot, q, v, possible, contacts=[0], ground=ground)
+        assert np.abs(again.missing_force).max() <= 1e-9
+        if not again.feasible:
+            continue
+        forward = hs.contact_forward_dynamics(robot, q, v, again.torque, ground=ground)
+        scale = max(1.0, float(np.abs(possible).max()))
+        assert np.abs(forward.acceleration - possible).max() <= TOLERANCE * scale
+        done += 1
+    assert done >= 3
 
 
 def problems(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
