@@ -33,6 +33,8 @@ class EnergyBalance:
         Work of the ground: impacts and sliding friction. An exact contact never adds energy.
     stops : (nt,) float
         Work of the joint stops, of which the same is true.
+    dry_friction : (nt,) float
+        Work of dry friction in the joints, never positive in exact motion.
     """
 
     time: Floats
@@ -42,6 +44,7 @@ class EnergyBalance:
     dampers: Floats
     contacts: Floats
     stops: Floats
+    dry_friction: Floats
 
     @property
     def total(self) -> Floats:
@@ -52,7 +55,8 @@ class EnergyBalance:
     def residual(self) -> Floats:
         """Change of energy that no work explains, (nt,), in J: the error of the time method."""
         gained = self.total - self.total[:1]
-        return gained - self.actuators - self.dampers - self.contacts - self.stops
+        explained = self.actuators + self.dampers + self.contacts + self.stops + self.dry_friction
+        return gained - explained
 
 
 def energy_balance(run: Run) -> EnergyBalance:
@@ -89,4 +93,7 @@ def energy_balance(run: Run) -> EnergyBalance:
         dampers=summed(damper_power * held),
         contacts=summed(contact_work),
         stops=summed((mean_over_intervals(run, run.stop_torque) * mean).sum(axis=1) * held),
+        dry_friction=summed(
+            (mean_over_intervals(run, run.friction_torque) * mean).sum(axis=1) * held
+        ),
     )

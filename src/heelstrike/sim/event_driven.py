@@ -27,6 +27,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
 from heelstrike.sim.dormand_prince import SLOPES, interpolate
+from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
     DIVERGED,
@@ -83,7 +84,7 @@ from heelstrike.sim.event_phase import (
     Phase,
     allocate_phase,
 )
-from heelstrike.sim.impact import REST, collide, strike
+from heelstrike.sim.impact import REST, collide, heading, strike
 from heelstrike.sim.memory import (
     PENETRATION,
     STEPS,
@@ -215,6 +216,7 @@ def copy_row(
         record.q[row, i] = state[i]
         record.v[row, i] = state[nv + i]
         record.stop_torque[row, i] = 0.0
+        record.friction_torque[row, i] = 0.0
     for i in range(torque.shape[0]):
         record.torque[row, i] = torque[i]
     for i in range(contacts.gap.shape[0]):
@@ -261,11 +263,19 @@ def write_row(
     row = record.row_count[0]
     copy_row(row, time, phase.trial, memory.torque, contacts, memory.residual, record)
     points = contacts.gap.shape[0]
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    dry_force(
+        phase.dry_joint, phase.slide[first:], model.dry_friction, record.friction_torque[row]
+    )  # fmt: skip
     for contact in range(points):
         if phase.passing[contact] == 0:
             memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -contacts.gap[contact])
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= first:
+            joint = phase.dry_joint[contact - first]
+            record.friction_torque[row, joint] = memory.impulse[2 * place + 1]
+            continue
         if contact >= points:
             stop = contact - points
             record.stop_torque[row, phase.stop_joint[stop]] += (
@@ -332,6 +342,7 @@ def decide(
     """
     time = phase.clock[TIME]
     contacts = phase.closed.shape[0]
+    dry = contacts - phase.dry_joint.shape[0]
     points = model.contact_link.shape[0]
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
@@ -360,11 +371,11 @@ def decide(
                 continue
         if jammed:
             jammed = False
-            for contact in range(contacts):
+            for contact in range(dry):
                 phase.hit[contact] = 0
                 phase.plastic[contact] = phase.closed[contact]
             solved, _ = collide(model, memory, phase, order, phase.begin, NUDGE)
-            for contact in range(contacts):
+            for contact in range(dry):
                 phase.plastic[contact] = 0
                 if phase.impulse[contact, 0] > 0.0 and contact >= points:
                     log_event(
@@ -383,6 +394,8 @@ def decide(
         apart = True
         for place in range(count):
             contact = memory.candidate[place]
+            if contact >= dry:
+                continue
             row = 2 * place
             apart = apart and memory.free[row] >= 0.0
             lean = -phase.slide[contact] * memory.friction[contact]
@@ -392,7 +405,8 @@ def decide(
                 log_event(record, time, PAINLEVE, contact, 0.0, 0.0)
         if several and apart:
             for place in range(count):
-                memory.problem_mode[place] = OPEN
+                if memory.candidate[place] < dry:
+                    memory.problem_mode[place] = OPEN
         if count > 0:
             note_residual(memory.residual, memory.extreme)
         adopt_modes(count, memory.candidate, memory.problem_mode, memory.mode, phase)
@@ -417,6 +431,16 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
         if phase.closed[other] == 1 and direction * ahead > 0.0:
             return phase.count[LET_PASS] == 1
     return False
+
+
+@kernel
+def begin_dry_joints(memory: Memory, phase: Phase) -> None:
+    """Let joints with dry friction begin as they move."""
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    for dry in range(phase.dry_joint.shape[0]):
+        phase.slide[first + dry] = heading(memory.v[phase.dry_joint[dry]])
+        memory.closed[first + dry] = 1
+        memory.slipping[first + dry] = phase.slide[first + dry]
 
 
 @kernel
@@ -624,6 +648,7 @@ def _advance(
             for i in range(nv):
                 phase.begin[i] = memory.q[i]
                 phase.begin[nv + i] = memory.v[i]
+            begin_dry_joints(memory, phase)
         if event:
             evaluate(
                 controller, model, ground, parameters, kept, spare, memory, phase, clock[TIME],

@@ -36,7 +36,7 @@ class Event:
     kind : EventKind
         Touchdown, lift-off, beginning of slip or of stick.
     contact : int
-        Index of the contact point, or of the joint when it reached its stop.
+        Index of the contact point, or of the joint of a ``JOINT_`` event.
     impulse : tuple of float
         Impulse (normal, tangent) on the robot over the step in which it happened, in N s.
     """
@@ -119,6 +119,8 @@ class Run:
         Joint torques within their limits (N m).
     stop_torque : (nt, nv) float
         Generalised force of the joint stops on the robot (N m, or N for a slide).
+    friction_torque : (nt, nv) float
+        Generalised force of the joints' dry friction on the robot (N m, or N for a slide).
     contact_point : (nt, nc, 2) float
         World position (x, z) of the contact points (m).
     contact_normal : (nt, nc, 2) float
@@ -155,6 +157,7 @@ class Run:
     velocity: Floats
     torque: Floats
     stop_torque: Floats
+    friction_torque: Floats
     contact_point: Floats
     contact_normal: Floats
     gap: Floats

@@ -316,6 +316,7 @@ class _Loop:
             velocity=rows.v,
             torque=rows.torque,
             stop_torque=rows.stop_torque,
+            friction_torque=rows.friction_torque,
             contact_point=rows.point,
             contact_normal=rows.normal,
             gap=rows.gap,
