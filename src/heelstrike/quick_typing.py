@@ -20,7 +20,8 @@ _PLAIN = (types.Number, types.Boolean, types.Array, types.UniTuple)
 @contextmanager
 def remembered_typings() -> Iterator[None]:
     """Remember what built-in functions return for plain arguments, while the context lasts."""
-    ask = BaseFunction.get_call_type
+    functions: Any = BaseFunction
+    ask = functions.get_call_type
     answers: dict[Any, Any] = {}
 
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
@@ -31,8 +32,8 @@ def remembered_typings() -> Iterator[None]:
             answers[key] = ask(self, context, args, kws)
         return answers[key]
 
-    BaseFunction.get_call_type = get_call_type
+    functions.get_call_type = get_call_type
     try:
         yield
     finally:
-        BaseFunction.get_call_type = ask
+        functions.get_call_type = ask
