@@ -30,16 +30,21 @@ _COMPILED = ("robot", "dynamics", "contact", "sim", "control", "analysis")
 
 
 @lru_cache(maxsize=1)
-def _sources() -> str:
+def source_fingerprint() -> str:
     """Fingerprint of all sources that kernels are made of."""
     home = Path(__file__).parent
-    files = [Path(__file__)]
+    files = sorted(home.glob("*.py"))
     for package in _COMPILED:
         files += sorted((home / package).rglob("*.py"))
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def cache_directory() -> Path:
+    """Return the directory in which machine code is kept."""
+    return Path(FunctionCache(source_fingerprint.__wrapped__).cache_path)
 
 
 class _PackageCache(FunctionCache):
@@ -52,7 +57,7 @@ class _PackageCache(FunctionCache):
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         index = self._cache_file
-        index._source_stamp = (_sources(), index._source_stamp)
+        index._source_stamp = (source_fingerprint(), index._source_stamp)
 
 
 def _kept_on_disk(compiled: Any) -> Any:

@@ -132,6 +132,24 @@ def test_a_fall_is_kept_and_told(walk: Callable[..., Any], tmp_path: Path) -> No
     assert (out / "tracking.png").exists()
 
 
+def test_a_fall_on_point_feet_is_explained(
+    walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out = tmp_path / "rabbit"
+    options = ["--steps", "20", "--animation", "none", "--out", str(out)]
+    result = CliRunner().invoke(app, ["walk", "rabbit", *options])
+    assert result.exit_code == 1
+    said = " ".join(result.stderr.split())
+    assert "error: the robot fell" in said
+    assert "stands on point feet" in said
+    assert "the first step" in said
+    # One step it takes, from the gait that was saved.
+    again = ["--steps", "1", "--gait", str(out / "gait.json")]
+    result = CliRunner().invoke(app, ["walk", "rabbit", *options, *again])
+    assert result.exit_code == 0, result.stderr
+    assert "point feet" not in result.stderr
+
+
 @pytest.mark.parametrize("lost", ["zmp", "tracking"])
 def test_a_figure_that_fails_takes_nothing_with_it(
     walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: str
