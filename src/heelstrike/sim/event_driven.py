@@ -40,6 +40,7 @@ from heelstrike.sim.engine import (
     Setting,
     solver_order,
 )
+from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import evaluate, project
 from heelstrike.sim.event_gaps import gap_now, gap_velocity
 from heelstrike.sim.event_location import integrate, total_weight
@@ -50,7 +51,6 @@ from heelstrike.sim.event_modes import (
     log_event,
     note_residual,
     report_modes,
-    solve_candidates,
 )
 from heelstrike.sim.event_phase import (
     ABSOLUTE,
@@ -789,6 +789,7 @@ class _EventDrivenEngine:
         self._setting = setting
         self._phase = allocate_phase(setting.robot)
         self._order = solver_order(method.solver)
+        self._phase.order[:] = self._order
         self.solver = method.solver
         clock, count = self._phase.clock, self._phase.count
         clock[STEP] = min(1e-3, method.max_step)
