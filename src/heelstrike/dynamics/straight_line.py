@@ -39,8 +39,8 @@ from heelstrike.dynamics.tape import (
 from heelstrike.dynamics.trigonometry import sine_and_cosine
 
 CONSTANT = "model"
-"""The argument that never changes. Where its numbers are 0, 1 or -1, they are so in every robot that
-shares the code."""
+"""The argument that never changes. Where its numbers are 0, 1 or -1, they are so in every robot
+that shares the code."""
 
 _DOUBLE = ir.DoubleType()
 _WORD = ir.IntType(64)
@@ -89,8 +89,10 @@ class Recording:
                         },
                     )
                 )
-            else:
+            elif _is_floats(argument):
                 operands.append(self._symbols(name, argument, known or {}))
+            else:
+                operands.append(argument)
         uncompiled(kernel, replace={"sin": sine, "cos": cosine})(*operands)
         self._scratch = scratch
 

@@ -13,8 +13,10 @@ from typing import Any
 
 from llvmlite import ir
 
-_PARTS = (float.fromhex("0x1.921fb54442d18p+0"), float.fromhex("0x1.1a62633145c07p-54"))
-"""π/2 in two parts, to 107 bits."""
+_PARTS = tuple(
+    map(float.fromhex, ("0x1.921fb54442d18p+0", "0x1.1a62633145c07p-54", "-0x1.f1976b7ed8fbcp-110"))
+)
+"""π/2 in three parts, to 160 bits."""
 
 _ROUNDER = 1.5 * 2.0**52
 """Added to a double, it pushes all bits below one out and the integer into the low bits."""

@@ -15,7 +15,6 @@ from typing import Any
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
-    bias_force,
     factorize,
     forward_kinematics,
     link_velocities,
@@ -25,7 +24,13 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, contact_velocity, locate_contacts
+from heelstrike.sim.contact_geometry import (
+    assemble_delassus,
+    contact_velocity,
+    evaluate_equations,
+    locate_contacts,
+    solve_mass_matrix,
+)
 from heelstrike.sim.controller import Contacts
 from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
@@ -252,20 +257,18 @@ def free_acceleration(
 ) -> None:
     """Acceleration without contact, A⁻¹ (B Γ + passive − H), into ``memory.rate``.
 
-    Dry friction of the joints that move is one of the passive forces; `slide` ends with theirs.
+    The equations of the state have been evaluated. Dry friction of the joints that move is one of
+    the passive forces; `slide` ends with theirs.
     """
     nv = model.parent.shape[0]
-    mass_matrix(model, memory.tree, memory.mass_matrix)
-    factorize(model, memory.mass_matrix, memory.factor)
-    bias_force(model, memory.tree, memory.rate)
     passive_force(model, state[:nv], state[nv:], memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     first = slide.shape[0] - dry_joint.shape[0]
     dry_force(dry_joint, slide[first:], model.dry_friction, memory.force)
     for i in range(nv):
-        memory.rate[i] = memory.force[i] - memory.rate[i]
-    solve_factorized(model, memory.factor, memory.rate)
+        memory.rate[i] = memory.force[i] - memory.bias[i]
+    solve_mass_matrix(model, memory, memory.rate)
 
 
 @kernel
@@ -308,8 +311,11 @@ def evaluate(
     """
     nv = model.parent.shape[0]
     contacts = memory.contacts
-    forward_kinematics(model, state[:nv], memory.tree)
-    link_velocities(model, state[nv:], memory.tree)
+    if forces:
+        evaluate_equations(model, state[:nv], state[nv:], memory)
+    else:
+        forward_kinematics(model, state[:nv], memory.tree)
+        link_velocities(model, state[nv:], memory.tree)
     locate_contacts(model, ground, memory)
     watch_geometry(model, contacts, memory.tree, phase, state)
     if not forces:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, locate_contacts
+from heelstrike.sim.contact_geometry import (
+    assemble_delassus,
+    evaluate_equations,
+    locate_contacts,
+)
 from heelstrike.sim.event_dynamics import (
     add_contact_force,
     free_acceleration,
@@ -127,8 +130,7 @@ def short_bounces(
     """
     nv = model.parent.shape[0]
     time = phase.clock[TIME]
-    forward_kinematics(model, state[:nv], memory.tree)
-    link_velocities(model, state[nv:], memory.tree)
+    evaluate_equations(model, state[:nv], state[nv:], memory)
     locate_contacts(model, ground, memory)
     free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
     count = gather_closed(model, memory, phase)

@@ -13,7 +13,7 @@ from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
-from heelstrike.sim.programs import straight_line_programs
+from heelstrike.sim.programs import straight_line_programs, usual_points
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -92,10 +92,15 @@ class Memory(Bundle):
         Residuals of the certificate of the last solve.
     programs : (5,) int
         Addresses of straight-line code, zero for none; see :mod:`heelstrike.sim.programs`.
-    point_rows : (2 nc, nv) float
-    point_delassus : (2 nc, 2 nc) float
+    every_point, usual_points : (nc,), (k,) int
+        All contact points, and those that the programs are for.
+    usual_place : (nc,) int
+        Place of each contact point in `usual_points`, -1 for none.
+    point_rows : (2 k, nv) float
+    point_delassus : (2 k, 2 k) float
+        Scratch and Delassus matrix of the usual points.
     point_velocity, point_impulse : (nc, 2) float
-        Scratch, Delassus matrix, velocities and impulses of all contact points.
+        Velocities and impulses of contact points.
     solver : ContactWorkspace
         Memory of the contact solvers.
     tally : (3,) int
@@ -141,6 +146,9 @@ class Memory(Bundle):
     problem_mode: Integers
     residual: Floats
     programs: Integers
+    every_point: Integers
+    usual_points: Integers
+    usual_place: Integers
     point_rows: Floats
     point_delassus: Floats
     point_velocity: Floats
@@ -156,6 +164,9 @@ def allocate_memory(robot: Robot) -> Memory:
     stops = np.isfinite(robot.model.lower).sum() + np.isfinite(robot.model.upper).sum()
     dry = np.flatnonzero(robot.model.dry_friction > 0.0)
     capacity = nc + int(stops) + len(dry)
+    usual = usual_points(robot)
+    place = np.full(nc, -1)
+    place[usual] = np.arange(len(usual))
     return Memory(
         q=np.zeros(nv),
         v=np.zeros(nv),
@@ -194,9 +205,12 @@ def allocate_memory(robot: Robot) -> Memory:
         problem_friction=np.zeros(capacity),
         problem_mode=np.zeros(capacity, dtype=np.int64),
         residual=np.zeros(3),
-        programs=straight_line_programs(robot.model),
-        point_rows=np.zeros((2 * nc, nv)),
-        point_delassus=np.zeros((2 * nc, 2 * nc)),
+        programs=straight_line_programs(robot.model, usual),
+        every_point=np.arange(nc),
+        usual_points=usual,
+        usual_place=place,
+        point_rows=np.zeros((2 * len(usual), nv)),
+        point_delassus=np.zeros((2 * len(usual), 2 * len(usual))),
         point_velocity=np.zeros((nc, 2)),
         point_impulse=np.zeros((nc, 2)),
         solver=contact_workspace(max(capacity, 1)),

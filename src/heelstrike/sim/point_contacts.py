@@ -1,7 +1,8 @@
-"""Contact points of a robot all together, without a branch: kernels that run as straight-line code.
+"""Several contact points of a robot at once, without a branch: kernels for straight-line code.
 
-Rows and components go contact by contact, normal before tangent. Positions and normals are those of
-:func:`~heelstrike.sim.contact_geometry.locate_contacts`.
+`points` (k,) lists the contact points. Rows and components go point by point in that order, normal
+before tangent. Arrays of (nc, 2) have an entry for every contact point of the robot; positions and
+normals are those of :func:`~heelstrike.sim.contact_geometry.locate_contacts`.
 """
 
 from __future__ import annotations
@@ -9,12 +10,13 @@ from __future__ import annotations
 from heelstrike.compilation import kernel
 from heelstrike.dynamics.kernels import solve_factorized, solve_upper
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 
 
 @kernel
 def point_delassus(
     model: Model,
+    points: Integers,
     tree: Workspace,
     position: Floats,
     normal: Floats,
@@ -22,27 +24,28 @@ def point_delassus(
     rows: Floats,
     delassus: Floats,
 ) -> None:
-    """Delassus matrix G = J A⁻¹ Jᵀ of all contact points; `rows` (2 nc, nv) is scratch.
+    """Delassus matrix G = J A⁻¹ Jᵀ of the points, (2 k, 2 k); `rows` (2 k, nv) is scratch.
 
     With A = Lᵀ D L it is Y D⁻¹ Yᵀ, where Y = J L⁻¹.
     """
-    for contact in range(model.contact_link.shape[0]):
+    for place in range(points.shape[0]):
+        contact = points[place]
         x = position[contact, 0] - tree.pivot[0]
         z = position[contact, 1] - tree.pivot[1]
         nx = normal[contact, 0]
         nz = normal[contact, 1]
         for j in range(model.parent.shape[0]):
-            rows[2 * contact, j] = 0.0
-            rows[2 * contact + 1, j] = 0.0
+            rows[2 * place, j] = 0.0
+            rows[2 * place + 1, j] = 0.0
         j = model.contact_link[contact]
         while j >= 0:
             jx = tree.motion[j, 1] + tree.motion[j, 0] * z
             jz = tree.motion[j, 2] - tree.motion[j, 0] * x
-            rows[2 * contact, j] = nx * jx + nz * jz
-            rows[2 * contact + 1, j] = nz * jx - nx * jz
+            rows[2 * place, j] = nx * jx + nz * jz
+            rows[2 * place + 1, j] = nz * jx - nx * jz
             j = model.parent[j]
-        solve_upper(model, factor, rows[2 * contact])
-        solve_upper(model, factor, rows[2 * contact + 1])
+        solve_upper(model, factor, rows[2 * place])
+        solve_upper(model, factor, rows[2 * place + 1])
     for row in range(rows.shape[0]):
         for column in range(row + 1):
             total = 0.0
@@ -54,9 +57,15 @@ def point_delassus(
 
 @kernel
 def point_velocities(
-    model: Model, tree: Workspace, position: Floats, normal: Floats, v: Floats, velocity: Floats
+    model: Model,
+    points: Integers,
+    tree: Workspace,
+    position: Floats,
+    normal: Floats,
+    v: Floats,
+    velocity: Floats,
 ) -> None:
-    """Velocities (normal, tangent) of all contact points under the joint velocity v, (nc, 2)."""
+    """Velocities (normal, tangent) of the points under the joint velocity v, into (nc, 2)."""
     link = tree.force  # scratch
     for i in range(model.parent.shape[0]):
         parent = model.parent[i]
@@ -64,7 +73,8 @@ def point_velocities(
             link[i, k] = tree.motion[i, k] * v[i]
             if parent >= 0:
                 link[i, k] += link[parent, k]
-    for contact in range(model.contact_link.shape[0]):
+    for place in range(points.shape[0]):
+        contact = points[place]
         i = model.contact_link[contact]
         vx = link[i, 1] + link[i, 0] * (position[contact, 1] - tree.pivot[1])
         vz = link[i, 2] - link[i, 0] * (position[contact, 0] - tree.pivot[0])
@@ -75,6 +85,7 @@ def point_velocities(
 @kernel
 def push_points(
     model: Model,
+    points: Integers,
     tree: Workspace,
     position: Floats,
     normal: Floats,
@@ -83,7 +94,7 @@ def push_points(
     force: Floats,
     v: Floats,
 ) -> None:
-    """Add A⁻¹ Jᵀ λ to a velocity, λ (nc, 2) the impulses of all contact points; `force` is scratch.
+    """Add A⁻¹ Jᵀ λ to a velocity, λ (nc, 2) the impulses of the points; `force` is scratch.
 
     The impulses are gathered link by link, as moments about the pivot and resultants.
     """
@@ -91,7 +102,8 @@ def push_points(
     for i in range(model.parent.shape[0]):
         for k in range(3):
             link[i, k] = 0.0
-    for contact in range(model.contact_link.shape[0]):
+    for place in range(points.shape[0]):
+        contact = points[place]
         i = model.contact_link[contact]
         fx = normal[contact, 0] * impulse[contact, 0] + normal[contact, 1] * impulse[contact, 1]
         fz = normal[contact, 1] * impulse[contact, 0] - normal[contact, 0] * impulse[contact, 1]

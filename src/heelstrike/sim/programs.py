@@ -14,6 +14,7 @@ from heelstrike.dynamics.machine_code import addresses, can_fuse
 from heelstrike.dynamics.straight_line import Recording, add_function, description
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot.model import Model
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.point_contacts import point_delassus, point_velocities, push_points
 
 # Places in ``Memory.programs``; an address of zero means that there is none.
@@ -34,14 +35,23 @@ KERNELS: tuple[Callable[..., None], ...] = (
 MOST_COORDINATES = 16
 """Robots with more are left to the loops: straight-line code grows with the cube of the depth."""
 
-MOST_CONTACTS = 8
+MOST_POINTS = 8
 """The same for contact points, which straight-line code takes all together."""
 
 
-def straight_line_programs(model: Model) -> NDArray[np.int64]:
-    """Return the addresses of the straight-line programs of a robot, one for each kernel."""
-    nv, nc = len(model.parent), len(model.contact_link)
-    count = len(KERNELS) if 0 < nc <= MOST_CONTACTS else DELASSUS
+def usual_points(robot: Robot) -> NDArray[np.int64]:
+    """Return the contact points that carry the robot usually: its feet, or all it has."""
+    points = sorted(point for foot in robot.feet for point in foot.contacts) or range(robot.nc)
+    return np.array(points if len(points) <= MOST_POINTS else [], dtype=np.int64)
+
+
+def straight_line_programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the addresses of the straight-line programs of a robot, one for each kernel.
+
+    `points` are the contact points that the last three kernels are for.
+    """
+    nv, nc, size = len(model.parent), len(model.contact_link), len(points)
+    count = len(KERNELS) if size > 0 else DELASSUS
     programs = np.zeros(len(KERNELS), dtype=np.int64)
     if not 0 < nv <= MOST_COORDINATES or not can_fuse():
         return programs
@@ -54,16 +64,17 @@ def straight_line_programs(model: Model) -> NDArray[np.int64]:
         },
         {"model": model, "factor": matrix, "x": vector},
         {
-            "model": model, "tree": tree, "position": pairs, "normal": pairs, "factor": matrix,
-            "rows": np.zeros((2 * nc, nv)), "delassus": np.zeros((2 * nc, 2 * nc)),
+            "model": model, "points": points, "tree": tree, "position": pairs, "normal": pairs,
+            "factor": matrix, "rows": np.zeros((2 * size, nv)),
+            "delassus": np.zeros((2 * size, 2 * size)),
         },
         {
-            "model": model, "tree": tree, "position": pairs, "normal": pairs, "v": vector,
-            "velocity": pairs,
+            "model": model, "points": points, "tree": tree, "position": pairs, "normal": pairs,
+            "v": vector, "velocity": pairs,
         },
         {
-            "model": model, "tree": tree, "position": pairs, "normal": pairs, "factor": matrix,
-            "impulse": pairs, "force": vector, "v": vector,
+            "model": model, "points": points, "tree": tree, "position": pairs, "normal": pairs,
+            "factor": matrix, "impulse": pairs, "force": vector, "v": vector,
         },
     ][:count]  # fmt: skip
     scratch = tuple(f"tree.{name}" for name in ("acceleration", "force", "composite", "zero"))

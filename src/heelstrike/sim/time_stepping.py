@@ -33,8 +33,6 @@ from heelstrike.dynamics.kernels import (
     factorize,
     mass_matrix,
     passive_force,
-    solve_factorized,
-    state_equations,
 )
 from heelstrike.dynamics.straight_line import play
 from heelstrike.errors import SimulationError
@@ -45,7 +43,9 @@ from heelstrike.sim.contact_geometry import (
     assemble_delassus,
     contact_rows,
     contact_velocity,
+    evaluate_equations,
     locate_contacts,
+    solve_mass_matrix,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
 from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
@@ -64,7 +64,7 @@ from heelstrike.sim.engine import (
 )
 from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
 from heelstrike.sim.point_contacts import point_velocities
-from heelstrike.sim.programs import DELASSUS, EQUATIONS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.programs import DELASSUS, PUSH, VELOCITIES
 from heelstrike.sim.recording import (
     center_height,
     limit_torque,
@@ -152,18 +152,7 @@ class TimeStepping:
 @kernel
 def evaluate_state(model: Model, ground: GroundModel, memory: Memory) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
-    if memory.programs[EQUATIONS] != 0:
-        play(
-            memory.programs[EQUATIONS],
-            (
-                model, memory.q, memory.v, memory.tree, memory.mass_matrix, memory.factor,
-                memory.bias,
-            ),
-        )  # fmt: skip
-    else:
-        state_equations(
-            model, memory.q, memory.v, memory.tree, memory.mass_matrix, memory.factor, memory.bias
-        )
+    evaluate_equations(model, memory.q, memory.v, memory)
     locate_contacts(model, ground, memory)
 
 
@@ -187,10 +176,7 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
         factorize(model, memory.mass_matrix, memory.factor)
     for i in range(nv):
         memory.rate[i] = step * (memory.force[i] - memory.bias[i])
-    if memory.programs[SOLVE] != 0:
-        play(memory.programs[SOLVE], (model, memory.factor, memory.rate))
-    else:
-        solve_factorized(model, memory.factor, memory.rate)
+    solve_mass_matrix(model, memory, memory.rate)
     for i in range(nv):
         memory.next_v[i] = memory.v[i] + memory.rate[i]
 
@@ -206,23 +192,29 @@ def select_candidates(
     if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
         farthest = activation
     count = 0
+    usual = memory.programs[VELOCITIES] != 0
     for contact in range(model.contact_link.shape[0]):
         if contacts.gap[contact] <= farthest:
             memory.candidate[count] = contact
+            usual = usual and memory.usual_place[contact] >= 0
             count += 1
     if count == 0:
         return 0
     near = count
     velocity = memory.point_velocity
-    if memory.programs[VELOCITIES] != 0:
+    if usual:
         play(
             memory.programs[VELOCITIES],
-            (model, memory.tree, contacts.position, contacts.normal, memory.next_v, velocity),
-        )
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                memory.next_v, velocity,
+            ),
+        )  # fmt: skip
     else:
         point_velocities(
-            model, memory.tree, contacts.position, contacts.normal, memory.next_v, velocity
-        )
+            model, memory.every_point, memory.tree, contacts.position, contacts.normal,
+            memory.next_v, velocity,
+        )  # fmt: skip
     count = 0
     for place in range(near):
         contact = memory.candidate[place]
@@ -304,20 +296,32 @@ def write_rows(model: Model, memory: Memory, count: int) -> None:
 
 
 @kernel
+def are_usual(memory: Memory, count: int) -> bool:
+    """Whether there are programs for all candidates."""
+    if memory.programs[DELASSUS] == 0:
+        return False
+    for place in range(count):
+        candidate = memory.candidate[place]
+        if candidate >= memory.usual_place.shape[0] or memory.usual_place[candidate] < 0:
+            return False
+    return True
+
+
+@kernel
 def gather_delassus(model: Model, memory: Memory, count: int) -> None:
-    """Delassus matrix of the candidates, contact points all, out of that of all contact points."""
+    """Delassus matrix of the candidates out of that of all usual points."""
     contacts = memory.contacts
     play(
         memory.programs[DELASSUS],
         (
-            model, memory.tree, contacts.position, contacts.normal, memory.factor,
-            memory.point_rows, memory.point_delassus,
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_rows, memory.point_delassus,
         ),
     )  # fmt: skip
     for place in range(count):
-        row = 2 * memory.candidate[place]
+        row = 2 * memory.usual_place[memory.candidate[place]]
         for other in range(count):
-            column = 2 * memory.candidate[other]
+            column = 2 * memory.usual_place[memory.candidate[other]]
             for i in range(2):
                 for j in range(2):
                     entry = memory.point_delassus[row + i, column + j]
@@ -326,7 +330,7 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> None:
 
 @kernel
 def push_candidates(model: Model, memory: Memory, count: int) -> None:
-    """Add what the impulses of the candidates, contact points all, do to the velocity."""
+    """Add what the impulses of the candidates, usual points all, do to the velocity."""
     contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
         memory.point_impulse[contact, 0] = 0.0
@@ -337,8 +341,8 @@ def push_candidates(model: Model, memory: Memory, count: int) -> None:
     play(
         memory.programs[PUSH],
         (
-            model, memory.tree, contacts.position, contacts.normal, memory.factor,
-            memory.point_impulse, memory.rate, memory.next_v,
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_impulse, memory.rate, memory.next_v,
         ),
     )  # fmt: skip
 
@@ -348,8 +352,8 @@ def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
-    touching = select_candidates(model, step, scheme, activation, memory)
-    count = select_stops(model, step, scheme, activation, touching, memory)
+    count = select_candidates(model, step, scheme, activation, memory)
+    count = select_stops(model, step, scheme, activation, count, memory)
     count = select_dry_joints(model, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
@@ -366,7 +370,7 @@ def solve_contacts(
         memory.residual[i] = 0.0
     if count == 0:
         return True
-    straight = memory.programs[DELASSUS] != 0 and count == touching
+    straight = are_usual(memory, count)
     if straight:
         gather_delassus(model, memory, count)
     else:
