@@ -10,7 +10,6 @@ The function computes what the kernel computes, to rounding.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
@@ -75,20 +74,16 @@ class Recording:
         self.arguments = dict(arguments)
         self.tape = Tape()
         self.arrays: dict[str, Symbols] = {}
-        operands = []
+        operands: list[Any] = []
         for name, argument in arguments.items():
             if isinstance(argument, Bundle):
-                members = argument.members().items()
-                operands.append(
-                    dataclasses.replace(
-                        argument,
-                        **{
-                            member: self._symbols(f"{name}.{member}", value, known or {})
-                            for member, value in members
-                            if _is_floats(value)
-                        },
-                    )
-                )
+                members = {
+                    member: self._symbols(f"{name}.{member}", value, known or {})
+                    if _is_floats(value)
+                    else value
+                    for member, value in argument.members().items()
+                }
+                operands.append(type(argument)(**members))
             elif _is_floats(argument):
                 operands.append(self._symbols(name, argument, known or {}))
             else:
@@ -222,7 +217,7 @@ class _Writer:
         """Sines and cosines, of many angles at once; no angle depends on another's."""
         operations = self.recording.tape.operations
         angles = list(dict.fromkeys(op[1] for op in operations if op[0] in (SINE, COSINE)))
-        results: dict[tuple[int, Any], Any] = {}
+        results: dict[Any, Any] = {}
         for begin in range(0, len(angles), _ANGLES_AT_ONCE):
             group = angles[begin : begin + _ANGLES_AT_ONCE]
             vector: Any = ir.Constant(ir.VectorType(_DOUBLE, _ANGLES_AT_ONCE), None)
@@ -230,9 +225,8 @@ class _Writer:
                 vector = self.builder.insert_element(vector, self._value(angle), _lane(lane))
             both = sine_and_cosine(self.builder, vector)
             for lane, angle in enumerate(group):
-                for operation, values in zip((SINE, COSINE), both, strict=True):
-                    element = self.builder.extract_element(values, _lane(lane))
-                    results[operation, angle] = element
+                for function, values in zip((SINE, COSINE), both, strict=True):
+                    results[function, angle] = self.builder.extract_element(values, _lane(lane))
         for place, operation in enumerate(operations):
             if operation[:2] in results:
                 self._values[place] = results[operation[:2]]
@@ -242,9 +236,7 @@ def _lane(lane: int) -> ir.Constant:
     return ir.Constant(ir.IntType(32), lane)
 
 
-@intrinsic
-def play(context: Any, address: Any, arguments: Any) -> Any:
-    """Call machine code of :func:`add_function` from a kernel: address, tuple of arguments."""
+def _play(context: Any, address: Any, arguments: Any) -> Any:
     del context
     signature = types.void(address, arguments)
 
@@ -255,8 +247,12 @@ def play(context: Any, address: Any, arguments: Any) -> Any:
             if isinstance(kind, types.Array):
                 value = context.make_array(kind)(context, builder, value).data
             places.append(builder.bitcast(value, _POINTER))
-        kind = ir.FunctionType(ir.VoidType(), [_POINTER] * len(places))
-        builder.call(builder.inttoptr(values[0], kind.as_pointer()), places)
+        function = ir.FunctionType(ir.VoidType(), [_POINTER] * len(places))
+        builder.call(builder.inttoptr(values[0], function.as_pointer()), places)
         return context.get_dummy_value()
 
     return signature, generate
+
+
+play: Any = intrinsic(_play)
+"""``play(address, arguments)`` calls machine code of :func:`add_function` from a kernel."""

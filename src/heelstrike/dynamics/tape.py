@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SINE, COSINE, READ = range(8)
 
-Symbols = NDArray[np.object_]
+Symbols = NDArray[Any]
 
 
 class Value:

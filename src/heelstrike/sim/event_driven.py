@@ -24,7 +24,7 @@ from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mom
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts
+from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
 from heelstrike.sim.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.dry_friction import dry_force
@@ -40,6 +40,7 @@ from heelstrike.sim.engine import (
     Setting,
     solver_order,
 )
+from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import evaluate, project
 from heelstrike.sim.event_gaps import gap_now, gap_velocity
 from heelstrike.sim.event_location import integrate, total_weight
@@ -50,7 +51,6 @@ from heelstrike.sim.event_modes import (
     log_event,
     note_residual,
     report_modes,
-    solve_candidates,
 )
 from heelstrike.sim.event_phase import (
     ABSOLUTE,
@@ -195,7 +195,13 @@ class EventDriven:
         solver_order(self.solver)
 
     def engine(self, setting: Setting) -> Engine:
-        """Return this way through time, compiled and ready to run."""
+        """Return this way through time, compiled and ready to run.
+
+        Raises
+        ------
+        SimulationError
+            If the robot begins in the ground, or with a joint beyond its range.
+        """
         return _EventDrivenEngine(self, setting)
 
 
@@ -747,14 +753,43 @@ def compiled_advance() -> tuple[Any, float]:
     return compiled_for(signature, _advance), perf_counter() - begin
 
 
+def _check_start(setting: Setting, swing_feet_pass: bool) -> None:
+    """Refuse a state in the ground or beyond a joint stop: no motion leads there or out of it."""
+    robot, memory = setting.robot, setting.memory
+    observe(robot.model, setting.ground, memory)
+    gap, normal = memory.contacts.gap, memory.contacts.normal
+    inside = np.flatnonzero(gap < -ON_THE_GROUND)
+    if len(inside) and not swing_feet_pass:
+        deepest = int(inside[np.argmin(gap[inside])])
+        others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
+        needed = float(np.max(-gap[inside] / normal[inside, 1]))
+        raise SimulationError(
+            f"contact point {robot.contact_names[deepest]!r}{others} begins "
+            f"{-gap[deepest]:.3g} m deep in the ground. EventDriven knows no way out of it: raise "
+            f"the robot by {needed:.3g} m, begin on the ground that the state was made for, or use "
+            f"TimeStepping or Compliant, which push it out"
+        )
+    model = robot.model
+    beyond = np.maximum(model.lower - memory.q, memory.q - model.upper)
+    joint = int(np.argmax(beyond))
+    if beyond[joint] > ON_THE_GROUND:
+        raise SimulationError(
+            f"joint {robot.joint_names[joint]!r} begins at {memory.q[joint]:.6g}, beyond its range "
+            f"of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven knows no way "
+            f"back: begin within the range, or use TimeStepping or Compliant"
+        )
+
+
 class _EventDrivenEngine:
     """Event-driven simulation at work."""
 
     def __init__(self, method: EventDriven, setting: Setting) -> None:
+        _check_start(setting, method.swing_feet_pass)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
         self._phase = allocate_phase(setting.robot)
         self._order = solver_order(method.solver)
+        self._phase.order[:] = self._order
         self.solver = method.solver
         clock, count = self._phase.clock, self._phase.count
         clock[STEP] = min(1e-3, method.max_step)

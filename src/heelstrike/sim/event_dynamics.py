@@ -33,6 +33,7 @@ from heelstrike.sim.contact_geometry import (
 )
 from heelstrike.sim.controller import Contacts
 from heelstrike.sim.dry_friction import dry_force
+from heelstrike.sim.event_candidates import share_redundant
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
@@ -367,6 +368,8 @@ def evaluate(
         count, memory.candidate, phase, memory.friction, memory.delassus, memory.free,
         memory.impulse,
     )  # fmt: skip
+    if count > 0 and phase.count[DEFICIENT] == 1:
+        share_redundant(count, memory, phase)
     for i in range(nv):
         slope[i] = state[nv + i]
         slope[nv + i] = memory.rate[i]

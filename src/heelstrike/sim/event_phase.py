@@ -64,6 +64,8 @@ class Phase(Bundle):
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     dry_joint : (nd,) int
         Joints with dry friction.
+    order : (3,) int
+        Contact solvers in the order in which they are tried.
     closed : (nc,) int
         Whether each contact point is on the ground, each joint at its stop.
     slide : (nc,) int
@@ -119,6 +121,7 @@ class Phase(Bundle):
     stop_side: Floats
     stop_limit: Floats
     dry_joint: Integers
+    order: Integers
     closed: Integers
     slide: Integers
     group: Integers
@@ -176,6 +179,7 @@ def allocate_phase(robot: Robot) -> Phase:
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
+        order=integers(3),
         closed=(np.arange(nc) >= nc - len(dry)).astype(np.int64),
         slide=integers(nc),
         group=integers(nc),
