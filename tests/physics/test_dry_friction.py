@@ -12,10 +12,11 @@ import dataclasses
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.optimize import brentq
+from scipy.optimize import brentq, linprog
 
 import heelstrike as hs
 from heelstrike.analysis.energy import energy_balance
+from heelstrike.dynamics import bias_force, contact_positions, point_jacobian
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import read_mjcf
 from heelstrike.robot.model import Model
@@ -303,23 +304,70 @@ def test_stops_and_friction_share_a_joint() -> None:
         assert abs(run.friction_torque[-1, 2]) <= friction * (1.0 + 1e-9)
 
 
+def crouching() -> tuple[hs.Robot, hs.State]:
+    """bravo7 with bent knees, both feet flat beside each other."""
+    robot = hs.load_robot("bravo7")
+    q = robot.reference_state().q.copy()
+    for part, angle in (("hip", -0.3), ("knee", 0.6), ("ankle", -0.3)):
+        q[[part in name for name in robot.joint_names]] += angle
+    q[1] -= contact_positions(robot, q)[:, 1].min()
+    return robot, hs.State(q, np.zeros(robot.nv))
+
+
+def least_breakaway_torque(robot: hs.Robot, state: hs.State) -> float:
+    """Breakaway torque of all joints that just holds a robot at rest: a linear program.
+
+    Of all joint torques τ and contact forces λ in their cones with τ + Jᵀ λ = H, those with the
+    smallest |τ|.
+    """
+    nv, nc = robot.nv, robot.nc
+    places = zip(robot.model.contact_link, robot.model.contact_position, strict=True)
+    rows = [point_jacobian(robot, state.q, link, local)[[1, 0]] for link, local in places]
+    moving = np.eye(nv)[3:]  # all but the trunk
+    count = len(moving)
+    equal = np.hstack((moving.T, np.concatenate(rows).T, np.zeros((nv, 1))))
+    bounds = np.zeros((2 * (count + nc), count + 2 * nc + 1))
+    for i in range(count):
+        for k, sign in enumerate((1.0, -1.0)):
+            bounds[2 * i + k, [i, -1]] = sign, -1.0
+    for i in range(nc):
+        for k, sign in enumerate((1.0, -1.0)):
+            place = count + 2 * i
+            bounds[2 * count + 2 * i + k, [place, place + 1]] = -0.75, sign
+    found = linprog(
+        np.eye(count + 2 * nc + 1)[-1],
+        A_ub=bounds,
+        b_ub=np.zeros(len(bounds)),
+        A_eq=equal,
+        b_eq=bias_force(robot, state.q, state.v),
+        bounds=(None, None),
+    )
+    assert found.success
+    return float(found.fun)
+
+
 @pytest.mark.parametrize("method", METHODS[:2], ids=lambda method: type(method).__name__)
 def test_a_biped_stands_on_its_dry_joints(method: object) -> None:
-    """Six joints that hold on two feet that stick: three times statically indeterminate.
+    """Six joints that stick above two feet that stick: three times statically indeterminate.
 
-    The split of the loads is not unique, the motion is: none. Without friction it would fall.
+    Which joint carries what is open, but not whether they can: up to the least breakaway torque
+    that balances the weight nothing moves, however the loads are shared; below it knees give way.
     """
-    robot = hs.load_robot("bravo7")
-    joints = [robot.joint_names.index(name) for name in robot.joint_names[3:]]
-    friction = np.zeros(robot.nv)
-    friction[joints] = 300.0
-    robot = dataclasses.replace(
-        robot, model=dataclasses.replace(robot.model, dry_friction=friction)
-    )
-    state = robot.reference_state()
-    run = hs.simulate(robot, state=state, duration=0.2, method=method)  # type: ignore[arg-type]
-    assert run.completed, run.message
-    assert max(dataclasses.astuple(run.certificates)) <= 1e-9
-    assert np.abs(run.velocity).max() <= 1e-10
+    robot, state = crouching()
+    least = least_breakaway_torque(robot, state)
     weight = G * robot.model.mass.sum()
-    np.testing.assert_allclose(run.contact_force[1:, :, 0].sum(axis=1), weight, rtol=1e-9)
+    for share in (5.0, 1.5, 1.01, 0.99):
+        friction = np.concatenate((np.zeros(3), np.full(6, share * least)))
+        model = dataclasses.replace(robot.model, dry_friction=friction)
+        dry = dataclasses.replace(robot, model=model)
+        run = hs.simulate(dry, state=state, duration=0.2, method=method)  # type: ignore[arg-type]
+        assert run.completed, run.message
+        assert max(dataclasses.astuple(run.certificates)) <= 1e-9
+        assert np.abs(run.friction_torque).max() <= share * least * (1.0 + 1e-9)
+        if share > 1.0:
+            assert np.abs(run.velocity).max() <= 1e-10
+            assert not run.events
+            np.testing.assert_allclose(run.contact_force[1:, :, 0].sum(axis=1), weight, rtol=1e-9)
+        else:
+            assert np.abs(run.velocity[-1]).max() > 1e-3
+            assert joint_events(run)

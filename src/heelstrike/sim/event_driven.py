@@ -24,7 +24,7 @@ from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mom
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts
+from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
 from heelstrike.sim.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.dry_friction import dry_force
@@ -40,6 +40,7 @@ from heelstrike.sim.engine import (
     Setting,
     solver_order,
 )
+from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import evaluate, project
 from heelstrike.sim.event_gaps import gap_now, gap_velocity
 from heelstrike.sim.event_location import integrate, total_weight
@@ -50,7 +51,6 @@ from heelstrike.sim.event_modes import (
     log_event,
     note_residual,
     report_modes,
-    solve_candidates,
 )
 from heelstrike.sim.event_phase import (
     ABSOLUTE,
@@ -68,6 +68,7 @@ from heelstrike.sim.event_phase import (
     LENGTH,
     LET_PASS,
     LONGEST,
+    NEXT_PUSH,
     OUTPUT_PERIOD,
     PAUSE,
     PAUSE_STEP,
@@ -93,6 +94,7 @@ from heelstrike.sim.memory import (
     allocate_memory,
     allocate_record,
 )
+from heelstrike.sim.push import switch_at
 from heelstrike.sim.recording import center_height, limit_torque, sound
 from heelstrike.sim.status import EventKind
 
@@ -195,7 +197,13 @@ class EventDriven:
         solver_order(self.solver)
 
     def engine(self, setting: Setting) -> Engine:
-        """Return this way through time, compiled and ready to run."""
+        """Return this way through time, compiled and ready to run.
+
+        Raises
+        ------
+        SimulationError
+            If the robot begins in the ground, or with a joint beyond its range.
+        """
         return _EventDrivenEngine(self, setting)
 
 
@@ -515,13 +523,17 @@ def control(
     memory: Memory,
     phase: Phase,
 ) -> int:
-    """Ask the controller, if it is due; return BAD, SAME or JUMPED."""
+    """Ask the controller, if it is due, and let pushes begin and end.
+
+    Returns BAD, SAME or JUMPED, which is what the forces did.
+    """
     clock, count = phase.clock, phase.count
     nv = model.parent.shape[0]
+    jumped, clock[NEXT_PUSH] = switch_at(memory.pushes, clock[TIME])
     period = clock[SAMPLE_PERIOD]
     if period > 0.0:
         if clock[TIME] < count[SAMPLE] * period:
-            return SAME
+            return JUMPED if jumped else SAME
         count[SAMPLE] += 1
     state = phase.begin
     forward_kinematics(model, state[:nv], memory.tree)
@@ -533,7 +545,6 @@ def control(
     )  # fmt: skip
     if not limit_torque(model, memory):
         return BAD
-    jumped = False
     for i in range(memory.torque.shape[0]):
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
@@ -544,7 +555,7 @@ def control(
 @kernel
 def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
     """Time that the next step may not pass."""
-    stop = min(clock[END], clock[PAUSE])
+    stop = min(clock[END], clock[PAUSE], clock[NEXT_PUSH])
     if clock[SAMPLE_PERIOD] > 0.0:
         stop = min(stop, count[SAMPLE] * clock[SAMPLE_PERIOD])
     for contact in range(accumulation.shape[0]):
@@ -747,14 +758,43 @@ def compiled_advance() -> tuple[Any, float]:
     return compiled_for(signature, _advance), perf_counter() - begin
 
 
+def _check_start(setting: Setting, swing_feet_pass: bool) -> None:
+    """Refuse a state in the ground or beyond a joint stop: no motion leads there or out of it."""
+    robot, memory = setting.robot, setting.memory
+    observe(robot.model, setting.ground, memory)
+    gap, normal = memory.contacts.gap, memory.contacts.normal
+    inside = np.flatnonzero(gap < -ON_THE_GROUND)
+    if len(inside) and not swing_feet_pass:
+        deepest = int(inside[np.argmin(gap[inside])])
+        others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
+        needed = float(np.max(-gap[inside] / normal[inside, 1]))
+        raise SimulationError(
+            f"contact point {robot.contact_names[deepest]!r}{others} begins "
+            f"{-gap[deepest]:.3g} m deep in the ground. EventDriven knows no way out of it: raise "
+            f"the robot by {needed:.3g} m, begin on the ground that the state was made for, or use "
+            f"TimeStepping or Compliant, which push it out"
+        )
+    model = robot.model
+    beyond = np.maximum(model.lower - memory.q, memory.q - model.upper)
+    joint = int(np.argmax(beyond))
+    if beyond[joint] > ON_THE_GROUND:
+        raise SimulationError(
+            f"joint {robot.joint_names[joint]!r} begins at {memory.q[joint]:.6g}, beyond its range "
+            f"of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven knows no way "
+            f"back: begin within the range, or use TimeStepping or Compliant"
+        )
+
+
 class _EventDrivenEngine:
     """Event-driven simulation at work."""
 
     def __init__(self, method: EventDriven, setting: Setting) -> None:
+        _check_start(setting, method.swing_feet_pass)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
         self._phase = allocate_phase(setting.robot)
         self._order = solver_order(method.solver)
+        self._phase.order[:] = self._order
         self.solver = method.solver
         clock, count = self._phase.clock, self._phase.count
         clock[STEP] = min(1e-3, method.max_step)
@@ -763,6 +803,7 @@ class _EventDrivenEngine:
         clock[OUTPUT_PERIOD] = method.output_period or 0.0
         clock[SAMPLE_PERIOD] = setting.control_period or 0.0
         clock[LONGEST] = method.max_step
+        clock[NEXT_PUSH] = np.inf
         clock[LAST_EVENT] = -np.inf
         clock[LAST_IMPACT] = -np.inf
         clock[LAST_ROW] = -np.inf

@@ -33,9 +33,11 @@ from heelstrike.sim.contact_geometry import (
 )
 from heelstrike.sim.controller import Contacts
 from heelstrike.sim.dry_friction import dry_force
+from heelstrike.sim.event_candidates import share_redundant
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
+from heelstrike.sim.push import add_pushes
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
@@ -255,13 +257,14 @@ def watch_forces(
 def free_acceleration(
     model: Model, memory: Memory, dry_joint: Integers, slide: Integers, state: Floats
 ) -> None:
-    """Acceleration without contact, A⁻¹ (B Γ + passive − H), into ``memory.rate``.
+    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``memory.rate``.
 
     The equations of the state have been evaluated. Dry friction of the joints that move is one of
     the passive forces; `slide` ends with theirs.
     """
     nv = model.parent.shape[0]
     passive_force(model, state[:nv], state[nv:], memory.force)
+    add_pushes(model, memory.tree, memory.pushes, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     first = slide.shape[0] - dry_joint.shape[0]
@@ -367,6 +370,8 @@ def evaluate(
         count, memory.candidate, phase, memory.friction, memory.delassus, memory.free,
         memory.impulse,
     )  # fmt: skip
+    if count > 0 and phase.count[DEFICIENT] == 1:
+        share_redundant(count, memory, phase)
     for i in range(nv):
         slope[i] = state[nv + i]
         slope[nv + i] = memory.rate[i]

@@ -3,15 +3,7 @@
 from __future__ import annotations
 
 from heelstrike.compilation import kernel
-from heelstrike.contact.modes import (
-    OPEN,
-    SLIDING_BACKWARD,
-    SLIDING_FORWARD,
-    SLIP_BACKWARD,
-    SLIP_FORWARD,
-    STICK,
-)
-from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.event_dynamics import tangential_place
 from heelstrike.sim.event_phase import Phase
@@ -51,43 +43,6 @@ def note_residual(residual: Floats, extreme: Floats) -> None:
     extreme[COMPLEMENTARITY] = max(extreme[COMPLEMENTARITY], residual[0])
     extreme[CONE] = max(extreme[CONE], residual[1])
     extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], residual[2])
-
-
-@kernel
-def solve_candidates(
-    count: int, memory: Memory, slide: Integers, accelerations: bool, order: Integers
-) -> int:
-    """Solve the contact problem of the candidates at the level of accelerations or velocities.
-
-    Matrix and free term are those in the memory. Of accelerations, points that slide are prescribed
-    to go on doing so: their friction is known. Forces or impulses go to ``memory.impulse``, modes
-    to ``memory.problem_mode``. Returns the solver's status.
-    """
-    for place in range(count):
-        contact = memory.candidate[place]
-        memory.problem_friction[place] = memory.friction[contact]
-        memory.problem_mode[place] = STICK
-        if accelerations:
-            if slide[contact] > 0:
-                memory.problem_mode[place] = SLIDING_FORWARD
-            elif slide[contact] < 0:
-                memory.problem_mode[place] = SLIDING_BACKWARD
-            elif memory.mode[contact] < SLIDING_FORWARD:
-                memory.problem_mode[place] = memory.mode[contact]
-    return int(
-        solve_contact_kernel(
-            count,
-            memory.delassus,
-            memory.free,
-            memory.problem_friction,
-            order,
-            memory.problem_mode,
-            memory.impulse,
-            memory.velocity,
-            memory.residual,
-            memory.solver,
-        )
-    )
 
 
 @kernel

@@ -27,7 +27,8 @@ RELATIVE = 10
 ABSOLUTE = 11
 FALLEN = 12  # height of the centre of mass below which the robot has fallen, m
 LAST_ROW = 13  # time of the last row of the record
-CLOCKS = 14
+NEXT_PUSH = 14  # when a push begins or ends next
+CLOCKS = 15
 
 # Places in ``Phase.count``.
 STARTED = 0  # whether the first contact modes are being, or have been, decided
@@ -64,6 +65,8 @@ class Phase(Bundle):
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     dry_joint : (nd,) int
         Joints with dry friction.
+    order : (3,) int
+        Contact solvers in the order in which they are tried.
     closed : (nc,) int
         Whether each contact point is on the ground, each joint at its stop.
     slide : (nc,) int
@@ -110,7 +113,7 @@ class Phase(Bundle):
         Stages of the step and coefficients of its dense output.
     torque : (nu,) float
         Torques at the end of the step, to see whether the controller jumps.
-    clock : (14,) float
+    clock : (15,) float
     count : (15,) int
         Their places are module constants.
     """
@@ -119,6 +122,7 @@ class Phase(Bundle):
     stop_side: Floats
     stop_limit: Floats
     dry_joint: Integers
+    order: Integers
     closed: Integers
     slide: Integers
     group: Integers
@@ -176,6 +180,7 @@ def allocate_phase(robot: Robot) -> Phase:
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
+        order=integers(3),
         closed=(np.arange(nc) >= nc - len(dry)).astype(np.int64),
         slide=integers(nc),
         group=integers(nc),

@@ -11,13 +11,14 @@ from heelstrike.sim.contact_geometry import (
     evaluate_equations,
     locate_contacts,
 )
+from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import (
     add_contact_force,
     free_acceleration,
     gather_closed,
 )
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_modes import log_event, note_residual, solve_candidates
+from heelstrike.sim.event_modes import log_event, note_residual
 from heelstrike.sim.event_phase import LAST_IMPACT, TIME, Phase
 from heelstrike.sim.memory import Memory, Record
 from heelstrike.sim.status import EventKind

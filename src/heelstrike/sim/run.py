@@ -14,6 +14,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.engine import Method
+from heelstrike.sim.push import Push
 from heelstrike.sim.status import EventKind, RunStatus
 
 if TYPE_CHECKING:
@@ -141,10 +142,14 @@ class Run:
     steps : int
         Steps taken.
     saturations : int
-        Times a torque was clipped to its limit.
+        Times a torque was clipped to its limit, counted when the controller is called for good: at
+        every step or control period. Of a controller that acts continuously, at the samples or
+        ends of steps only; what is clipped within them is not counted.
     timing : Timing
     error : Exception or None
         What the controller raised, if that ended the run.
+    pushes : tuple of Push
+        What pushed the robot.
     """
 
     robot: Robot
@@ -171,6 +176,14 @@ class Run:
     saturations: int
     timing: Timing
     error: Exception | None = field(default=None, repr=False)
+    pushes: tuple[Push, ...] = ()
+
+    def __repr__(self) -> str:
+        last = self.time[-1] if len(self.time) else 0.0
+        return (
+            f"Run({self.robot.name}, {type(self.method).__name__}, {last:.6g} s, "
+            f"{self.status.value}, {self.steps} steps)"
+        )
 
     @property
     def completed(self) -> bool:
