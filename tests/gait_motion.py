@@ -87,7 +87,9 @@ def instant(robot: Robot, gait: Gait, t: float, *, end: bool = False) -> Instant
         return full
 
     v = completed(joints[1], np.zeros(3))
-    drift = dynamics.point_bias_acceleration(robot, q, v, robot.feet[foot].link, middle(robot, foot))
+    drift = dynamics.point_bias_acceleration(
+        robot, q, v, robot.feet[foot].link, middle(robot, foot)
+    )
     acceleration = completed(joints[2], -drift)
     force = dynamics.inverse_dynamics(robot, q, v, acceleration)
     force -= dynamics.passive_force(robot, q, v)

@@ -59,4 +59,6 @@ RANDOM = [RobotCase(f"tree{seed}", random_tree(seed)) for seed in range(20)]
 ROBOTS = [*NAMED, *RANDOM[:4]]
 
 # Trees of 2 to 30 joints, for checks that need few states of many robots.
-MANY = [RobotCase(f"forest{k}", random_tree(1000 + k, bodies=2 + k * 14 // 200)) for k in range(200)]
+MANY = [
+    RobotCase(f"forest{k}", random_tree(1000 + k, bodies=2 + k * 14 // 200)) for k in range(200)
+]

@@ -54,6 +54,7 @@ def make_run(
         velocity=full(velocity, robot.nv),
         torque=full(torque, robot.nu),
         stop_torque=full(None, robot.nv),
+        friction_torque=full(None, robot.nv),
         contact_point=center - radius[:, None] * normal,
         contact_normal=full(normal, robot.nc, 2),
         gap=center @ normal - radius,

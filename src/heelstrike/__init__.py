@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
+    from heelstrike.errors import ViewError as ViewError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PiecewiseGait as PiecewiseGait
@@ -57,6 +58,7 @@ if TYPE_CHECKING:
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
     from heelstrike.robot import human as human
+    from heelstrike.robot import inspect_robot as inspect_robot
     from heelstrike.robot import load_robot as load_robot
     from heelstrike.sim import Batch as Batch
     from heelstrike.sim import Compliant as Compliant
@@ -105,6 +107,7 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "ViewError": "heelstrike.errors",
     "builtin_robots": "heelstrike.robot",
     "compare": "heelstrike.experiments.comparison",
     "contact_forward_dynamics": "heelstrike.contact",
@@ -112,6 +115,7 @@ _HOME = {
     "contact_kinematics": "heelstrike.contact",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "human": "heelstrike.robot",
+    "inspect_robot": "heelstrike.robot",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",

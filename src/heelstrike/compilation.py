@@ -19,6 +19,7 @@ from numba import njit
 from numba.core.caching import FunctionCache
 
 from heelstrike.linking import InnerKernelCompiler
+from heelstrike.quick_compiling import quick_compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -30,16 +31,21 @@ _COMPILED = ("robot", "dynamics", "contact", "sim", "control", "analysis")
 
 
 @lru_cache(maxsize=1)
-def _sources() -> str:
+def source_fingerprint() -> str:
     """Fingerprint of all sources that kernels are made of."""
     home = Path(__file__).parent
-    files = [Path(__file__)]
+    files = sorted(home.glob("*.py"))
     for package in _COMPILED:
         files += sorted((home / package).rglob("*.py"))
     digest = hashlib.sha256()
     for file in files:
         digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def cache_directory() -> Path:
+    """Return the directory in which machine code is kept."""
+    return Path(FunctionCache(source_fingerprint.__wrapped__).cache_path)
 
 
 class _PackageCache(FunctionCache):
@@ -52,7 +58,7 @@ class _PackageCache(FunctionCache):
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         index = self._cache_file
-        index._source_stamp = (_sources(), index._source_stamp)
+        index._source_stamp = (source_fingerprint(), index._source_stamp)
 
 
 def _kept_on_disk(compiled: Any) -> Any:
@@ -73,6 +79,7 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
         self.py_func = function
+        self._called = False
         options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         self._part = njit(**options, pipeline_class=InnerKernelCompiler)(function)
 
@@ -83,7 +90,12 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
-        return self._callable(*arguments)
+        if self._called:
+            return self._callable(*arguments)
+        with quick_compiling():
+            result = self._callable(*arguments)
+        self._called = True
+        return result
 
     @cached_property
     def _callable(self) -> Any:
@@ -114,7 +126,8 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     """
     options = _OPTIONS | {"no_cfunc_wrapper": not address}
     compiled = _kept_on_disk(njit(**options)(function))
-    compiled.compile(signature)
+    with quick_compiling():
+        compiled.compile(signature)
     compiled.disable_compile()
     result: Function = compiled
     return result

@@ -37,3 +37,7 @@ class LimitCycleError(HeelstrikeError, RuntimeError):
 
 class RunFileError(HeelstrikeError, ValueError):
     """A saved run cannot be read."""
+
+
+class ViewError(HeelstrikeError, ValueError):
+    """A figure or animation was asked for that cannot be drawn or written."""

@@ -132,6 +132,32 @@ def test_a_fall_is_kept_and_told(walk: Callable[..., Any], tmp_path: Path) -> No
     assert (out / "tracking.png").exists()
 
 
+def test_a_fall_on_point_feet_is_explained(
+    walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = {"step_length": 0.21, "step_duration": 0.58, "clearance": 0.02}
+    gait = hs.optimize_gait(hs.load_robot("rabbit"), **size, friction=0.6, starts=1)
+    gait.save(tmp_path / "rabbit.json")
+    options = [
+        "--animation",
+        "none",
+        "--out",
+        str(tmp_path),
+        "--gait",
+        str(tmp_path / "rabbit.json"),
+    ]
+    result = CliRunner().invoke(app, ["walk", "rabbit", *options])
+    assert result.exit_code == 1
+    said = " ".join(result.stderr.split())
+    assert "error: the robot fell" in said
+    assert "stands on point feet" in said
+    assert "the first step" in said
+    # The first step succeeds.
+    result = CliRunner().invoke(app, ["walk", "rabbit", *options, "--steps", "1"])
+    assert result.exit_code == 0, result.stderr
+    assert "point feet" not in result.stderr
+
+
 @pytest.mark.parametrize("lost", ["zmp", "tracking"])
 def test_a_figure_that_fails_takes_nothing_with_it(
     walk: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lost: str

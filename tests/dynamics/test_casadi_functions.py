@@ -15,7 +15,7 @@ from heelstrike import dynamics
 TOLERANCE = 1e-11
 
 
-@pytest.mark.parametrize("case", [*NAMED, *RANDOM[:5]], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*NAMED, *RANDOM[1:3]], ids=lambda case: case.name)
 def test_functions_equal_queries(case: RobotCase) -> None:
     robot = case.robot()
     functions = dynamics.CasadiDynamics(robot)
@@ -31,7 +31,7 @@ def test_functions_equal_queries(case: RobotCase) -> None:
 
     of_q = ("mass_matrix", "gravity_force", "center_of_mass", "center_of_mass_jacobian")
     of_state = ("bias_force", "coriolis_force", "passive_force", "momentum", "kinetic_energy")
-    for q, v in case.states(3):
+    for q, v in case.states(2):
         a = np.cos(np.arange(robot.nv))
         torque = np.sin(np.arange(robot.nu))
         for name in (*of_q, "momentum_matrix", "potential_energy"):

@@ -56,7 +56,7 @@ def relative(ours: np.ndarray, theirs: np.ndarray) -> float:
     return float(np.abs(ours - theirs).max(initial=0.0) / np.abs(theirs).max(initial=1.0))
 
 
-@pytest.mark.parametrize("case", [*NAMED, *RANDOM], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*NAMED, *RANDOM[:8]], ids=lambda case: case.name)
 def test_equals_complex_step(case: RobotCase) -> None:
     robot = case.robot()
     n, nu = robot.nv, robot.nu
@@ -66,7 +66,7 @@ def test_equals_complex_step(case: RobotCase) -> None:
         q, v, torque = np.split(x, [n, 2 * n])
         return free_acceleration(robot, q, v, torque, np.complex128, functions)
 
-    for q, v in case.states(3):
+    for q, v in case.states(2):
         torque = 10.0 * np.cos(np.arange(nu))
         linear = dynamics.linearize(robot, q, v, torque)
         expected = complex_step(acceleration, np.concatenate([q, v, torque]).astype(complex))

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 import walking
+from rich.console import Console
 
 import heelstrike as hs
 from heelstrike.experiments.comparison import Comparison
+from heelstrike.sim import Scheme
 
 
 @pytest.fixture(scope="module")
@@ -76,3 +80,28 @@ def test_what_compare_refuses() -> None:
 def test_positions_are_compared_at_common_instants(comparison: Comparison) -> None:
     ends = [run.time[-1] for run in comparison.runs.values()]
     np.testing.assert_allclose(ends, 1.5, atol=1e-9)
+
+
+def test_methods_that_cannot_are_left_out_and_say_why() -> None:
+    """A ground with restitution is nothing for plastic impacts or for laws that have their own."""
+    options = {
+        "methods": {
+            "events": hs.EventDriven(),
+            "bouncing": hs.TimeStepping(scheme=Scheme.MOREAU_JEAN),
+            "plastic": hs.TimeStepping(),
+            "soft": hs.Compliant(),
+        },
+        "state": walking.gait().initial_state,
+        "duration": 0.01,
+        "ground": hs.Ground(restitution=0.3),
+    }
+    found = hs.compare(walking.bravo7(), None, **options)  # type: ignore[arg-type]
+    assert list(found.runs) == ["events", "bouncing"]
+    assert list(found.left_out) == ["plastic", "soft"]
+    assert "HuntCrossley.from_sink" in found.left_out["soft"]
+    assert found.to_dict()["left_out"] == found.left_out
+    console = Console(width=200, file=io.StringIO())
+    console.print(found)
+    assert "soft left out: on compliant ground" in console.file.getvalue()
+    with pytest.raises(hs.SimulationError, match="restitution"):
+        hs.compare(walking.bravo7(), None, reference="soft", **options)  # type: ignore[arg-type]

@@ -1,8 +1,9 @@
 """Every query against Pinocchio, on all built-in robots and 200 random trees of 2 to 30 joints.
 
-Pinocchio's model is built here from the arrays of ours, joint by joint in three dimensions, so that
-only the algorithms are compared; the reading of files is MuJoCo's test. Install it (package ``pin``)
-to run this. Both sides add a few hundred products, hence 1e-10 relative to the largest entry.
+Pinocchio's model is built here from the arrays of ours, joint by joint in three dimensions, so
+that only the algorithms are compared; the reading of files is MuJoCo's test. Install it (package
+``pin``) to run this. Both sides add a few hundred products, hence 1e-10 relative to the largest
+entry.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ def test_queries(case: RobotCase) -> None:
         check("inverse dynamics", dynamics.inverse_dynamics(robot, q, v, a), inverse)
         forward = pin.aba(model, data, at, v, force).copy()
         if case.name != "rimless_wheel":
-            # Its inertia about the hub is 1e-12 kg m², which Pinocchio's sums round off: the angular
-            # acceleration loses its digits there, not in MuJoCo and not here.
+            # Its inertia about the hub is 1e-12 kg m², which Pinocchio's sums round off: the
+            # angular acceleration loses its digits there, not in MuJoCo and not here.
             check("forward dynamics", dynamics.forward_dynamics(robot, q, v, force), forward)
 
         pin.centerOfMass(model, data, at, v, 0.0 * a)
@@ -135,9 +136,7 @@ def test_queries(case: RobotCase) -> None:
                 + np.cross(w, np.cross(w, arm))
             )
             drift = dynamics.point_bias_acceleration(robot, q, v, link, local)
-            check(
-                "Jacobian bias", drift, [at_point[0], at_point[2], acceleration.angular[1]]
-            )
+            check("Jacobian bias", drift, [at_point[0], at_point[2], acceleration.angular[1]])
             position = dynamics.point_position(robot, q, link, local)
             check("position", position, (origin + arm)[::2])
             moved = dynamics.point_velocity(robot, q, v, link, local)

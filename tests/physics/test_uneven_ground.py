@@ -11,7 +11,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.dynamics import energy
+from heelstrike.dynamics import contact_positions, energy
 from heelstrike.sim import EventKind, RunStatus
 
 RISE = float(np.tan(np.deg2rad(5.0)))
@@ -75,3 +75,26 @@ def test_time_stepping_sees_the_same_first_touchdown(name: str) -> None:
     )
     assert exact.contact == stepped.contact
     assert stepped.time == pytest.approx(exact.time, abs=2.0 * step)
+
+
+def test_a_robot_that_begins_in_the_ground_is_refused() -> None:
+    """A state for level ground on a slope that rises through the foot in front: which, how deep.
+
+    The slope rises by tan 5° from the world's origin. Raised by what the message says, it begins.
+    """
+    gait = walking.gait()
+    ground = hs.Ground(slope=np.deg2rad(5.0))
+    robot, state = walking.bravo7(), gait.initial_state
+    with pytest.raises(
+        hs.SimulationError, match=r"contact point '\w+'.* deep in the ground"
+    ) as told:
+        hs.simulate(robot, state=state, duration=0.1, method=hs.EventDriven(), ground=ground)
+    points = contact_positions(robot, state.q)
+    needed = float(np.max(points[:, 0] * np.tan(np.deg2rad(5.0)) - points[:, 1]))
+    assert f"raise the robot by {needed:.3g} m" in str(told.value)
+    raised = hs.State(state.q + np.array([0.0, needed, *np.zeros(7)]), state.v)
+    run = hs.simulate(robot, state=raised, duration=0.1, method=hs.EventDriven(), ground=ground)
+    assert run.completed, run.message
+    # Time stepping pushes the feet out of it, and fast.
+    pushed = hs.simulate(robot, state=state, duration=0.02, method=hs.TimeStepping(), ground=ground)
+    assert pushed.gap[-1].min() >= -1e-3

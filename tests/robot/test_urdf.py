@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -125,7 +126,7 @@ def test_limits_of_a_urdf() -> None:
     np.testing.assert_array_equal(model.torque_upper, [9.0, 9.0])
     free = read_mjcf(biped(joint("planar")).replace('velocity="4"', 'velocity="0"')).model
     assert np.all(np.isinf(free.speed_limit))  # what exporters write for nothing
-    with pytest.raises(RobotError, match="speed limit of joint 'left_hip'"):
+    with pytest.raises(RobotError, match="'velocity' of <limit> of joint 'left_hip'"):
         read_mjcf(biped(joint("planar")).replace('velocity="4"', 'velocity="-4"'))
 
 
@@ -251,3 +252,61 @@ def test_a_planar_robot_is_projected_onto_itself() -> None:
     one, other = load_robot("bravo7"), load_robot("bravo7", projected=True)
     for field, values in one.model.members().items():
         np.testing.assert_array_equal(other.model.members()[field], values, err_msg=field)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("<limit lower", "<limits lower", "<limits> in <joint> .*did you mean 'limit'"),
+        ("effort=", "efort=", "unknown attribute 'efort' .did you mean 'effort'"),
+        ('lower="-1" ', "", "<limit> of joint 'left_hip' has no 'lower'"),
+        ('upper="1"', 'upper="-1"', "range of joint 'left_hip' is empty, from -1 to -1"),
+        ("<collision>", "<colision>", "<colision> in <link> .*did you mean 'collision'"),
+    ],
+)
+def test_what_a_parser_would_pass_over_is_told(old: str, new: str, said: str) -> None:
+    text = biped(joint("planar"))
+    assert old in text
+    changed = text.replace(old, new, 1)
+    if "colision" in new:
+        changed = changed.replace("</collision>", "</colision>", 1)
+    with pytest.warns(RobotWarning, match=said):
+        read_mjcf(changed)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'value="5"',
+            'value="-5"',
+            "'value' of <mass> of link 'trunk' is '-5'; it must not be neg",
+        ),
+        ('value="5"', 'value="5,5"', "'5,5', where a number must be"),
+        ('izz="0.1"', "", "<inertia> of link 'trunk' lacks the attribute 'izz'"),
+        ('name="right_hip"', 'name="left_hip"', "two joints are called 'left_hip'"),
+        ('xyz="0 1 0"', 'xyz="0 0 0"', "'xyz' of <axis> of joint 'root' is '0 0 0'|no direction"),
+        ("<link", "<xacro:link", "Expand it first: xacro robot.xacro > robot.urdf"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(old: str, new: str, words: str) -> None:
+    text = biped(joint("planar"))
+    if "xacro" in new:
+        text = text.replace("<link name", '<xacro:property name="a"/><link name', 1)
+    else:
+        assert old in text
+        text = text.replace(old, new, 1)
+    with pytest.raises(RobotError, match=words):
+        read_mjcf(text)
+
+
+def test_what_belongs_to_other_programs_is_left_alone() -> None:
+    """Prefixes that nothing declares, materials, transmissions, Gazebo: no word about them."""
+    more = (
+        '<material name="m"><color rgba="1 0 0 1"/></material><gazebo reference="trunk"/>'
+        '<transmission name="t"/><gazebo:plugin filename="x"/><ros2_control name="c"/>'
+    )
+    text = biped(joint("planar")).replace("</robot>", more + "</robot>")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert read_mjcf(text).nu == 2

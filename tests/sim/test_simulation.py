@@ -173,3 +173,8 @@ def test_zero_duration_records_the_first_instant() -> None:
 @pytest.mark.parametrize("scheme", list(Scheme))
 def test_every_scheme_says_what_it_is(scheme: Scheme) -> None:
     assert hs.TimeStepping(scheme=scheme).scheme is scheme
+
+
+def test_a_run_introduces_itself_in_a_line() -> None:
+    found = run(None, stop_when_fallen=False)
+    assert repr(found) == "Run(bravo7, TimeStepping, 0.1 s, completed, 100 steps)"

@@ -34,6 +34,8 @@ class EnergyBalance:
         Work of the ground: impacts and sliding friction. An exact contact never adds energy.
     stops : (nt,) float
         Work of the joint stops, of which the same is true.
+    dry_friction : (nt,) float
+        Work of dry friction in the joints, never positive in exact motion.
     pushes : (nt,) float
         Work of the pushes.
     """
@@ -45,6 +47,7 @@ class EnergyBalance:
     dampers: Floats
     contacts: Floats
     stops: Floats
+    dry_friction: Floats
     pushes: Floats
 
     @property
@@ -56,8 +59,8 @@ class EnergyBalance:
     def residual(self) -> Floats:
         """Change of energy that no work explains, (nt,), in J: the error of the time method."""
         gained = self.total - self.total[:1]
-        known = self.actuators + self.dampers + self.contacts + self.stops + self.pushes
-        return gained - known
+        known = self.actuators + self.dampers + self.contacts + self.stops
+        return gained - known - self.dry_friction - self.pushes
 
 
 def energy_balance(run: Run) -> EnergyBalance:
@@ -94,6 +97,9 @@ def energy_balance(run: Run) -> EnergyBalance:
         dampers=summed(damper_power * held),
         contacts=summed(contact_work),
         stops=summed((mean_over_intervals(run, run.stop_torque) * mean).sum(axis=1) * held),
+        dry_friction=summed(
+            (mean_over_intervals(run, run.friction_torque) * mean).sum(axis=1) * held
+        ),
         pushes=summed(_push_work(run, mean)),
     )
 

@@ -53,6 +53,10 @@ def compare(
         float, typer.Option(help="Time step in s of the methods that have one.")
     ] = 1e-4,
     friction: Annotated[float, typer.Option(help="Friction coefficient of the ground.")] = 0.75,
+    restitution: Annotated[
+        float,
+        typer.Option(help="Restitution of the ground; methods that know none are left out."),
+    ] = 0.0,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
     ] = Path("compare"),
@@ -68,7 +72,7 @@ def compare(
     loaded = hs.load_robot(robot)
     ways = method or ALL
     chosen = {way.value: _method(way, step) for way in ways}
-    ground = hs.Ground(friction=friction)
+    ground = hs.Ground(friction=friction, restitution=restitution)
     if gait is not None:
         planned = hs.load_gait(gait, loaded)
     else:

@@ -9,6 +9,7 @@ import typer
 from heelstrike import __version__
 from heelstrike.cli.bench import bench
 from heelstrike.cli.compare import compare
+from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
 from heelstrike.cli.robots import robots
 from heelstrike.cli.walk import walk
@@ -26,6 +27,7 @@ app.command()(paper)
 app.command()(compare)
 app.command()(robots)
 app.command()(bench)
+app.command()(inspect)
 
 
 def _show_version(wanted: bool) -> None:

@@ -99,7 +99,7 @@ def walk(
     with stage("loading"):
         from heelstrike.contact.ground import Ground
         from heelstrike.experiments.results import Results
-        from heelstrike.experiments.walk import walk
+        from heelstrike.experiments.walk import walk, why_unstable
         from heelstrike.robot import load_robot
 
         # All that is cheap to refuse is refused before anything that takes long.
@@ -136,6 +136,9 @@ def walk(
         complain(run.message)
     elif not walked:
         complain(f"the robot took {summary.steps} of {steps} steps in {run.time[-1]:.3g} s")
+    if not walked and (reason := why_unstable(planned)):
+        longer = " --method event-driven keeps to the gait for longer."
+        tell(reason + ("" if method is Method.EVENT_DRIVEN else longer))
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)
 

@@ -26,11 +26,14 @@ class GroundModel(Bundle):
     vertices : (ns + 1, 2) float
         Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
         ever.
+    normal : (ns, 2) float
+        Upward unit normal of each segment.
     friction, restitution : (ns,) float
         Coefficients of each segment.
     """
 
     vertices: Floats
+    normal: Floats
     friction: Floats
     restitution: Floats
 
@@ -81,7 +84,8 @@ class Ground:
         segments = len(vertices) - 1
         friction = _coefficients("friction coefficient", self.friction, segments, np.inf)
         restitution = _coefficients("restitution", self.restitution, segments, 1.0)
-        object.__setattr__(self, "_model", GroundModel(vertices, friction, restitution))
+        model = GroundModel(vertices, _normals(vertices), friction, restitution)
+        object.__setattr__(self, "_model", model)
 
     @classmethod
     def stairs(
@@ -167,6 +171,11 @@ def _polyline(profile: ArrayLike) -> Floats:
     return vertices
 
 
+def _normals(vertices: Floats) -> Floats:
+    run, rise = np.diff(vertices, axis=0).T
+    return np.ascontiguousarray(np.column_stack((-rise, run)) / np.hypot(run, rise)[:, None])
+
+
 def _coefficients(name: str, value: ArrayLike, segments: int, highest: float) -> Floats:
     coefficients = np.asarray(value, dtype=np.float64)
     if coefficients.ndim > 1 or coefficients.size not in (1, segments):
@@ -198,19 +207,15 @@ def segment_below(ground: GroundModel, x: float) -> int:
 def ground_height(ground: GroundModel, x: float) -> float:
     """Height of the ground at x."""
     segment = segment_below(ground, x)
-    run = ground.vertices[segment + 1, 0] - ground.vertices[segment, 0]
-    rise = ground.vertices[segment + 1, 1] - ground.vertices[segment, 1]
-    return ground.vertices[segment, 1] + rise / run * (x - ground.vertices[segment, 0])
+    slope = -ground.normal[segment, 0] / ground.normal[segment, 1]
+    return ground.vertices[segment, 1] + slope * (x - ground.vertices[segment, 0])
 
 
 @kernel
 def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: Floats) -> float:
     """Signed distance to the line through a segment; writes its upward normal."""
-    run = ground.vertices[segment + 1, 0] - ground.vertices[segment, 0]
-    rise = ground.vertices[segment + 1, 1] - ground.vertices[segment, 1]
-    length = np.sqrt(run * run + rise * rise)
-    normal[0] = -rise / length
-    normal[1] = run / length
+    normal[0] = ground.normal[segment, 0]
+    normal[1] = ground.normal[segment, 1]
     return (x - ground.vertices[segment, 0]) * normal[0] + (
         z - ground.vertices[segment, 1]
     ) * normal[1]

@@ -2,8 +2,9 @@
 
 Sticking contacts make one symmetric system. Vertices of one flat foot share their tangential row,
 so that only the sum of their friction is determined; among all splits the equal one has the least
-norm. Whatever is less usual - slip, normal rows that depend on each other, friction that an equal
-split cannot hold - is left to the general way, and the certificate decides as always.
+norm. Rows may depend on each other otherwise, as those of two feet under straight legs do. Whatever
+is less usual - slip, or friction that this split cannot hold - is left to the general way, and the
+certificate decides as always.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from heelstrike.compilation import kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
+    BASIS,
     PIVOT_ROW,
     POINT,
     REST_TOLERANCE,
@@ -28,7 +30,10 @@ SAME_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 
 GOOD_PIVOT = 1e-7
-"""Pivots that keep less than this of their diagonal are left to an elimination that chooses."""
+"""Pivots that keep more than this of their diagonal are good."""
+
+NO_PIVOT = 1e-13
+"""Rows that keep less depend on those before; what lies between is left to the general way."""
 
 
 @kernel
@@ -76,11 +81,13 @@ def list_equations(
 
 @kernel
 def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
-    """Solve ``G x = -b`` over the listed rows, x to ``POINT``; return whether it is regular.
+    """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
 
-    Elimination in the order of the rows, A = L D Lᵀ, with 1/D on the diagonal.
+    Elimination in the order of the rows, A = L D Lᵀ, with 1/D on the diagonal, zero for rows that
+    depend on others.
     """
     source, matrix, x = work.labels[SOURCE], work.tableau, work.vectors[POINT]
+    dependent = 0
     for i in range(size):
         total = -free[source[i]]
         for j in range(i):
@@ -90,22 +97,67 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
             # Until row i is finished, its entries still carry their D.
             matrix[i, j] = entry
         pivot = delassus[source[i], source[i]]
-        least = GOOD_PIVOT * pivot
+        diagonal = pivot
         for j in range(i):
             ratio = matrix[i, j] * matrix[j, j]
             pivot -= ratio * matrix[i, j]
             total -= ratio * x[j]
             matrix[i, j] = ratio
-        if not pivot > least:
-            return False
-        matrix[i, i] = 1.0 / pivot
         x[i] = total
+        if pivot > GOOD_PIVOT * diagonal:
+            matrix[i, i] = 1.0 / pivot
+        elif abs(pivot) <= NO_PIVOT * diagonal:
+            matrix[i, i] = 0.0
+            dependent += 1
+        else:
+            return False
     for i in range(size):
         x[i] *= matrix[i, i]
     for i in range(size - 1, -1, -1):
         for j in range(i):
             x[j] -= matrix[i, j] * x[i]
+    if dependent > 0:
+        shorten(size, work)
     return True
+
+
+@kernel
+def shorten(size: int, work: ContactWorkspace) -> None:
+    """Take from the solution what lies along directions that change no velocity.
+
+    There is one such direction n for every row that depends on others, Lᵀ n = e. They are made
+    orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
+    counts 1/m.
+    """
+    matrix, x, basis = work.tableau, work.vectors[POINT], work.squares[BASIS]
+    sharers = work.vectors[SHARERS]
+    found = 0
+    for row in range(size):
+        if matrix[row, row] != 0.0:
+            continue
+        direction = basis[found]
+        for i in range(size):
+            direction[i] = 0.0
+        direction[row] = 1.0
+        for i in range(row, -1, -1):
+            for j in range(i):
+                direction[j] -= matrix[i, j] * direction[i]
+        for earlier in range(found):
+            remove_part(size, basis[earlier], sharers, direction)
+        remove_part(size, direction, sharers, x)
+        found += 1
+
+
+@kernel
+def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -> None:
+    """Make a vector orthogonal to a direction."""
+    part = 0.0
+    length = 0.0
+    for i in range(size):
+        part += direction[i] * vector[i] / sharers[i]
+        length += direction[i] * direction[i] / sharers[i]
+    for i in range(size):
+        vector[i] -= part / length * direction[i]
 
 
 @kernel

@@ -69,7 +69,7 @@ def point_foot_torque(
     contacts: Contacts,
     model: Model,
     tree: Workspace,
-    scratch: Workspace,
+    scratch: Workspace,  # noqa: ARG001 - every controller of the compiled loop is called with it
     parameters: Floats,
     memory: Floats,
     torque: Floats,

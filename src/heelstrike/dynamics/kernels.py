@@ -434,3 +434,21 @@ def momentum_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
         if parent >= 0:
             for k in range(4):
                 work.composite[parent, k] += work.composite[i, k]
+
+
+@kernel
+def state_equations(
+    model: Model,
+    q: Floats,
+    v: Floats,
+    work: Workspace,
+    matrix: Floats,
+    factor: Floats,
+    bias: Floats,
+) -> None:
+    """Everything that follows from a state: kinematics, factor of the mass matrix, bias force."""
+    forward_kinematics(model, q, work)
+    link_velocities(model, v, work)
+    mass_matrix(model, work, matrix)
+    factorize(model, matrix, factor)
+    bias_force(model, work, bias)

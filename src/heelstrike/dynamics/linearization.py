@@ -114,8 +114,8 @@ def _solved(system: Floats, right: Floats, n: int) -> Floats:
     scale = np.ones(len(system))
     scale[:n] = 1.0 / np.sqrt(np.diag(system)[:n])
     scaled = scale[:, None] * system * scale
-    solution: Floats = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=1e-12)[0]
-    return scale[:, None] * solution
+    solution = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=1e-12)[0]
+    return np.asarray(scale[:, None] * solution, np.float64)
 
 
 @lru_cache(maxsize=32)

@@ -120,7 +120,7 @@ class TracedDynamics:
         return acceleration
 
     def contact_jacobian(self, contacts: Sequence[int]) -> NDArray[np.object_]:
-        """Rows (normal, tangent) of contact points on level ground, contact by contact, (2k, nv)."""
+        """Rows (normal, tangent) of contact points on level ground, point by point, (2k, nv)."""
         rows = np.zeros((2 * len(contacts), self.robot.nv), dtype=object)
         for place, contact in enumerate(contacts):
             link = int(self.model.contact_link[contact])

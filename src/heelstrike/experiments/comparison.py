@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -92,11 +92,14 @@ class Comparison:
         Name of the run that the others are held against.
     differences : tuple of Difference
         One a method, in the order they were given.
+    left_out : dict of str to str
+        Methods that could not simulate this, and why.
     """
 
     runs: dict[str, Run]
     reference: str
     differences: tuple[Difference, ...]
+    left_out: dict[str, str] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the differences as plain numbers, NaN as None."""
@@ -109,6 +112,7 @@ class Comparison:
                 }
                 for each in self.differences
             ],
+            "left_out": self.left_out,
         }
 
     def plot(self) -> Figure:
@@ -121,7 +125,12 @@ class Comparison:
         return draw_comparison(self.runs[self.reference].robot, self.reference, times, series)
 
     def __rich__(self) -> Table:
-        table = Table(title=f"differences from {self.reference}", title_justify="left")
+        table = Table(
+            title=f"differences from {self.reference}",
+            title_justify="left",
+            caption="\n".join(f"{name} left out: {why}" for name, why in self.left_out.items()),
+            caption_justify="left",
+        )
         columns = [
             ("method", "left"),
             ("status", "left"),
@@ -166,30 +175,42 @@ def compare(
     reference : str, optional
         Name of the method to hold the others against; the first by default.
 
+    Returns
+    -------
+    Comparison
+        Methods that refuse the ground, the state or the controller's period are left out with
+        their reasons: a compliant law has a restitution of its own, for one, and takes none from
+        the ground.
+
     Raises
     ------
     SimulationError
-        If no method is given, two have the same name, or the reference is none of them.
+        If no method is given, two have the same name, the reference is none of them, or the
+        reference is left out.
     """
     named = _named(methods)
     first = next(iter(named)) if reference is None else reference
     if first not in named:
         raise SimulationError(f"the reference {first!r} is none of the methods: {', '.join(named)}")
-    runs = {
-        name: simulate(
-            robot,
-            controller,
-            state=state,
-            duration=duration,
-            method=method,
-            ground=ground,
-            control_period=control_period,
-        )
-        for name, method in named.items()
-    }
-    return Comparison(
-        runs, first, tuple(_difference(name, run, runs[first]) for name, run in runs.items())
-    )
+    runs: dict[str, Run] = {}
+    left_out: dict[str, str] = {}
+    for name, method in named.items():
+        try:
+            runs[name] = simulate(
+                robot,
+                controller,
+                state=state,
+                duration=duration,
+                method=method,
+                ground=ground,
+                control_period=control_period,
+            )
+        except SimulationError as error:
+            if name == first:
+                raise
+            left_out[name] = str(error)
+    differences = tuple(_difference(name, run, runs[first]) for name, run in runs.items())
+    return Comparison(runs, first, differences, left_out)
 
 
 def _named(methods: Sequence[Method] | Mapping[str, Method]) -> dict[str, Method]:

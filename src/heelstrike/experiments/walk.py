@@ -11,7 +11,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.dynamics import center_of_mass, contact_positions
 from heelstrike.errors import GaitError, SimulationError
-from heelstrike.gait import Gait, optimize_gait
+from heelstrike.gait import Gait, PiecewiseGait, optimize_gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Controller, Run, simulate
 from heelstrike.sim.engine import Method
@@ -176,4 +176,21 @@ def walk(
         method=method,
         ground=ground,
         progress=report,
+    )
+
+
+def why_unstable(gait: Gait) -> str | None:
+    """Say why computed torque follows a gait but cannot hold it; None if it can.
+
+    On a flat foot every coordinate follows from the joints. On a point the robot tips about it as
+    gravity will, whatever the joints do: the linearised step multiplies an error of that motion by
+    some factor, 7.8 for rabbit's usual gait (:func:`heelstrike.find_limit_cycle`).
+    """
+    if not isinstance(gait, PiecewiseGait):
+        return None
+    return (
+        f"robot {gait.robot!r} stands on point feet, on which the ground exerts no moment: no "
+        "motor acts on its tipping about the stance foot. Computed torque makes the joints follow "
+        "the gait, and the first step with them, but an error of that motion grows from step to "
+        "step until the robot falls."
     )

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 POINTS = 4
 """Gauss points in every interval: joint positions are polynomials of degree 5 there."""
-MOST_ITERATIONS = 500
+MOST_ITERATIONS = 250
 """Iterations of IPOPT after which a start is given up; those that succeed take 30 to 150."""
 RESERVE = 1e-7
 """Scaled distance kept from every bound at the Gauss points, for the time between them."""
@@ -346,13 +346,13 @@ def _effort(program: CollocationProgram, unknowns: Floats) -> float:
         motion = [(row @ pieces).T for row in (basis, rate, second)]
         cost, _ = program.transcription.path.map(program.intervals)(*motion)
         total += weight * h * float(np.sum(np.array(cost)))
-    return total
+    return float(total)
 
 
 def _margins(program: CollocationProgram, unknowns: Floats) -> Margins:
     """Worst values on the fine grid, from the motion itself."""
     transcription, request = program.transcription, program.request
-    robot, model = request.robot, request.robot.model
+    model = request.robot.model
     phases, q, v, a = fine_motion(program, unknowns)
     force, torque, height, _ = (
         np.array(part) for part in transcription.motion.map(phases.size)(q, v, a)

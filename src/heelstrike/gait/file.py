@@ -20,6 +20,7 @@ from heelstrike.errors import GaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait, fingerprint
 from heelstrike.gait.margins import Margins
+from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
@@ -45,6 +46,12 @@ _NUMBERS = {
     "friction": "friction",
     "clearance_m": "clearance",
 }
+_PIECES = {
+    "breakpoints_s": "breakpoints",
+    "joint_pieces": "pieces",
+    "pitch_pieces": "pitch_pieces",
+}
+"""What a gait of piecewise polynomials has besides; a file with the first of these is one."""
 _MARGINS = {
     "normal_force_N": "normal_force",
     "friction_use": "friction_use",
@@ -86,6 +93,8 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
             for key, name in _MARGINS.items()
         },
     }
+    if isinstance(gait, PiecewiseGait):
+        data |= {key: getattr(gait, name).tolist() for key, name in _PIECES.items()}
     lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     Path(path).write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
 
@@ -191,10 +200,37 @@ class _Reader:
                 **{name: self.margin(margins, key) for key, name in _MARGINS.items()}
             ),
         }
+        kind: type[Gait] = Gait
+        if any(key in self.data for key in _PIECES):
+            kind = PiecewiseGait
+            values |= self.pieces(nu)
         try:
-            return Gait(**values)
+            return kind(**values)
         except GaitError as error:
             raise self.error(str(error)) from None
+
+    def pieces(self, nu: int) -> dict[str, NDArray[np.float64]]:
+        breakpoints, joints, pitch = (self.table(key) for key in _PIECES)
+        if joints.ndim != 3 or joints.shape[2] != nu or pitch.ndim != 2 or breakpoints.ndim != 1:
+            raise self.error(
+                f'"joint_pieces" must hold a list of coefficients of {nu} joints for every piece, '
+                '"pitch_pieces" a list of coefficients, "breakpoints_s" the times between them'
+            )
+        return {"breakpoints": breakpoints, "pieces": joints, "pitch_pieces": pitch}
+
+    def table(self, key: str) -> NDArray[np.float64]:
+        """Numbers in lists of lists, all of the same length."""
+
+        def checked(value: Any, depth: int) -> Any:
+            if depth and isinstance(value, list) and value:
+                return [checked(each, depth - 1) for each in value]
+            return self.checked(key, value)
+
+        numbers = checked(self.entry(self.data, key), 3)
+        try:
+            return np.array(numbers, dtype=np.float64)
+        except ValueError:
+            raise self.error(f'"{key}" must hold lists of one length') from None
 
     def entry(self, data: Mapping[str, Any], key: str) -> Any:
         if key not in data:

@@ -44,7 +44,7 @@ def gauss_scheme(points: int) -> GaussScheme:
     """Make the scheme with a number of Gauss points."""
     nodes, weights = np.polynomial.legendre.leggauss(points)
     nodes, weights = 0.5 * (nodes + 1.0), 0.5 * weights
-    powers = np.linalg.inv(np.vander(nodes, increasing=True)).T
+    powers = np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)).T, np.float64)
     at = np.append(nodes, 1.0)
     cardinal = [Polynomial(row) for row in powers]
     velocity = np.column_stack([p.integ()(at) for p in cardinal])

@@ -62,7 +62,7 @@ class PiecewiseGait(Gait):
             raise GaitError("gait: breakpoints must rise from 0 to step_duration")
 
     @property
-    def coefficients(self) -> Floats:  # type: ignore[override]
+    def coefficients(self) -> Floats:
         """Raise a `GaitError`: there is more than one polynomial a joint, see `pieces`."""
         raise GaitError(
             "a gait of piecewise polynomials has no single set of coefficients; use its pieces, or "

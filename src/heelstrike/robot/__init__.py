@@ -2,6 +2,7 @@
 
 from heelstrike.robot.builder import JointProperties, RobotBuilder
 from heelstrike.robot.human import BodyTable, human
+from heelstrike.robot.inspection import Finding, FindingKind, Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mjcf import read_mjcf
 from heelstrike.robot.model import Model
@@ -11,7 +12,10 @@ from heelstrike.robot.warning import RobotWarning
 
 __all__ = [
     "BodyTable",
+    "Finding",
+    "FindingKind",
     "Foot",
+    "Inspection",
     "JointProperties",
     "Mirror",
     "Model",
@@ -21,6 +25,7 @@ __all__ = [
     "State",
     "builtin_robots",
     "human",
+    "inspect_robot",
     "load_robot",
     "read_mjcf",
 ]

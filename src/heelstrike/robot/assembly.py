@@ -11,11 +11,15 @@ from heelstrike.robot.contact_points import ContactPoint
 from heelstrike.robot.feet import find_feet, name_contacts
 from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.plausibility import unlikely_numbers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
 
 LARGEST_NUMBER = 1e10
 """Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
+
+UNLIKELY = "numbers that are unlikely"
+SHOWN = 6  # how many of them a message lists before it counts the rest
 
 _MAY_BE_INFINITE = {"lower", "upper", "torque_lower", "torque_upper", "speed_limit"}
 
@@ -53,11 +57,13 @@ def assembled(
     Warns
     -----
     RobotWarning
-        If left and right differ, or the base floats by joints in an unusual order.
+        If left and right differ, the base floats by joints in an unusual order, or numbers look as
+        if they were in another unit.
     """
     _refuse_impossible_numbers(model, source)
     origin = link_origins(model)
     _refuse_joints_without_inertia(model, origin, joint_names, source)
+    _warn_of_unlikely_numbers(model, origin, joint_names, link_names, source)
     points = list(points)
     center: Floats = model.mass @ (origin + model.center_of_mass) / model.mass.sum()
     feet = find_feet(model.parent, link_names, points, origin, center)
@@ -95,6 +101,20 @@ def _refuse_impossible_numbers(model: Model, source: str) -> None:
                 f"{source}: the {field.replace('_', ' ')} of the robot is not a number below "
                 f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
             )
+
+
+def _warn_of_unlikely_numbers(
+    model: Model,
+    origin: Floats,
+    joint_names: tuple[str, ...],
+    link_names: tuple[str, ...],
+    source: str,
+) -> None:
+    """Warn of numbers in units that are not meant, all in one message."""
+    found = [words for _, words in unlikely_numbers(model, origin, joint_names, link_names)]
+    if found:
+        more = f" And {len(found) - SHOWN} more." if len(found) > SHOWN else ""
+        warn(f"{source}: {UNLIKELY}: {' '.join(found[:SHOWN])}{more}")
 
 
 def _refuse_joints_without_inertia(

@@ -6,6 +6,7 @@ or where URDF has no other way to say what is meant.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -85,7 +86,11 @@ def project(spec: Any, label: str) -> None:
         if _is_free(body):
             _put_on_planar_root(spec, body)
     mend_planar_root(spec)
-    model = spec.compile()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # they come again when the result is compiled
+        model = spec.compile()
+    if model.njnt == 0:
+        return  # no robot at all, which the reader says better
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)

@@ -13,6 +13,8 @@ from heelstrike.robot.urdf import MASSLESS
 IN_PLANE = 1e-6
 """How far (as the sine of an angle) an axis may stand off the plane before it is refused."""
 
+MOST_JOINTS = 1000
+
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 SHOWN = 4  # how many culprits a message lists before it counts the rest
 
@@ -59,6 +61,11 @@ def read_links(file: MujocoFile) -> Links:
         raise file.error(
             "the robot has no joints, so nothing can move. A body that floats needs three: "
             "slide along x, slide along z, hinge about y; did the root <body> lose its <joint>s?"
+        )
+    if model.njnt > MOST_JOINTS:
+        raise file.error(
+            f"the robot has {model.njnt} joints; heelstrike takes up to {MOST_JOINTS}, whose "
+            "equations are dense."
         )
     _refuse_spatial_joints(file)
 

@@ -23,6 +23,7 @@ def read_mjcf(
     name: str | None = None,
     floating: bool = False,
     projected: bool = False,
+    lenient: bool = False,
 ) -> Robot:
     """Read a planar robot from an MJCF or URDF file, or from a string that holds one.
 
@@ -42,6 +43,8 @@ def read_mjcf(
     projected : bool
         Lock the joints that leave the x–z plane, where a symmetric robot of three dimensions is
         meant to move in it.
+    lenient : bool
+        Let impossible masses and inertias pass, to look at the robot; see `inspect_robot`.
 
     Raises
     ------
@@ -53,7 +56,12 @@ def read_mjcf(
     RobotWarning
         If the file says something that is not simulated, or left and right differ.
     """
-    file = parse(source, floating=floating, projected=projected)
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused in the end
+        file = parse(source, floating=floating, projected=projected, lenient=lenient)
+        return _robot(file, name or _model_name(file, source))
+
+
+def _robot(file: MujocoFile, name: str) -> Robot:
     model = file.model
     links = read_links(file)
     warn_of_unmodelled(file)
@@ -90,7 +98,7 @@ def read_mjcf(
         pivot=int(hinges[0]) if len(hinges) else 0,
     )
     return assembled(
-        name or _model_name(file, source),
+        name,
         arrays,
         joint_names=_joint_names(file),
         link_names=links.names,

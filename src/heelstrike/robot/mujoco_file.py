@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,8 +15,10 @@ from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.flattening import float_in_plane, project
+from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.screening import screen
-from heelstrike.robot.urdf import prepare_urdf, urdf_text
+from heelstrike.robot.urdf import let_massless_links_pass, prepare_urdf, urdf_text
+from heelstrike.robot.urdf_check import check_urdf
 from heelstrike.robot.warning import warn
 
 
@@ -29,7 +32,7 @@ class MujocoFile:
         The compiled file.
     pose : mujoco.MjData
         World poses of joints, bodies and geoms in the reference configuration (``qpos0``).
-    xml : Element or None
+    xml : Element
         The file as it is written.
     source : str
         What to call the file in messages.
@@ -37,13 +40,13 @@ class MujocoFile:
 
     model: Any
     pose: Any
-    xml: Element | None
+    xml: Element
     source: str
 
     @property
     def is_urdf(self) -> bool:
         """Whether the file is URDF and not MJCF."""
-        return self.xml is not None and self.xml.tag == "robot"
+        return self.xml.tag == "robot"
 
     def given_name(self, kind: str, index: int) -> str:
         """Name that the file gives a body, joint, geom, actuator …, or the empty string."""
@@ -72,7 +75,13 @@ class MujocoFile:
         return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
 
 
-def parse(source: Path | str, *, floating: bool = False, projected: bool = False) -> MujocoFile:
+def parse(
+    source: Path | str,
+    *,
+    floating: bool = False,
+    projected: bool = False,
+    lenient: bool = False,
+) -> MujocoFile:
     """Parse an MJCF or URDF file, or a string that holds one.
 
     Parameters
@@ -83,6 +92,9 @@ def parse(source: Path | str, *, floating: bool = False, projected: bool = False
         Whether the body that the file fixes to the world (or leaves free) floats in the plane.
     projected : bool
         Whether joints that leave the x–z plane are locked.
+    lenient : bool
+        Whether masses and inertias that no body can have pass, mended as MuJoCo mends them. For
+        looking at the file, not for simulating the robot.
 
     Raises
     ------
@@ -96,14 +108,19 @@ def parse(source: Path | str, *, floating: bool = False, projected: bool = False
     remarks: list[str] = []
     try:
         with _warnings_into(remarks):
-            urdf = xml is not None and xml.tag == "robot"
-            if urdf or floating or projected:
+            urdf = xml.tag == "robot"
+            if urdf and not lenient:
+                check_urdf(xml, label)
+            if urdf or floating or projected or lenient:
                 spec = _parsed(source, xml, label)
+                if lenient:
+                    spec.compiler.balanceinertia = True
+                    let_massless_links_pass(spec)
                 if floating:
                     float_in_plane(spec, label)
                 if projected:
                     project(spec, label)
-                model = spec.compile()
+                model = compiled(spec, remarks)
             elif isinstance(source, Path):
                 model = mujoco.MjModel.from_xml_path(str(source))
             else:
@@ -113,18 +130,86 @@ def parse(source: Path | str, *, floating: bool = False, projected: bool = False
     except RobotError:
         raise
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split())
-        raise RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}") from error
+        raise _unreadable(label, error) from error
     for remark in remarks:
         warn(f"{label}: {remark}")
+    if not lenient:
+        _warn_of_mended_inertias(source, xml, label)
     return MujocoFile(model, pose, xml, label)
 
 
-def _parsed(source: Path | str, xml: Element | None, label: str) -> Any:
+def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
+    """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
+
+    Bodies that do not move, and those that leave their inertia to their geoms, are not among them.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read.
+    """
+    import mujoco
+
+    label = str(path)
+    xml = screen(path, label)
+    try:
+        with _warnings_into([]), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            spec = _parsed(path, xml, label)
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise _unreadable(label, error) from error
+    return _stated(spec)
+
+
+def _stated(spec: Any) -> list[tuple[str, float, NDArray[np.float64]]]:
+    result = []
+    for body in spec.bodies:
+        if not body.explicitinertial or body.id == 0:
+            continue
+        full = np.array(body.fullinertia, dtype=np.float64)
+        if np.isnan(full[0]):  # given by its principal moments
+            tensor = np.diag(np.array(body.inertia, dtype=np.float64))
+        else:
+            xx, yy, zz, xy, xz, yz = full
+            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        result.append((body.name, float(body.mass), tensor))
+    return result
+
+
+def _warn_of_mended_inertias(source: Path | str, xml: Element, label: str) -> None:
+    """Warn of inertias that MuJoCo changed because the file says ``balanceinertia="true"``."""
+    if not any(compiler.get("balanceinertia") == "true" for compiler in xml.iter("compiler")):
+        return
+    with _warnings_into([]), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        stated = _stated(_parsed(source, xml, label))
+    mended = [name for name, _, tensor in stated if not is_possible(tensor)]
+    if mended:
+        warn(
+            f"{label}: the inertias of {', '.join(mended)} violate the triangle inequality, and "
+            'balanceinertia="true" in the file lets MuJoCo replace them by others.'
+        )
+
+
+def _unreadable(label: str, error: Exception) -> RobotError:
+    reason = " ".join(str(error).split())
+    return RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}")
+
+
+def compiled(spec: Any, remarks: list[str]) -> Any:
+    """Compile a parsed file; what MuJoCo warns of goes to `remarks`."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model = spec.compile()
+    remarks += [str(one.message) for one in caught]
+    return model
+
+
+def _parsed(source: Path | str, xml: Element, label: str) -> Any:
     """Return a file as MuJoCo understands it, not yet compiled."""
     import mujoco
 
-    if xml is not None and xml.tag == "robot":
+    if xml.tag == "robot":
         directory = source.parent if isinstance(source, Path) else Path()
         spec = mujoco.MjSpec.from_string(urdf_text(xml, directory, label))
         prepare_urdf(spec)

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.robot.coordinates import (
+    Spread,
+    by_name,
+    checked,
+    index_of,
+    mirrored,
+    perturbed,
+    state_by_name,
+)
 from heelstrike.robot.model import Model
 from heelstrike.robot.state import State
 
@@ -152,6 +162,136 @@ class Robot:
     def reference_state(self) -> State:
         """State at rest in the reference configuration of the robot's file."""
         return State(self.model.reference.copy(), np.zeros(self.nv))
+
+    def joint_index(self, joint: str | int) -> int:
+        """Index of a coordinate, given by the name of its joint (or by an index, which is checked).
+
+        Raises
+        ------
+        RobotError
+            If there is no such joint; the message lists those there are.
+        """
+        return index_of(self, "joint", self.joint_names, joint)
+
+    def actuator_index(self, actuator: str | int) -> int:
+        """Index of an actuator, given by its name or index; see `joint_index`."""
+        return index_of(self, "actuator", self.actuator_names, actuator)
+
+    def state(
+        self,
+        position: Mapping[str | int, float] | None = None,
+        velocity: Mapping[str | int, float] | None = None,
+        *,
+        start: State | None = None,
+    ) -> State:
+        """Make a state with some joints set by their names.
+
+        Parameters
+        ----------
+        position : mapping, optional
+            Positions (rad, m) of joints by name or index.
+        velocity : mapping, optional
+            Velocities (rad/s, m/s) likewise.
+        start : State, optional
+            Where all others are, by default at rest in the reference configuration. It is left as
+            it is.
+
+        Raises
+        ------
+        RobotError
+            If a joint is unknown, or a number is not finite.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> robot = hs.load_robot("bravo7")
+        >>> state = robot.state({"left_knee": 0.4}, {"root_x": 0.8})
+        >>> robot.positions(state)["left_knee"], robot.velocities(state)["root_x"]
+        (0.4, 0.8)
+        """
+        return state_by_name(self, position or {}, velocity or {}, start)
+
+    def positions(self, state: State) -> dict[str, float]:
+        """Positions of a state by the names of the joints, in rad and m."""
+        return by_name(self, checked(self, state).q)
+
+    def velocities(self, state: State) -> dict[str, float]:
+        """Velocities of a state by the names of the joints, in rad/s and m/s."""
+        return by_name(self, checked(self, state).v)
+
+    def mirrored(self, state: State) -> State:
+        """Return a state with left and right exchanged.
+
+        Raises
+        ------
+        RobotError
+            If the robot has no mirror image.
+        """
+        return mirrored(self, state)
+
+    def perturbed(
+        self,
+        state: State,
+        *,
+        seed: int,
+        position: Spread = 0.0,
+        velocity: Spread = 0.0,
+        joints: Iterable[str | int] | None = None,
+    ) -> State:
+        """Return a state to which independent Gaussian numbers are added.
+
+        Parameters
+        ----------
+        state : State
+            State to start from, left as it is.
+        seed : int
+            The same seed gives the same numbers, and a joint's number does not depend on which
+            others are perturbed.
+        position, velocity : float or mapping
+            Standard deviations, in rad and m, rad/s and m/s: one for all coordinates, or a mapping
+            from the joints (by name or index) that are perturbed to theirs.
+        joints : iterable of str or int, optional
+            Joints that are perturbed, by default all, trunk included.
+
+        Returns
+        -------
+        State
+            Its positions stay inside the joints' ranges; its feet may be in the ground or above it.
+
+        Raises
+        ------
+        RobotError
+            If a joint is unknown, or a standard deviation negative or not finite.
+        """
+        return perturbed(
+            self, state, seed=seed, position=position, velocity=velocity, joints=joints
+        )
+
+    def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
+        """Write a state to a JSON file, with the names of the joints; return its path.
+
+        Raises
+        ------
+        RobotError
+            If the state is not one of this robot, or the file cannot be written.
+        """
+        from heelstrike.robot.state_file import save_state
+
+        return save_state(self, state, path)
+
+    def load_state(self, path: str | os.PathLike[str]) -> State:
+        """Read a state from a file of :meth:`save_state`, bit by bit the one that was saved.
+
+        Joints are matched by name, so that their order in the robot may have changed since.
+
+        Raises
+        ------
+        RobotError
+            If the file is none of a state, or of a robot with other joints.
+        """
+        from heelstrike.robot.state_file import load_state
+
+        return load_state(self, path)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF (``.urdf``) most.

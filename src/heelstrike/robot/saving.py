@@ -75,7 +75,7 @@ def _write_bodies(robot: Robot, world: Element) -> None:
     """Write the tree. A massless link with one child is a joint more on the body of that child."""
     model = robot.model
     origin = link_origins(model)
-    last = _last_links(robot)
+    last = body_links(robot)
     body_of: dict[int, Element] = {}
     names = _unique(robot.link_names[link] for link in last)
     label = dict(zip(last, names, strict=True))
@@ -97,8 +97,8 @@ def _write_bodies(robot: Robot, world: Element) -> None:
         _write_shapes(robot, link, origin, body)
 
 
-def _last_links(robot: Robot) -> list[int]:
-    """Links that become bodies, in order."""
+def body_links(robot: Robot) -> list[int]:
+    """Links that are bodies of their own, in order; the others only carry a joint more."""
     model = robot.model
     children = np.bincount(model.parent[model.parent >= 0], minlength=robot.nv)
     merged = (model.mass == 0.0) & (model.inertia == 0.0) & (children == 1)
@@ -175,7 +175,7 @@ def urdf(robot: Robot) -> Element:
     if tuple(model.gravity) != STANDARD_GRAVITY:  # URDF has none; MuJoCo's extension does
         option = SubElement(SubElement(root, "mujoco"), "option")
         option.set("gravity", _numbers((model.gravity[0], 0.0, model.gravity[1])))
-    last = set(_last_links(robot))
+    last = set(body_links(robot))
     names = _unique(
         [
             "world",

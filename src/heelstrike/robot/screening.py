@@ -1,8 +1,8 @@
 """A look at a robot file before MuJoCo's parser runs on it.
 
 A file may come from anywhere. What makes a parser hang, fill the memory or read other files is
-refused here: devices, entities, elements that multiply themselves. Everything else, malformed
-XML included, is left to MuJoCo, whose messages name line and element.
+refused here: devices, entities, elements that multiply themselves, sizes beyond all robots.
+Everything else is left to MuJoCo, whose messages name line and element.
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.xml_tree import xml_tree
 
 LARGEST_FILE = 16 * 2**20
 """Robot files larger than this (in characters) are refused; the largest we know have 200 kB."""
@@ -21,10 +21,19 @@ LARGEST_FILE = 16 * 2**20
 MOST_COPIES = 10_000
 """Most elements that ``replicate``, ``composite`` and ``flexcomp`` may multiply to."""
 
+MOST_ELEMENTS = 30_000
+"""Most XML elements of a robot file, copies included; the largest we know have some 2000."""
+
+LARGEST_SIZE = 10_000
+"""Largest number in ``<size>``, and of rows, columns and pixels of height fields and textures."""
+
+_SIZED = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
+_MAY_BE_LARGE = ("memory", "nstack", "njmax", "nconmax")  # MuJoCo allocates or refuses these
+_MAY_BE_ENDLESS = ("range", "lower", "upper", "effort", "velocity")
 _MULTIPLIERS = ("replicate", "composite", "flexcomp")
 
 
-def screen(source: Path | str, label: str) -> Element | None:
+def screen(source: Path | str, label: str) -> Element:
     """Refuse what is no robot file, or one that would hurt the machine.
 
     Parameters
@@ -36,8 +45,8 @@ def screen(source: Path | str, label: str) -> Element | None:
 
     Returns
     -------
-    Element or None
-        The XML tree; None if it is malformed, which MuJoCo's parser explains better.
+    Element
+        The XML tree.
 
     Raises
     ------
@@ -50,15 +59,15 @@ def screen(source: Path | str, label: str) -> Element | None:
     seen: set[Path] = set()
     while pending:
         tree = pending.pop()
-        for include in () if tree is None else tree.iter("include"):
+        for include in tree.iter("include"):
             path = directory / include.get("file", "")
-            if path not in seen and _is_readable(path):
+            if path not in seen and is_readable(path):
                 seen.add(path)
                 pending.append(_checked(path, f"{label}: included {path}", directory))
     return root
 
 
-def _checked(source: Path | str, label: str, directory: Path) -> Element | None:
+def _checked(source: Path | str, label: str, directory: Path) -> Element:
     """Check one file, without those that it includes."""
     text = _read(source, label) if isinstance(source, Path) else source
     if len(text) > LARGEST_FILE:
@@ -72,11 +81,10 @@ def _checked(source: Path | str, label: str, directory: Path) -> Element | None:
             f"{label}: it has a document type or entity declaration, which no robot needs and "
             "which can make a parser read other files. Remove it."
         )
-    try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError):
-        return None
+    root = xml_tree(text, label)
     _refuse_multiplication(root, label)
+    _refuse_sizes(root, label)
+    _refuse_what_is_no_number(root, label)
     for path in _files(root, directory):
         if _is_special(path):
             raise RobotError(f"{label}: it reads {str(path)!r}, which is not a regular file.")
@@ -102,7 +110,7 @@ def _read(path: Path, label: str) -> str:
         raise RobotError(f"{label}: the file cannot be read: {error}.") from error
 
 
-def _is_readable(path: Path) -> bool:
+def is_readable(path: Path) -> bool:
     """Whether there is a regular file; an impossible name (too long, null character) is none."""
     try:
         return path.is_file()
@@ -128,8 +136,15 @@ def _too_large(label: str) -> str:
 def _refuse_multiplication(root: Element, label: str) -> None:
     """Refuse elements whose copies, nested ones included, number more than `MOST_COPIES`."""
     stack = [(root, 1.0)]
+    total = 0.0
     while stack:
         element, copies = stack.pop()
+        total += copies
+        if total > MOST_ELEMENTS:
+            raise RobotError(
+                f"{label}: it has more than {MOST_ELEMENTS} elements, copies included, which no "
+                "robot needs."
+            )
         if element.tag in _MULTIPLIERS:
             copies *= _count(element)
             if not copies <= MOST_COPIES:
@@ -138,6 +153,44 @@ def _refuse_multiplication(root: Element, label: str) -> None:
                     "content. Lower its count."
                 )
         stack.extend((child, copies) for child in element)
+
+
+def _refuse_sizes(root: Element, label: str) -> None:
+    """Refuse numbers for which MuJoCo would fill the memory before it looks at the robot."""
+    for element in root.iter():
+        names = tuple(element.attrib) if element.tag == "size" else _SIZED.get(element.tag, ())
+        for name in names:
+            if name not in _MAY_BE_LARGE and _number(element.get(name, "")) > LARGEST_SIZE:
+                raise RobotError(
+                    f"{label}: {name!r} of <{element.tag}> is above {LARGEST_SIZE}, which no robot "
+                    "needs. Lower it."
+                )
+
+
+def _refuse_what_is_no_number(root: Element, label: str) -> None:
+    """Refuse NaN, which MuJoCo's parser lets pass into axes and limits, and infinite masses."""
+    for element in root.iter():
+        for name, text in element.attrib.items():
+            if name == "name" or not set(text.lower()) & set("ne"):  # of nan, inf and 1e999
+                continue
+            try:
+                numbers = [float(word) for word in text.split()]
+            except ValueError:
+                continue  # words: other readers judge them
+            nan = any(map(math.isnan, numbers))
+            if nan or (any(map(math.isinf, numbers)) and not name.endswith(_MAY_BE_ENDLESS)):
+                what = repr(element.get("name")) if element.get("name") else "no name"
+                raise RobotError(
+                    f"{label}: {name!r} of <{element.tag}> ({what}) is {text[:60]!r}, which is no "
+                    "finite number."
+                )
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0  # not a number: MuJoCo's parser says so
 
 
 def _count(element: Element) -> float:

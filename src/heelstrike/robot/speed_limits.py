@@ -9,6 +9,7 @@ import numpy as np
 
 from heelstrike.robot.model import Floats
 from heelstrike.robot.mujoco_file import MujocoFile
+from heelstrike.robot.warning import warn
 
 SPEED_LIMIT = "speed_limit:"
 """Beginning of the name of a ``<custom><numeric>`` that holds the limit of the joint named next."""
@@ -32,6 +33,8 @@ def read_speed_limits(file: MujocoFile) -> Floats:
     limits = np.full(len(names), math.inf)
     for joint, limit in _written(file):
         if joint not in names:
+            if not file.is_urdf:  # whose fixed joints may have limits too
+                warn(f"{file.source}: {SPEED_LIMIT}{joint}: there is no joint of that name.")
             continue
         if not limit >= 0.0:
             raise file.error(f"the speed limit of joint {joint!r} is {limit}, not a number >= 0.")
@@ -41,7 +44,7 @@ def read_speed_limits(file: MujocoFile) -> Floats:
 
 
 def _written(file: MujocoFile) -> Iterator[tuple[str, float]]:
-    if file.is_urdf and file.xml is not None:
+    if file.is_urdf:
         for joint in file.xml.iterfind("joint"):
             for limit in joint.iterfind("limit"):
                 yield joint.get("name", ""), _number(limit.get("velocity", "0"))

@@ -42,12 +42,13 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
 
 def _warn_of_fixed_root(file: MujocoFile) -> None:
     """Warn of a URDF whose trunk MuJoCo fixes to the world, because nothing lets it float."""
-    if file.xml is None or not file.is_urdf:
+    if not file.is_urdf:
         return
     children = {child.get("link") for child in file.xml.iterfind("joint/child")}
+    moving = {file.name("body", int(body)) for body in file.model.jnt_bodyid}
     for link in file.xml.iterfind("link"):
         mass = link.find("inertial/mass")
-        if link.get("name") not in children and mass is not None:
+        if link.get("name") not in children | moving and mass is not None:
             warn(
                 f"{file.source}: link {link.get('name')!r} is fixed to the world, for no joint "
                 "moves it. If the robot floats, load it with floating=True, or put it on a link "

@@ -57,9 +57,14 @@ def urdf_text(xml: Element, directory: Path, label: str) -> str:
 
 def prepare_urdf(spec: Any) -> None:
     """Let massless links pass, and give a planar root the coordinates x, z and pitch."""
+    let_massless_links_pass(spec)
+    mend_planar_root(spec)
+
+
+def let_massless_links_pass(spec: Any) -> None:
+    """Give massless links the least mass that MuJoCo takes, below `MASSLESS`."""
     spec.compiler.boundmass = max(spec.compiler.boundmass, _SMALLEST)
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, _SMALLEST)
-    mend_planar_root(spec)
 
 
 def _keep_paths(root: Element) -> None:

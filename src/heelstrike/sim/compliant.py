@@ -148,6 +148,9 @@ class Compliant:
     the law, which neither pull nor leave the cone. A contact counts as closed while the point is
     in the ground; it slips while its bristle is dragged or, with regularised friction, while it is
     faster than the regularisation speed.
+
+    Dry friction of the joints is smoothed like regularised friction, around its speed or, beside a
+    bristle, around 1e-4 rad/s (m/s): a joint that should stick creeps.
     """
 
     law: NormalLaw = field(default_factory=HuntCrossley)
@@ -194,6 +197,7 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
     """
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] += 0.5 * h * (work.base_stop_force[joint] + work.stop_force[joint])
+        work.dry_impulse[joint] += 0.5 * h * (work.base_dry_force[joint] + work.dry_force[joint])
     for contact in range(model.contact_link.shape[0]):
         for k in range(2):
             work.impulse[contact, k] += (
@@ -263,6 +267,7 @@ def sample(
         work.left[contact] = -1.0
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] = 0.0
+        work.dry_impulse[joint] = 0.0
     memory.residual[1] = cone_residual(model, memory, work)
     span = clock[STEP]
     elapsed = 0.0
@@ -332,6 +337,7 @@ def sample(
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
     for joint in range(model.parent.shape[0]):
         memory.stop_torque[joint] = work.stop_impulse[joint] / span
+        memory.friction_torque[joint] = work.dry_impulse[joint] / span
     memory.extreme[CONE] = max(memory.extreme[CONE], memory.residual[1])
     return DONE
 
@@ -385,11 +391,12 @@ def note_events(
 
 @kernel
 def note_forces(
-    record: Record, row: int, force: Floats, stop_force: Floats, memory: Memory
+    record: Record, row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory
 ) -> None:
-    """Write the forces of contacts and joint stops, the slip and the residual of a row."""
+    """Write the forces of contacts and joints, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
+        record.friction_torque[row, joint] = dry_force[joint]
     for contact in range(force.shape[0]):
         record.force[row, contact, 0] = force[contact, 0]
         record.force[row, contact, 1] = force[contact, 1]
@@ -467,7 +474,7 @@ def _advance(
         row = record.row_count[0]
         if recorded:
             note_row(record, time, memory)
-            note_forces(record, row, work.force, work.stop_force, memory)
+            note_forces(record, row, work.force, work.stop_force, work.dry_force, memory)
         if center_height(model, ground, memory) < clock[FALLEN]:
             return FELL
         if k == last:
@@ -482,7 +489,14 @@ def _advance(
             record.event_impulse[place, 1] *= step
         if recorded:
             # What acted until the next sample takes the place of what acted at the first instant.
-            note_forces(record, row, memory.contacts.force, memory.stop_torque, memory)
+            note_forces(
+                record,
+                row,
+                memory.contacts.force,
+                memory.stop_torque,
+                memory.friction_torque,
+                memory,
+            )
         if continuous:
             for contact in range(count):
                 memory.contacts.force[contact, 0] = work.force[contact, 0]

@@ -40,6 +40,7 @@ from heelstrike.sim.contact_law import (
     BRISTLE_BY_BRISTLE,
     BRISTLE_BY_NORMAL,
     BRISTLE_BY_SPEED,
+    JOINT_SCALE,
     NORMAL_BY_GAP,
     NORMAL_BY_SPEED,
     PARTIALS,
@@ -47,6 +48,7 @@ from heelstrike.sim.contact_law import (
     TANGENT_BY_NORMAL,
     TANGENT_BY_SPEED,
     friction_force,
+    joint_friction,
     normal_force,
 )
 from heelstrike.sim.memory import Memory
@@ -75,10 +77,10 @@ class Laws(Bundle):
     ----------
     normal, friction : int
         Which laws; constants of :mod:`heelstrike.sim.contact_law`.
-    numbers : (6,) float
+    numbers : (7,) float
         Their parameters.
     stop : int
-    stop_numbers : (6,) float
+    stop_numbers : (7,) float
         The law of the joint stops.
     """
 
@@ -125,8 +127,10 @@ class CompliantWorkspace(Bundle):
         Their derivatives.
     stop_force : (nv,) float
         Forces of the joint stops at the state evaluated last.
+    dry_force : (nv,) float
+        Dry friction of the joints at the state evaluated last.
     stop_partial : (nv, 2) float
-        Their derivatives by q and v of the joint.
+        Derivatives of both by q and v of the joint.
     torque_by_q, torque_by_v : (nu, nv) float
         Derivatives of the controller's torques.
     age : (1,) int
@@ -136,7 +140,7 @@ class CompliantWorkspace(Bundle):
     base_q, base_v, base_acceleration : (nv,) float
     base_bristle, base_rate, base_gap : (nc,) float
     base_force : (nc, 2) float
-    base_stop_force : (nv,) float
+    base_stop_force, base_dry_force : (nv,) float
     base_stop_partial : (nv, 2) float
     base_partial : (nc, 8) float
     base_rows : (2 nc, nv) float
@@ -155,8 +159,8 @@ class CompliantWorkspace(Bundle):
     right_bristle : (nc,) float
         Right-hand side of a stage.
     impulse : (nc, 2) float
-    stop_impulse : (nv,) float
-        Impulses of contacts and joint stops since the last sample, in N s (N m s).
+    stop_impulse, dry_impulse : (nv,) float
+        Impulses of contacts, joint stops and dry friction since the last sample, in N s (N m s).
     touched, left : (nc,) float
         When a contact point last came to the ground and left it since the last sample; negative
         if it did not.
@@ -168,6 +172,7 @@ class CompliantWorkspace(Bundle):
     force: Floats
     partial: Floats
     stop_force: Floats
+    dry_force: Floats
     stop_partial: Floats
     torque_by_q: Floats
     torque_by_v: Floats
@@ -181,6 +186,7 @@ class CompliantWorkspace(Bundle):
     base_gap: Floats
     base_force: Floats
     base_stop_force: Floats
+    base_dry_force: Floats
     base_stop_partial: Floats
     base_partial: Floats
     base_rows: Floats
@@ -196,6 +202,7 @@ class CompliantWorkspace(Bundle):
     right_bristle: Floats
     impulse: Floats
     stop_impulse: Floats
+    dry_impulse: Floats
     touched: Floats
     left: Floats
 
@@ -209,6 +216,7 @@ def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
         force=np.zeros((nc, 2)),
         partial=np.zeros((nc, PARTIALS)),
         stop_force=np.zeros(nv),
+        dry_force=np.zeros(nv),
         stop_partial=np.zeros((nv, 2)),
         torque_by_q=np.zeros((nu, nv)),
         torque_by_v=np.zeros((nu, nv)),
@@ -222,6 +230,7 @@ def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
         base_gap=np.zeros(nc),
         base_force=np.zeros((nc, 2)),
         base_stop_force=np.zeros(nv),
+        base_dry_force=np.zeros(nv),
         base_stop_partial=np.zeros((nv, 2)),
         base_partial=np.zeros((nc, PARTIALS)),
         base_rows=np.zeros((2 * nc, nv)),
@@ -237,6 +246,7 @@ def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
         right_bristle=np.zeros(nc),
         impulse=np.zeros((nc, 2)),
         stop_impulse=np.zeros(nv),
+        dry_impulse=np.zeros(nv),
         touched=np.zeros(nc),
         left=np.zeros(nc),
     )
@@ -344,6 +354,7 @@ def evaluate(
     observe(model, ground, memory)
     push_contacts(model, laws, memory, work)
     push_stops(model, laws, memory, work)
+    rub_joints(model, laws.numbers[JOINT_SCALE], memory, work)
     if control.continuous:
         if accepted:
             for contact in range(model.contact_link.shape[0]):
@@ -363,7 +374,7 @@ def evaluate(
     rate = work.acceleration
     nv = model.parent.shape[0]
     for j in range(nv):
-        rate[j] = memory.force[j] - memory.rate[j] + work.stop_force[j]
+        rate[j] = memory.force[j] - memory.rate[j] + work.stop_force[j] + work.dry_force[j]
     for contact in range(model.contact_link.shape[0]):
         normal = work.force[contact, 0]
         tangent = work.force[contact, 1]
@@ -423,6 +434,15 @@ def push_stops(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspac
 
 
 @kernel
+def rub_joints(model: Model, scale: float, memory: Memory, work: CompliantWorkspace) -> None:
+    """Dry friction of the joints at the state now, after :func:`push_stops`."""
+    for place in range(memory.dry_joint.shape[0]):
+        j = memory.dry_joint[place]
+        work.dry_force[j], slope = joint_friction(model.dry_friction[j], scale, memory.v[j])
+        work.stop_partial[j, NORMAL_BY_SPEED] += slope
+
+
+@kernel
 def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Make the state evaluated last the start of the next step."""
     nv = model.parent.shape[0]
@@ -431,6 +451,7 @@ def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
         work.base_v[i] = memory.v[i]
         work.base_acceleration[i] = work.acceleration[i]
         work.base_stop_force[i] = work.stop_force[i]
+        work.base_dry_force[i] = work.dry_force[i]
         for k in range(2):
             work.base_stop_partial[i, k] = work.stop_partial[i, k]
         for j in range(nv):

@@ -10,11 +10,15 @@ from heelstrike.dynamics.kernels import (
     forward_kinematics,
     link_velocities,
     point_position,
+    solve_factorized,
     solve_lower,
+    state_equations,
 )
+from heelstrike.dynamics.straight_line import play
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.memory import Memory
+from heelstrike.sim.programs import EQUATIONS, SOLVE
 
 
 @kernel
@@ -125,6 +129,26 @@ def add_impulse(model: Model, memory: Memory, count: int, v: Floats) -> None:
     solve_lower(model, memory.factor, change)
     for j in range(model.parent.shape[0]):
         v[j] += change[j]
+
+
+@kernel
+def evaluate_equations(model: Model, q: Floats, v: Floats, memory: Memory) -> None:
+    """Kinematics, factor of the mass matrix and bias force of a state."""
+    program = memory.programs[EQUATIONS]
+    tree, matrix, factor, bias = memory.tree, memory.mass_matrix, memory.factor, memory.bias
+    if program != 0:
+        play(program, (model, q, v, tree, matrix, factor, bias))
+    else:
+        state_equations(model, q, v, tree, matrix, factor, bias)
+
+
+@kernel
+def solve_mass_matrix(model: Model, memory: Memory, x: Floats) -> None:
+    """Replace x by A⁻¹ x."""
+    if memory.programs[SOLVE] != 0:
+        play(memory.programs[SOLVE], (model, memory.factor, x))
+    else:
+        solve_factorized(model, memory.factor, x)
 
 
 @kernel

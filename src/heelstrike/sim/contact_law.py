@@ -26,6 +26,9 @@ Floats = NDArray[np.float64]
 # Standard gravity (m/s²): turns the weight on a contact point into the mass that hits the ground.
 GRAVITY = 9.80665
 
+# Speed (rad/s, m/s) around which dry friction of the joints is smoothed beside a law that has none.
+JOINT_SPEED = 1e-4
+
 # What the kernels call the laws.
 HUNT_CROSSLEY = 0
 KELVIN_VOIGT = 1
@@ -39,7 +42,8 @@ EXPONENT = 2
 SLIP_SCALE = 3
 BRISTLE_STIFFNESS = 4
 BRISTLE_DAMPING = 5
-NUMBERS = 6
+JOINT_SCALE = 6
+NUMBERS = 7
 
 # Places in the partial derivatives of a contact's forces.
 NORMAL_BY_GAP = 0
@@ -304,6 +308,7 @@ class RegularisedFriction:
     def write(self, numbers: Floats) -> None:
         """Write the parameters where the kernels look for them."""
         numbers[SLIP_SCALE] = self.speed
+        numbers[JOINT_SCALE] = self.speed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -344,6 +349,7 @@ class BristleFriction:
         """Write the parameters where the kernels look for them."""
         numbers[BRISTLE_STIFFNESS] = self.stiffness
         numbers[BRISTLE_DAMPING] = self.damping
+        numbers[JOINT_SCALE] = JOINT_SPEED
 
 
 NormalLaw = HuntCrossley | KelvinVoigt
@@ -457,3 +463,10 @@ def slips(kind: int, numbers: Floats, limit: float, speed: float, bristle: float
         return abs(speed) > numbers[SLIP_SCALE]
     wanted = numbers[BRISTLE_STIFFNESS] * bristle + numbers[BRISTLE_DAMPING] * speed
     return abs(wanted) > limit
+
+
+@kernel
+def joint_friction(limit: float, scale: float, speed: float) -> tuple[float, float]:
+    """Dry friction of a joint, smoothed around zero speed, and its derivative by the speed."""
+    size = np.sqrt(speed * speed + scale * scale)
+    return -limit * speed / size, -limit * (scale / size) ** 2 / size

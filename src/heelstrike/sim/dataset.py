@@ -50,6 +50,7 @@ _ROWS = {
     "velocity": (("coordinate",), "m/s or rad/s", "generalised velocities"),
     "torque": (("actuator",), "N m", "joint torques within their limits"),
     "stop_torque": (("coordinate",), "N m or N", "force of the joint stops on the robot"),
+    "friction_torque": (("coordinate",), "N m or N", "dry friction of the joints on the robot"),
     "contact_point": (("contact", "axis"), "m", "world position of the contact points"),
     "contact_normal": (("contact", "axis"), "1", "ground normal under the contact points"),
     "gap": (("contact",), "m", "distance of the contact points to the ground"),
@@ -80,6 +81,7 @@ NONE = "none"
 """How a setting that is None is written, for NetCDF has no such attribute."""
 _COUNTS = ("solves", "shortcuts", "fallbacks", "failures")
 _WORST = ("penetration", "complementarity", "cone", "non_penetration")
+_JOINT_EVENTS = (EventKind.JOINT_STOP, EventKind.JOINT_SLIP, EventKind.JOINT_STICK)
 _EVENTS = ("event_time", "event_kind", "event_contact", "event_impulse")
 
 
@@ -127,7 +129,10 @@ def to_dataset(run: Run) -> xarray.Dataset:
         "event_contact": (
             ("event",),
             np.array([event.contact for event in events], dtype=np.int64),
-            {"units": "1", "long_name": "index of the contact point, or of the joint for a stop"},
+            {
+                "units": "1",
+                "long_name": "index of the contact point, or of the joint of a joint event",
+            },
         ),
         "event_impulse": (
             ("event", "component"),
@@ -405,7 +410,9 @@ def _run(source: Path, dataset: xarray.Dataset, robot: Robot) -> Run:
         **{name: len(labels) for name, labels in _LABELS.items()},
     }
     arrays: dict[str, Any] = {
-        name: _numbers(source, dataset, name, (rows, *(sizes[dim] for dim in dims)))
+        name: np.zeros((rows, robot.nv))
+        if name == "friction_torque" and name not in dataset.variables  # as files once were
+        else _numbers(source, dataset, name, (rows, *(sizes[dim] for dim in dims)))
         for name, (dims, _, _) in _ROWS.items()
     }
     text = _Attributes(source, attributes)
@@ -483,9 +490,7 @@ def _events(source: Path, dataset: xarray.Dataset, robot: Robot) -> tuple[Event,
     )
     impulse = _numbers(source, dataset, "event_impulse", (count, 2)).tolist()
     for k, c in zip(kind, contact, strict=True):
-        where, count = (
-            ("joint", robot.nv) if k == EventKind.JOINT_STOP else ("contact point", robot.nc)
-        )
+        where, count = ("joint", robot.nv) if k in _JOINT_EVENTS else ("contact point", robot.nc)
         if not 0 <= c < count:
             raise RunFileError(f"{source}: damaged, an event names a {where} that is not there")
     return tuple(

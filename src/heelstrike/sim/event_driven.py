@@ -24,9 +24,10 @@ from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mom
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts
+from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
 from heelstrike.sim.dormand_prince import SLOPES, interpolate
+from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
     DIVERGED,
@@ -39,6 +40,7 @@ from heelstrike.sim.engine import (
     Setting,
     solver_order,
 )
+from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import evaluate, project
 from heelstrike.sim.event_gaps import gap_now, gap_velocity
 from heelstrike.sim.event_location import integrate, total_weight
@@ -49,7 +51,6 @@ from heelstrike.sim.event_modes import (
     log_event,
     note_residual,
     report_modes,
-    solve_candidates,
 )
 from heelstrike.sim.event_phase import (
     ABSOLUTE,
@@ -84,7 +85,7 @@ from heelstrike.sim.event_phase import (
     Phase,
     allocate_phase,
 )
-from heelstrike.sim.impact import REST, collide, strike
+from heelstrike.sim.impact import REST, collide, heading, strike
 from heelstrike.sim.memory import (
     PENETRATION,
     STEPS,
@@ -196,7 +197,13 @@ class EventDriven:
         solver_order(self.solver)
 
     def engine(self, setting: Setting) -> Engine:
-        """Return this way through time, compiled and ready to run."""
+        """Return this way through time, compiled and ready to run.
+
+        Raises
+        ------
+        SimulationError
+            If the robot begins in the ground, or with a joint beyond its range.
+        """
         return _EventDrivenEngine(self, setting)
 
 
@@ -217,6 +224,7 @@ def copy_row(
         record.q[row, i] = state[i]
         record.v[row, i] = state[nv + i]
         record.stop_torque[row, i] = 0.0
+        record.friction_torque[row, i] = 0.0
     for i in range(torque.shape[0]):
         record.torque[row, i] = torque[i]
     for i in range(contacts.gap.shape[0]):
@@ -263,11 +271,19 @@ def write_row(
     row = record.row_count[0]
     copy_row(row, time, phase.trial, memory.torque, contacts, memory.residual, record)
     points = contacts.gap.shape[0]
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    dry_force(
+        phase.dry_joint, phase.slide[first:], model.dry_friction, record.friction_torque[row]
+    )  # fmt: skip
     for contact in range(points):
         if phase.passing[contact] == 0:
             memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -contacts.gap[contact])
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= first:
+            joint = phase.dry_joint[contact - first]
+            record.friction_torque[row, joint] = memory.impulse[2 * place + 1]
+            continue
         if contact >= points:
             stop = contact - points
             record.stop_torque[row, phase.stop_joint[stop]] += (
@@ -334,6 +350,7 @@ def decide(
     """
     time = phase.clock[TIME]
     contacts = phase.closed.shape[0]
+    dry = contacts - phase.dry_joint.shape[0]
     points = model.contact_link.shape[0]
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
@@ -362,11 +379,11 @@ def decide(
                 continue
         if jammed:
             jammed = False
-            for contact in range(contacts):
+            for contact in range(dry):
                 phase.hit[contact] = 0
                 phase.plastic[contact] = phase.closed[contact]
             solved, _ = collide(model, memory, phase, order, phase.begin, NUDGE)
-            for contact in range(contacts):
+            for contact in range(dry):
                 phase.plastic[contact] = 0
                 if phase.impulse[contact, 0] > 0.0 and contact >= points:
                     log_event(
@@ -385,6 +402,8 @@ def decide(
         apart = True
         for place in range(count):
             contact = memory.candidate[place]
+            if contact >= dry:
+                continue
             row = 2 * place
             apart = apart and memory.free[row] >= 0.0
             lean = -phase.slide[contact] * memory.friction[contact]
@@ -394,7 +413,8 @@ def decide(
                 log_event(record, time, PAINLEVE, contact, 0.0, 0.0)
         if several and apart:
             for place in range(count):
-                memory.problem_mode[place] = OPEN
+                if memory.candidate[place] < dry:
+                    memory.problem_mode[place] = OPEN
         if count > 0:
             note_residual(memory.residual, memory.extreme)
         adopt_modes(count, memory.candidate, memory.problem_mode, memory.mode, phase)
@@ -419,6 +439,16 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
         if phase.closed[other] == 1 and direction * ahead > 0.0:
             return phase.count[LET_PASS] == 1
     return False
+
+
+@kernel
+def begin_dry_joints(memory: Memory, phase: Phase) -> None:
+    """Let joints with dry friction begin as they move."""
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    for dry in range(phase.dry_joint.shape[0]):
+        phase.slide[first + dry] = heading(memory.v[phase.dry_joint[dry]])
+        memory.closed[first + dry] = 1
+        memory.slipping[first + dry] = phase.slide[first + dry]
 
 
 @kernel
@@ -629,6 +659,7 @@ def _advance(
             for i in range(nv):
                 phase.begin[i] = memory.q[i]
                 phase.begin[nv + i] = memory.v[i]
+            begin_dry_joints(memory, phase)
         if event:
             evaluate(
                 controller, model, ground, parameters, kept, spare, memory, phase, clock[TIME],
@@ -727,14 +758,43 @@ def compiled_advance() -> tuple[Any, float]:
     return compiled_for(signature, _advance), perf_counter() - begin
 
 
+def _check_start(setting: Setting, swing_feet_pass: bool) -> None:
+    """Refuse a state in the ground or beyond a joint stop: no motion leads there or out of it."""
+    robot, memory = setting.robot, setting.memory
+    observe(robot.model, setting.ground, memory)
+    gap, normal = memory.contacts.gap, memory.contacts.normal
+    inside = np.flatnonzero(gap < -ON_THE_GROUND)
+    if len(inside) and not swing_feet_pass:
+        deepest = int(inside[np.argmin(gap[inside])])
+        others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
+        needed = float(np.max(-gap[inside] / normal[inside, 1]))
+        raise SimulationError(
+            f"contact point {robot.contact_names[deepest]!r}{others} begins "
+            f"{-gap[deepest]:.3g} m deep in the ground. EventDriven knows no way out of it: raise "
+            f"the robot by {needed:.3g} m, begin on the ground that the state was made for, or use "
+            f"TimeStepping or Compliant, which push it out"
+        )
+    model = robot.model
+    beyond = np.maximum(model.lower - memory.q, memory.q - model.upper)
+    joint = int(np.argmax(beyond))
+    if beyond[joint] > ON_THE_GROUND:
+        raise SimulationError(
+            f"joint {robot.joint_names[joint]!r} begins at {memory.q[joint]:.6g}, beyond its range "
+            f"of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven knows no way "
+            f"back: begin within the range, or use TimeStepping or Compliant"
+        )
+
+
 class _EventDrivenEngine:
     """Event-driven simulation at work."""
 
     def __init__(self, method: EventDriven, setting: Setting) -> None:
+        _check_start(setting, method.swing_feet_pass)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
         self._phase = allocate_phase(setting.robot)
         self._order = solver_order(method.solver)
+        self._phase.order[:] = self._order
         self.solver = method.solver
         clock, count = self._phase.clock, self._phase.count
         clock[STEP] = min(1e-3, method.max_step)

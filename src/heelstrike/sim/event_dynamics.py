@@ -15,7 +15,6 @@ from typing import Any
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
-    bias_force,
     factorize,
     forward_kinematics,
     link_velocities,
@@ -25,8 +24,16 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, contact_velocity, locate_contacts
+from heelstrike.sim.contact_geometry import (
+    assemble_delassus,
+    contact_velocity,
+    evaluate_equations,
+    locate_contacts,
+    solve_mass_matrix,
+)
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.dry_friction import dry_force
+from heelstrike.sim.event_candidates import share_redundant
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
@@ -186,12 +193,18 @@ def share_forces(
 def watch_geometry(
     model: Model, contacts: Contacts, tree: Workspace, phase: Phase, state: Floats
 ) -> None:
-    """Event functions that need no forces: gaps of open points, speeds of sliding ones.
+    """Event functions that need no forces: gaps of open points, speeds of what slides.
 
     That of a point that is let pass below the ground is its depth.
     """
     nv = state.shape[0] // 2
     points = contacts.gap.shape[0]
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    for dry in range(phase.dry_joint.shape[0]):
+        slide = phase.slide[first + dry]
+        phase.value[2 * (first + dry) + 1] = 1.0
+        if slide != 0:
+            phase.value[2 * (first + dry) + 1] = slide * state[nv + phase.dry_joint[dry]]
     for stop in range(phase.stop_joint.shape[0]):
         if phase.closed[points + stop] == 0:
             joint = phase.stop_joint[stop]
@@ -241,27 +254,36 @@ def watch_forces(
 
 
 @kernel
-def free_acceleration(model: Model, memory: Memory, state: Floats) -> None:
-    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``memory.rate``."""
+def free_acceleration(
+    model: Model, memory: Memory, dry_joint: Integers, slide: Integers, state: Floats
+) -> None:
+    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``memory.rate``.
+
+    The equations of the state have been evaluated. Dry friction of the joints that move is one of
+    the passive forces; `slide` ends with theirs.
+    """
     nv = model.parent.shape[0]
-    mass_matrix(model, memory.tree, memory.mass_matrix)
-    factorize(model, memory.mass_matrix, memory.factor)
-    bias_force(model, memory.tree, memory.rate)
     passive_force(model, state[:nv], state[nv:], memory.force)
     add_pushes(model, memory.tree, memory.pushes, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
+    first = slide.shape[0] - dry_joint.shape[0]
+    dry_force(dry_joint, slide[first:], model.dry_friction, memory.force)
     for i in range(nv):
-        memory.rate[i] = memory.force[i] - memory.rate[i]
-    solve_factorized(model, memory.factor, memory.rate)
+        memory.rate[i] = memory.force[i] - memory.bias[i]
+    solve_mass_matrix(model, memory, memory.rate)
 
 
 @kernel
 def gather_closed(model: Model, memory: Memory, phase: Phase) -> int:
-    """Jacobian rows and Delassus matrix of the closed contact points; return their number."""
+    """Jacobian rows and Delassus matrix of the closed contacts; return their number.
+
+    Dry joints that move are none of them: their friction is known.
+    """
     count = 0
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     for contact in range(phase.closed.shape[0]):
-        if phase.closed[contact] == 1:
+        if phase.closed[contact] == 1 and (contact < first or phase.slide[contact] == 0):
             gap_rows(model, memory, phase, contact, count)
             memory.candidate[count] = contact
             count += 1
@@ -292,8 +314,11 @@ def evaluate(
     """
     nv = model.parent.shape[0]
     contacts = memory.contacts
-    forward_kinematics(model, state[:nv], memory.tree)
-    link_velocities(model, state[nv:], memory.tree)
+    if forces:
+        evaluate_equations(model, state[:nv], state[nv:], memory)
+    else:
+        forward_kinematics(model, state[:nv], memory.tree)
+        link_velocities(model, state[nv:], memory.tree)
     locate_contacts(model, ground, memory)
     watch_geometry(model, contacts, memory.tree, phase, state)
     if not forces:
@@ -309,13 +334,17 @@ def evaluate(
             memory.torque[i] = min(
                 max(memory.torque[i], model.torque_lower[i]), model.torque_upper[i]
             )
-    free_acceleration(model, memory, state)
+    free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
     count = gather_closed(model, memory, phase)
     phase.count[CLOSED] = count
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     for place in range(count):
-        free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
+        contact = memory.candidate[place]
+        free_gap_acceleration(model, memory, phase, contact, place)
         memory.impulse[2 * place] = 0.0
         memory.impulse[2 * place + 1] = 0.0
+        if contact >= first:
+            memory.impulse[2 * place] = model.dry_friction[phase.dry_joint[contact - first]]
     if count > 0:
         size = list_unknowns(
             count, memory.candidate, phase.carrier, phase.holder, phase.slide, memory.friction,
@@ -341,20 +370,26 @@ def evaluate(
         count, memory.candidate, phase, memory.friction, memory.delassus, memory.free,
         memory.impulse,
     )  # fmt: skip
+    if count > 0 and phase.count[DEFICIENT] == 1:
+        share_redundant(count, memory, phase)
     for i in range(nv):
         slope[i] = state[nv + i]
         slope[nv + i] = memory.rate[i]
+    for dry in range(phase.dry_joint.shape[0]):
+        acceleration = memory.rate[phase.dry_joint[dry]]
+        phase.rate[2 * (first + dry) + 1] = phase.slide[first + dry] * acceleration
 
 
 @kernel
 def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> None:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
-    Closed points return to the ground, sticking ones to where they began to stick, and their
-    velocities along these directions vanish.
+    Closed points return to the ground, sticking ones (and joints) to where they began to stick, and
+    their velocities along these directions vanish.
     """
     nv = model.parent.shape[0]
     contacts = memory.contacts
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     for attempt in range(5):
         forward_kinematics(model, state[:nv], memory.tree)
         link_velocities(model, state[nv:], memory.tree)
@@ -375,6 +410,8 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
             error = 0.0
             if phase.row[i] % 2 == 0:
                 error = gap_now(contact, contacts, phase, state)
+            elif contact >= first:
+                error = state[phase.dry_joint[contact - first]] - phase.anchor[contact]
             elif phase.stuck[contact] == 1:
                 error = -phase.anchor[contact] + tangential_place(
                     contacts.position[contact], contacts.normal[contact],

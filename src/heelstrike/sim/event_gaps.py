@@ -2,7 +2,7 @@
 
 A joint stop is a contact without friction or restitution: its gap is the way left to the end of the
 joint's range, its force a torque of the joint. The event-driven method numbers stops on from the
-contact points, and these kernels tell the two apart.
+contact points, dry joints from the stops, and these kernels tell them apart.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contact_geometry import contact_rows, contact_velocity
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.dry_friction import press_dry_joint
 from heelstrike.sim.event_phase import Phase
 from heelstrike.sim.memory import Memory
 
@@ -41,7 +42,7 @@ def gap_velocity(
 
 @kernel
 def gap_rows(model: Model, memory: Memory, phase: Phase, contact: int, place: int) -> None:
-    """Write the Jacobian rows (normal, tangent) of a contact point or joint stop as a candidate."""
+    """Write the Jacobian rows (normal, tangent) of a contact, stop or dry joint as a candidate."""
     stop = contact - model.contact_link.shape[0]
     if stop < 0:
         contact_rows(model, memory, contact, place)
@@ -49,18 +50,23 @@ def gap_rows(model: Model, memory: Memory, phase: Phase, contact: int, place: in
     for j in range(model.parent.shape[0]):
         memory.jacobian[2 * place, j] = 0.0
         memory.jacobian[2 * place + 1, j] = 0.0
-    memory.jacobian[2 * place, phase.stop_joint[stop]] = phase.stop_side[stop]
+    dry = stop - phase.stop_joint.shape[0]
+    if dry < 0:
+        memory.jacobian[2 * place, phase.stop_joint[stop]] = phase.stop_side[stop]
+    else:
+        memory.jacobian[2 * place + 1, phase.dry_joint[dry]] = 1.0
 
 
 @kernel
 def free_gap_acceleration(
     model: Model, memory: Memory, phase: Phase, contact: int, place: int
 ) -> None:
-    """Acceleration b = J v̇ + J̇ v of a contact point or joint stop, under ``memory.rate``.
+    """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under ``memory.rate``.
 
-    It is that of the gap and of the sliding velocity: for a rolling disc the acceleration of its
-    centre and not of the material point that touches the ground. The Jacobian rows must be those
-    of the candidates' `place`.
+    Of a contact point it is that of the gap and of the sliding velocity: for a rolling disc the
+    acceleration of its centre and not of the material point that touches the ground. A dry joint
+    gets the normal row that presses it, too. The Jacobian rows must be those of the candidates'
+    `place`.
     """
     along_normal = 0.0
     along_tangent = 0.0
@@ -81,3 +87,7 @@ def free_gap_acceleration(
         along_tangent += memory.jacobian[2 * place + 1, j] * memory.rate[j]
     memory.free[2 * place] = along_normal
     memory.free[2 * place + 1] = along_tangent
+    dry = contact - phase.closed.shape[0] + phase.dry_joint.shape[0]
+    if dry >= 0:
+        limit = model.dry_friction[phase.dry_joint[dry]]
+        press_dry_joint(place, limit, memory.delassus, memory.free)

@@ -266,31 +266,41 @@ def integrate(
     length = wish
     rejected = False
     factor = 1.0
-    while True:
-        if time + 1.0001 * length >= stop:
-            length = stop - time
-        if length < SHORTEST_STEP * 2.2e-16 * max(abs(time), 1e-3):
-            return False
-        error = take_step(controller, model, ground, parameters, kept, spare, memory, phase, length)
-        factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
-        if error <= 1.0:
+    repeated = False
+    while not repeated:
+        while True:
+            if time + 1.0001 * length >= stop:
+                length = stop - time
+            if length < SHORTEST_STEP * 2.2e-16 * max(abs(time), 1e-3):
+                return False
+            error = take_step(
+                controller, model, ground, parameters, kept, spare, memory, phase, length
+            )
+            factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
+            if error <= 1.0:
+                break
+            length *= max(0.2, factor) if error < np.inf else 0.1
+            rejected = True
+        if rejected:
+            clock[STEP] = length * min(factor, 1.0)
+        else:  # a step cut short by a stop says little about how long the next may be
+            clock[STEP] = max(min(wish, 10.0 * length), length * factor)
+        part = first_event(
+            controller, model, ground, parameters, kept, spare, memory, phase, length, weight
+        )
+        count[FIRED] = 0
+        if part == NO_EVENT:
             break
-        length *= max(0.2, factor) if error < np.inf else 0.1
-        rejected = True
-    if rejected:
-        clock[STEP] = length * min(factor, 1.0)
-    else:  # a step cut short by a stop says little about how long the next may be
-        clock[STEP] = max(min(wish, 10.0 * length), length * factor)
-    part = first_event(
-        controller, model, ground, parameters, kept, spare, memory, phase, length, weight
-    )
-    count[FIRED] = 0
-    if part < NO_EVENT:
         count[FIRED] = 1
         length *= part
         # Repeat the step to end at the event, and correct its length by what is left there.
         for attempt in range(4):
-            take_step(controller, model, ground, parameters, kept, spare, memory, phase, length)
+            error = take_step(
+                controller, model, ground, parameters, kept, spare, memory, phase, length
+            )
+            repeated = error <= 1.0
+            if not repeated:
+                break
             change = 0.0
             for i in range(phase.fired.shape[0]):
                 contact = i // 2
@@ -301,6 +311,17 @@ def integrate(
             if attempt == 3 or not 1e-15 < abs(change) < 1e-6:
                 break
             length += change
+        if not repeated:
+            # Where a torque saturates the shorter step can be the worse one: take less of it.
+            length *= 0.5
+            rejected = True
+            evaluate(
+                controller, model, ground, parameters, kept, spare, memory, phase, time,
+                phase.begin, phase.slopes[0], True,
+            )  # fmt: skip
+            for i in range(phase.value.shape[0]):
+                phase.before[i] = phase.value[i]
+                phase.before_rate[i] = phase.rate[i]
     clock[LENGTH] = length
     count[FINISHED] = 1
     return True

@@ -3,15 +3,7 @@
 from __future__ import annotations
 
 from heelstrike.compilation import kernel
-from heelstrike.contact.modes import (
-    OPEN,
-    SLIDING_BACKWARD,
-    SLIDING_FORWARD,
-    SLIP_BACKWARD,
-    SLIP_FORWARD,
-    STICK,
-)
-from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.event_dynamics import tangential_place
 from heelstrike.sim.event_phase import Phase
@@ -24,6 +16,8 @@ SLIP = int(EventKind.SLIP)
 STICK_EVENT = int(EventKind.STICK)
 REVERSAL = int(EventKind.SLIP_REVERSAL)
 JOINT_STOP = int(EventKind.JOINT_STOP)
+JOINT_SLIP = int(EventKind.JOINT_SLIP)
+JOINT_STICK = int(EventKind.JOINT_STICK)
 
 # Two normals are one when the sine of the angle between them is below this.
 PARALLEL = 1e-9
@@ -52,55 +46,19 @@ def note_residual(residual: Floats, extreme: Floats) -> None:
 
 
 @kernel
-def solve_candidates(
-    count: int, memory: Memory, slide: Integers, accelerations: bool, order: Integers
-) -> int:
-    """Solve the contact problem of the candidates at the level of accelerations or velocities.
-
-    Matrix and free term are those in the memory. Of accelerations, points that slide are prescribed
-    to go on doing so: their friction is known. Forces or impulses go to ``memory.impulse``, modes
-    to ``memory.problem_mode``. Returns the solver's status.
-    """
-    for place in range(count):
-        contact = memory.candidate[place]
-        memory.problem_friction[place] = memory.friction[contact]
-        memory.problem_mode[place] = STICK
-        if accelerations:
-            if slide[contact] > 0:
-                memory.problem_mode[place] = SLIDING_FORWARD
-            elif slide[contact] < 0:
-                memory.problem_mode[place] = SLIDING_BACKWARD
-            elif memory.mode[contact] < SLIDING_FORWARD:
-                memory.problem_mode[place] = memory.mode[contact]
-    return int(
-        solve_contact_kernel(
-            count,
-            memory.delassus,
-            memory.free,
-            memory.problem_friction,
-            order,
-            memory.problem_mode,
-            memory.impulse,
-            memory.velocity,
-            memory.residual,
-            memory.solver,
-        )
-    )
-
-
-@kernel
 def adopt_modes(
     count: int, candidate: Integers, found: Integers, mode: Integers, phase: Phase
 ) -> None:
     """Let every closed contact point do what the acceleration-level problem says."""
-    points = phase.closed.shape[0] - phase.stop_joint.shape[0]
+    dry = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    points = dry - phase.stop_joint.shape[0]
     for place in range(count):
         contact = candidate[place]
         mode[contact] = found[place]
         if found[place] == OPEN:
             phase.closed[contact] = 0
             phase.slide[contact] = 0
-        elif contact >= points:
+        elif points <= contact < dry:
             continue
         elif found[place] == SLIP_FORWARD:
             phase.slide[contact] = 1
@@ -119,9 +77,17 @@ def form_groups(
 ) -> None:
     """Find which closed points hold the same constraints, and which of them carry the forces."""
     contacts = position.shape[0]
-    for stop in range(contacts, phase.closed.shape[0]):
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    for stop in range(contacts, first):
         phase.group[stop] = stop
         phase.carrier[stop] = phase.closed[stop]
+    for joint in range(first, phase.closed.shape[0]):
+        sticks = 1 if phase.slide[joint] == 0 else 0
+        phase.group[joint] = joint
+        phase.holder[joint] = sticks
+        if sticks == 1 and phase.stuck[joint] == 0:
+            phase.anchor[joint] = phase.begin[phase.dry_joint[joint - first]]
+        phase.stuck[joint] = sticks
     for contact in range(contacts):
         phase.group[contact] = contact
         phase.carrier[contact] = 0
@@ -183,12 +149,17 @@ def report_modes(time: float, phase: Phase, memory: Memory, record: Record, star
     Points that stand on the ground when the run begins do not touch down.
     """
     closed, was_closed = phase.closed, memory.closed
-    points = closed.shape[0] - phase.stop_joint.shape[0]
+    dry = closed.shape[0] - phase.dry_joint.shape[0]
+    points = dry - phase.stop_joint.shape[0]
     for contact in range(closed.shape[0]):
         now = phase.slide[contact]
         before = memory.slipping[contact]
         landed = closed[contact] == 1 and was_closed[contact] == 0
-        if contact >= points:
+        if contact >= dry:
+            if now != before:
+                kind = JOINT_STICK if now == 0 else JOINT_SLIP
+                log_event(record, time, kind, phase.dry_joint[contact - dry], 0.0, 0.0)
+        elif contact >= points:
             if landed and not starting:
                 log_event(record, time, JOINT_STOP, phase.stop_joint[contact - points], 0.0, 0.0)
         elif closed[contact] == 0 and was_closed[contact] == 1:

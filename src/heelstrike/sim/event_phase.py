@@ -55,17 +55,22 @@ class Phase(Bundle):
     A contact point that is closed and does not slide sticks. Closed points of one link on the same
     straight piece of ground form a group, told by its first point: only the outermost two of them
     carry normal force, and one tangential force stands for all. Joint stops are numbered on from
-    the contact points; in the shapes below nc counts both.
+    the contact points, joints with dry friction from these; in the shapes below nc counts all. A
+    dry joint is always closed, on a contact of its own (:mod:`heelstrike.sim.dry_friction`).
 
     Attributes
     ----------
     stop_joint : (ns,) int
     stop_side, stop_limit : (ns,) float
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
+    dry_joint : (nd,) int
+        Joints with dry friction.
+    order : (3,) int
+        Contact solvers in the order in which they are tried.
     closed : (nc,) int
         Whether each contact point is on the ground, each joint at its stop.
     slide : (nc,) int
-        Direction in which it slides along the tangent: -1, 0 or 1.
+        Direction in which it slides along the tangent, or the joint turns: -1, 0 or 1.
     group : (nc,) int
         First contact point of its group.
     carrier, holder : (nc,) int
@@ -95,7 +100,8 @@ class Phase(Bundle):
     value, rate, end_value, end_rate : (2 nc,) float
     before, before_rate, sample, sample_rate : (2 nc,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
-        the step, at the sample before, at this one. Of a joint stop the second is always 1.
+        the step, at the sample before, at this one. Of a joint stop the second is always 1, of a
+        dry joint the first.
     fired : (2 nc,) int
         Event functions that ended the step.
     scratch : (2, 3) float
@@ -115,6 +121,8 @@ class Phase(Bundle):
     stop_joint: Integers
     stop_side: Floats
     stop_limit: Floats
+    dry_joint: Integers
+    order: Integers
     closed: Integers
     slide: Integers
     group: Integers
@@ -160,7 +168,8 @@ def allocate_phase(robot: Robot) -> Phase:
     model, nv, nu = robot.model, robot.nv, robot.nu
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
-    nc = robot.nc + len(lower) + len(upper)
+    dry = np.flatnonzero(model.dry_friction > 0.0)
+    nc = robot.nc + len(lower) + len(upper) + len(dry)
     size = robot.nq + nv
 
     def integers(count: int) -> Integers:
@@ -170,7 +179,9 @@ def allocate_phase(robot: Robot) -> Phase:
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
-        closed=integers(nc),
+        dry_joint=dry.astype(np.int64),
+        order=integers(3),
+        closed=(np.arange(nc) >= nc - len(dry)).astype(np.int64),
         slide=integers(nc),
         group=integers(nc),
         carrier=integers(nc),

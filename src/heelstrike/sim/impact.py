@@ -5,16 +5,20 @@ from __future__ import annotations
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import assemble_delassus, locate_contacts
+from heelstrike.sim.contact_geometry import (
+    assemble_delassus,
+    evaluate_equations,
+    locate_contacts,
+)
+from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import (
     add_contact_force,
     free_acceleration,
     gather_closed,
 )
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_modes import log_event, note_residual, solve_candidates
+from heelstrike.sim.event_modes import log_event, note_residual
 from heelstrike.sim.event_phase import LAST_IMPACT, TIME, Phase
 from heelstrike.sim.memory import Memory, Record
 from heelstrike.sim.status import EventKind
@@ -45,6 +49,14 @@ def row_velocity(row: int, jacobian: Floats, state: Floats) -> float:
 
 
 @kernel
+def heading(speed: float) -> int:
+    """Whether something slides, and where to: -1, 0 or 1."""
+    if speed > REST:
+        return 1
+    return -1 if speed < -REST else 0
+
+
+@kernel
 def collide(
     model: Model, memory: Memory, phase: Phase, order: Integers, state: Floats, nudge: float
 ) -> tuple[bool, float]:
@@ -53,7 +65,7 @@ def collide(
     The pose and the factor of the mass matrix must be those of `state`. Normal velocities w and
     impulses p obey ``w⁺ + e w⁻ ≥ 0 ⟂ p ≥ 0``, tangential ones Coulomb's law. All points are taken
     to approach the ground faster by `nudge`: where zero impulse is one solution of several, that
-    singles out another.
+    singles out another. Dry friction of the joints is a finite force, and takes no part.
 
     Returns whether it was solved, and the energy it made relative to what went through the
     contacts. The impulses go to ``phase.impulse``; ``phase.closed`` and ``phase.slide`` become
@@ -61,7 +73,8 @@ def collide(
     """
     nv = model.parent.shape[0]
     count = 0
-    for contact in range(phase.closed.shape[0]):
+    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
+    for contact in range(first):
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
         if phase.closed[contact] == 0 and phase.hit[contact] == 0:
@@ -101,10 +114,9 @@ def collide(
         phase.slide[contact] = 0
         if normal <= REST or phase.plastic[contact] == 1:
             phase.closed[contact] = 1
-            if tangent > REST:
-                phase.slide[contact] = 1
-            elif tangent < -REST:
-                phase.slide[contact] = -1
+            phase.slide[contact] = heading(tangent)
+    for dry in range(phase.dry_joint.shape[0]):
+        phase.slide[first + dry] = heading(state[nv + phase.dry_joint[dry]])
     return status == SOLVED, made / through if through > 0.0 else 0.0
 
 
@@ -119,10 +131,9 @@ def short_bounces(
     """
     nv = model.parent.shape[0]
     time = phase.clock[TIME]
-    forward_kinematics(model, state[:nv], memory.tree)
-    link_velocities(model, state[nv:], memory.tree)
+    evaluate_equations(model, state[:nv], state[nv:], memory)
     locate_contacts(model, ground, memory)
-    free_acceleration(model, memory, state)
+    free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
     count = gather_closed(model, memory, phase)
     for place in range(count):
         free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
@@ -165,7 +176,7 @@ def strike(
     ``memory.slipping`` still hold the modes from before.
     """
     state, before = phase.begin, phase.end
-    contacts = phase.closed.shape[0]
+    contacts = phase.closed.shape[0] - phase.dry_joint.shape[0]
     points = contacts - phase.stop_joint.shape[0]
     time = phase.clock[TIME]
     for i in range(state.shape[0]):

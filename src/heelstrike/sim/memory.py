@@ -14,6 +14,7 @@ from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.programs import straight_line_programs, usual_points
 from heelstrike.sim.push import Push, Pushes, pushes_on
 
 Floats = NDArray[np.float64]
@@ -44,8 +45,8 @@ class Memory(Bundle):
         Velocity at the end of the step.
     torque : (nu,) float
         Joint torques of this step, within their limits.
-    force, rate : (nv,) float
-        Generalised force without contact; scratch.
+    force, rate, bias : (nv,) float
+        Generalised force without contact; scratch; bias force H.
     stiffness, damping : (nv,) float
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
@@ -56,7 +57,8 @@ class Memory(Bundle):
     contacts : Contacts
         Contact points now; their forces are those of the last solve.
     friction, restitution : (capacity,) float
-        Coefficients of the ground under each contact point; zero for the joint stops after them.
+        Coefficients of the ground under each contact point; zero for the joint stops after them,
+        and friction 1 for the dry joints after these.
     slip : (nc,) float
         Tangential velocity of each contact point at the end of the step.
     mode : (capacity,) int
@@ -67,9 +69,17 @@ class Memory(Bundle):
         Generalised force of the joint stops in the last solve.
     stopped : (nv,) int
         Whether each joint pressed against a stop.
+    dry_joint : (nd,) int
+        Joints with dry friction.
+    friction_torque : (nv,) float
+        Generalised force of dry joint friction in the last solve.
+    dry_mode, resting : (nd,) int
+        Contact mode of each dry joint in the last solve; whether it was reported at rest, -1
+        before the first report.
     candidate : (capacity,) int
         Contact points in the contact problem of this step; after them the joint stops, numbered
-        on from nc: twice the joint, plus one for its upper end. The capacity has room for all.
+        on from nc: twice the joint, plus one for its upper end; last the dry joints. The capacity
+        has room for all.
     jacobian : (2 capacity, nv) float
         Contact Jacobian of the candidates.
     root : (nv,) float
@@ -82,6 +92,17 @@ class Memory(Bundle):
     problem_mode : (capacity,) int
     residual : (3,) float
         Residuals of the certificate of the last solve.
+    programs : (5,) int
+        Addresses of straight-line code, zero for none; see :mod:`heelstrike.sim.programs`.
+    every_point, usual_points : (nc,), (k,) int
+        All contact points, and those that the programs are for.
+    usual_place : (nc,) int
+        Place of each contact point in `usual_points`, -1 for none.
+    point_rows : (2 k, nv) float
+    point_delassus : (2 k, 2 k) float
+        Scratch and Delassus matrix of the usual points.
+    point_velocity, point_impulse : (nc, 2) float
+        Velocities and impulses of contact points.
     solver : ContactWorkspace
         Memory of the contact solvers.
     pushes : Pushes
@@ -97,6 +118,7 @@ class Memory(Bundle):
     torque: Floats
     force: Floats
     rate: Floats
+    bias: Floats
     stiffness: Floats
     damping: Floats
     mass_matrix: Floats
@@ -112,6 +134,10 @@ class Memory(Bundle):
     slipping: Integers
     stop_torque: Floats
     stopped: Integers
+    dry_joint: Integers
+    friction_torque: Floats
+    dry_mode: Integers
+    resting: Integers
     candidate: Integers
     jacobian: Floats
     root: Floats
@@ -123,6 +149,14 @@ class Memory(Bundle):
     problem_friction: Floats
     problem_mode: Integers
     residual: Floats
+    programs: Integers
+    every_point: Integers
+    usual_points: Integers
+    usual_place: Integers
+    point_rows: Floats
+    point_delassus: Floats
+    point_velocity: Floats
+    point_impulse: Floats
     solver: ContactWorkspace
     pushes: Pushes
     tally: Integers
@@ -133,7 +167,11 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nv, nu, nc = robot.nv, robot.nu, robot.nc
     stops = np.isfinite(robot.model.lower).sum() + np.isfinite(robot.model.upper).sum()
-    capacity = nc + int(stops)
+    dry = np.flatnonzero(robot.model.dry_friction > 0.0)
+    capacity = nc + int(stops) + len(dry)
+    usual = usual_points(robot)
+    place = np.full(nc, -1)
+    place[usual] = np.arange(len(usual))
     return Memory(
         q=np.zeros(nv),
         v=np.zeros(nv),
@@ -141,6 +179,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         torque=np.zeros(nu),
         force=np.zeros(nv),
         rate=np.zeros(nv),
+        bias=np.zeros(nv),
         stiffness=np.zeros(nv),
         damping=np.zeros(nv),
         mass_matrix=np.zeros((nv, nv)),
@@ -148,7 +187,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         tree=workspace(nv),
         scratch=workspace(nv),
         contacts=Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2))),
-        friction=np.zeros(capacity),
+        friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
         restitution=np.zeros(capacity),
         slip=np.zeros(nc),
         mode=np.zeros(capacity, dtype=np.int64),
@@ -156,6 +195,10 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         slipping=np.zeros(capacity, dtype=np.int64),
         stop_torque=np.zeros(nv),
         stopped=np.zeros(nv, dtype=np.int64),
+        dry_joint=dry.astype(np.int64),
+        friction_torque=np.zeros(nv),
+        dry_mode=np.zeros(len(dry), dtype=np.int64),
+        resting=np.full(len(dry), -1, dtype=np.int64),
         candidate=np.zeros(capacity, dtype=np.int64),
         jacobian=np.zeros((2 * capacity, nv)),
         root=np.zeros(nv),
@@ -167,6 +210,14 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         problem_friction=np.zeros(capacity),
         problem_mode=np.zeros(capacity, dtype=np.int64),
         residual=np.zeros(3),
+        programs=straight_line_programs(robot.model, usual),
+        every_point=np.arange(nc),
+        usual_points=usual,
+        usual_place=place,
+        point_rows=np.zeros((2 * len(usual), nv)),
+        point_delassus=np.zeros((2 * len(usual), 2 * len(usual))),
+        point_velocity=np.zeros((nc, 2)),
+        point_impulse=np.zeros((nc, 2)),
         solver=contact_workspace(max(capacity, 1)),
         pushes=pushes_on(robot, pushes),
         tally=np.zeros(TALLIES, dtype=np.int64),
@@ -187,6 +238,7 @@ class Record(Bundle):
     v: Floats
     torque: Floats
     stop_torque: Floats
+    friction_torque: Floats
     point: Floats
     normal: Floats
     gap: Floats
@@ -210,6 +262,7 @@ def allocate_record(robot: Robot, rows: int, events: int) -> Record:
         v=np.zeros((rows, nv)),
         torque=np.zeros((rows, nu)),
         stop_torque=np.zeros((rows, nv)),
+        friction_torque=np.zeros((rows, nv)),
         point=np.zeros((rows, nc, 2)),
         normal=np.zeros((rows, nc, 2)),
         gap=np.zeros((rows, nc)),

@@ -24,6 +24,8 @@ LIFTOFF = int(EventKind.LIFTOFF)
 SLIP = int(EventKind.SLIP)
 STICK = int(EventKind.STICK)
 JOINT_STOP = int(EventKind.JOINT_STOP)
+JOINT_SLIP = int(EventKind.JOINT_SLIP)
+JOINT_STICK = int(EventKind.JOINT_STICK)
 
 # A contact point has left the ground when its gap exceeds this (m), and slips above this (m/s).
 LIFTOFF_GAP = 1e-7
@@ -79,7 +81,7 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
 
     An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
     Points that already stand on the ground when the run begins do not touch down, and joints that
-    rest at a stop do not reach it.
+    rest at a stop do not reach it. Joints with dry friction come to rest, or begin to move.
     """
     for contact in range(model.contact_link.shape[0]):
         pushed = memory.contacts.force[contact, 0] > 0.0
@@ -137,6 +139,19 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             memory.stopped[joint] = 1
         elif way > LIFTOFF_GAP:
             memory.stopped[joint] = 0
+    for dry in range(memory.dry_joint.shape[0]):
+        rests = abs(memory.next_v[memory.dry_joint[dry]]) <= SLIP_SPEED
+        if memory.resting[dry] == -1:
+            memory.resting[dry] = 1 if abs(memory.v[memory.dry_joint[dry]]) <= SLIP_SPEED else 0
+        if rests != (memory.resting[dry] == 1):
+            place = record.event_count[0]
+            record.event_time[place] = time + step
+            record.event_kind[place] = JOINT_STICK if rests else JOINT_SLIP
+            record.event_contact[place] = memory.dry_joint[dry]
+            record.event_impulse[place, 0] = 0.0
+            record.event_impulse[place, 1] = 0.0
+            record.event_count[0] = place + 1
+            memory.resting[dry] = 1 if rests else 0
 
 
 @kernel
@@ -148,6 +163,7 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
         record.q[row, i] = memory.q[i]
         record.v[row, i] = memory.v[i]
         record.stop_torque[row, i] = memory.stop_torque[i]
+        record.friction_torque[row, i] = memory.friction_torque[i]
     for i in range(memory.torque.shape[0]):
         record.torque[row, i] = memory.torque[i]
     contacts = memory.contacts

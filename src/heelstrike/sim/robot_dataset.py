@@ -64,6 +64,8 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     for index, foot in enumerate(robot.feet):
         foot_of[list(foot.contacts)] = index
     variables["contact_foot"] = (("contact",), foot_of)
+    if robot.contact_friction:
+        variables["contact_friction"] = (("contact",), np.array(robot.contact_friction))
     if robot.mirror is not None:
         for name, dim in _MIRROR.items():
             variables[f"mirror_{name}"] = ((dim,), getattr(robot.mirror, name))
@@ -142,6 +144,9 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
                 for name, dim in _MIRROR.items()
             }
         )
+    friction: tuple[float, ...] = ()
+    if "contact_friction" in dataset:
+        friction = tuple(numbers("contact_friction", ("contact",), np.float64).tolist())
     names: dict[str, Any] = {name: text(name, dim) for name, dim in _NAMES.items()}
     robot = Robot(
         name=_decoded(dataset.attrs["name"]),
@@ -150,6 +155,7 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
         feet=feet,
         mirror=mirror,
         floating=bool(int(dataset.attrs["floating"])),
+        contact_friction=friction,
         source=_decoded(dataset.attrs["source"]),
     )
     _check(robot)
@@ -183,6 +189,8 @@ def _check(robot: Robot) -> None:
         bad = np.isnan(values) if name in _MAY_BE_INFINITE else ~np.isfinite(values)
         if np.any(bad):
             raise ValueError(f"{name} is not finite")
+    if not all(0.0 <= friction < math.inf for friction in robot.contact_friction):
+        raise ValueError("contact_friction must be finite and not negative")
     if any(not foot.contacts for foot in robot.feet):
         raise ValueError("a foot has no contact points")
     if not math.isfinite(robot.total_mass) or np.any(model.mass < 0.0):

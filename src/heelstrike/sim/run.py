@@ -37,7 +37,7 @@ class Event:
     kind : EventKind
         Touchdown, lift-off, beginning of slip or of stick.
     contact : int
-        Index of the contact point, or of the joint when it reached its stop.
+        Index of the contact point, or of the joint of a ``JOINT_`` event.
     impulse : tuple of float
         Impulse (normal, tangent) on the robot over the step in which it happened, in N s.
     """
@@ -120,6 +120,8 @@ class Run:
         Joint torques within their limits (N m).
     stop_torque : (nt, nv) float
         Generalised force of the joint stops on the robot (N m, or N for a slide).
+    friction_torque : (nt, nv) float
+        Generalised force of the joints' dry friction on the robot (N m, or N for a slide).
     contact_point : (nt, nc, 2) float
         World position (x, z) of the contact points (m).
     contact_normal : (nt, nc, 2) float
@@ -140,7 +142,9 @@ class Run:
     steps : int
         Steps taken.
     saturations : int
-        Times a torque was clipped to its limit.
+        Times a torque was clipped to its limit, counted when the controller is called for good: at
+        every step or control period. Of a controller that acts continuously, at the samples or
+        ends of steps only; what is clipped within them is not counted.
     timing : Timing
     error : Exception or None
         What the controller raised, if that ended the run.
@@ -158,6 +162,7 @@ class Run:
     velocity: Floats
     torque: Floats
     stop_torque: Floats
+    friction_torque: Floats
     contact_point: Floats
     contact_normal: Floats
     gap: Floats
@@ -172,6 +177,13 @@ class Run:
     timing: Timing
     error: Exception | None = field(default=None, repr=False)
     pushes: tuple[Push, ...] = ()
+
+    def __repr__(self) -> str:
+        last = self.time[-1] if len(self.time) else 0.0
+        return (
+            f"Run({self.robot.name}, {type(self.method).__name__}, {last:.6g} s, "
+            f"{self.status.value}, {self.steps} steps)"
+        )
 
     @property
     def completed(self) -> bool:

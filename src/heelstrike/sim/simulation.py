@@ -87,8 +87,10 @@ def simulate(
     ground : Ground
         The ground; flat with μ = 0.75 and no restitution by default.
     control_period : float, optional
-        Time between two calls of the controller, a whole number of steps; every step by default.
-        Torques are held in between.
+        Time between two calls of the controller, in which its torques are held; a whole number of
+        steps where the method has steps. By default time stepping calls it every step, and under
+        ``EventDriven`` and ``Compliant`` a compiled controller acts continuously; one in Python is
+        called every millisecond by the former and at every sample by the latter.
     record_every : int
         Steps between two rows of the record.
     stop_when_fallen : bool, optional
@@ -107,8 +109,9 @@ def simulate(
     Raises
     ------
     SimulationError, ControllerError
-        If the arguments are not usable; raised before anything is simulated, except for a torque
-        of the wrong shape, which ends the run with status ``controller_failed``.
+        If the arguments are not usable, or the state is not one that the method can begin with;
+        raised before anything is simulated, except for a torque of the wrong shape, which ends the
+        run with status ``controller_failed``.
     """
     loop = prepared(
         robot=robot,
@@ -441,6 +444,7 @@ class Loop:
             velocity=rows.v,
             torque=rows.torque,
             stop_torque=rows.stop_torque,
+            friction_torque=rows.friction_torque,
             contact_point=rows.point,
             contact_normal=rows.normal,
             gap=rows.gap,

@@ -35,6 +35,9 @@ class EventKind(enum.IntEnum):
     ``JOINT_STOP``
         A joint reached the end of its range, with the impulse that took, or was pressed against it
         by an impact elsewhere; the event's `contact` is the index of the joint.
+    ``JOINT_SLIP``, ``JOINT_STICK``
+        A joint with dry friction broke away, or turned round; it came to rest. The event's
+        `contact` is the index of the joint.
     """
 
     TOUCHDOWN = 0
@@ -47,6 +50,8 @@ class EventKind(enum.IntEnum):
     PAINLEVE = 7
     ENERGY_GAIN = 8
     JOINT_STOP = 9
+    JOINT_SLIP = 10
+    JOINT_STICK = 11
 
 
 class Scheme(enum.IntEnum):

@@ -30,12 +30,11 @@ from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.dynamics.kernels import (
-    bias_force,
     factorize,
     mass_matrix,
     passive_force,
-    solve_factorized,
 )
+from heelstrike.dynamics.straight_line import play
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
@@ -43,10 +42,13 @@ from heelstrike.sim.contact_geometry import (
     add_impulse,
     assemble_delassus,
     contact_rows,
-    observe,
-    row_product,
+    contact_velocity,
+    evaluate_equations,
+    locate_contacts,
+    solve_mass_matrix,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
+from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
     DIVERGED,
@@ -61,6 +63,8 @@ from heelstrike.sim.engine import (
     whole_steps,
 )
 from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
+from heelstrike.sim.point_contacts import point_velocities
+from heelstrike.sim.programs import DELASSUS, PUSH, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.recording import (
     center_height,
@@ -147,6 +151,13 @@ class TimeStepping:
 
 
 @kernel
+def evaluate_state(model: Model, ground: GroundModel, memory: Memory) -> None:
+    """Kinematics, contact points, mass matrix and bias force of the state now."""
+    evaluate_equations(model, memory.q, memory.v, memory)
+    locate_contacts(model, ground, memory)
+
+
+@kernel
 def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
@@ -154,22 +165,19 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
     order that adds h D + h² K to the mass matrix and −h K v to the force; both leave the tree's
     sparsity alone, since K and D are diagonal.
     """
-    mass_matrix(model, memory.tree, memory.mass_matrix)
-    if scheme == LINEARLY_IMPLICIT:
-        for i in range(model.parent.shape[0]):
-            memory.mass_matrix[i, i] += step * (memory.damping[i] + step * memory.stiffness[i])
-    factorize(model, memory.mass_matrix, memory.factor)
-    bias_force(model, memory.tree, memory.rate)
+    nv = model.parent.shape[0]
     passive_force(model, memory.q, memory.v, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
-    nv = model.parent.shape[0]
     if scheme == LINEARLY_IMPLICIT:
+        mass_matrix(model, memory.tree, memory.mass_matrix)
         for i in range(nv):
+            memory.mass_matrix[i, i] += step * (memory.damping[i] + step * memory.stiffness[i])
             memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
+        factorize(model, memory.mass_matrix, memory.factor)
     for i in range(nv):
-        memory.rate[i] = step * (memory.force[i] - memory.rate[i])
-    solve_factorized(model, memory.factor, memory.rate)
+        memory.rate[i] = step * (memory.force[i] - memory.bias[i])
+    solve_mass_matrix(model, memory, memory.rate)
     for i in range(nv):
         memory.next_v[i] = memory.v[i] + memory.rate[i]
 
@@ -183,7 +191,7 @@ def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
     for i in range(nv):
         memory.rate[i] = 0.0
     add_pushes(model, memory.tree, memory.pushes, memory.rate)
-    solve_factorized(model, memory.factor, memory.rate)
+    solve_mass_matrix(model, memory, memory.rate)
     for i in range(nv):
         memory.next_v[i] += step * memory.rate[i]
 
@@ -192,28 +200,57 @@ def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
 def select_candidates(
     model: Model, step: float, scheme: int, activation: float, memory: Memory
 ) -> int:
-    """Write Jacobian rows and free terms of the contact points that could act in this step."""
-    count = 0
+    """List the contact points that could act in this step, with their free terms."""
+    contacts = memory.contacts
     linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    farthest = FAR_STEPS * CLOSING_SPEED * step
+    if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
+        farthest = activation
+    count = 0
+    usual = memory.programs[VELOCITIES] != 0
     for contact in range(model.contact_link.shape[0]):
-        gap = memory.contacts.gap[contact]
-        if gap > FAR_STEPS * CLOSING_SPEED * step or (
-            gap > activation and scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC)
-        ):
-            continue
-        contact_rows(model, memory, contact, count)
-        normal = row_product(memory, 2 * count, memory.next_v)
+        if contacts.gap[contact] <= farthest:
+            memory.candidate[count] = contact
+            usual = usual and memory.usual_place[contact] >= 0
+            count += 1
+    if count == 0:
+        return 0
+    near = count
+    velocity = memory.point_velocity
+    if usual:
+        play(
+            memory.programs[VELOCITIES],
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                memory.next_v, velocity,
+            ),
+        )  # fmt: skip
+    else:
+        point_velocities(
+            model, memory.every_point, memory.tree, contacts.position, contacts.normal,
+            memory.next_v, velocity,
+        )  # fmt: skip
+    count = 0
+    for place in range(near):
+        contact = memory.candidate[place]
+        gap = contacts.gap[contact]
+        normal = velocity[contact, 0]
         if linearised:
             if gap > step * max(CLOSING_SPEED, -2.0 * normal):
                 continue
             normal += gap / step
         elif scheme == MOREAU_JEAN:
-            before = row_product(memory, 2 * count, memory.v)
+            before, _ = contact_velocity(
+                model.contact_link[contact],
+                contacts.position[contact],
+                contacts.normal[contact],
+                memory.tree,
+            )
             if gap + 0.5 * step * before > activation:
                 continue
             normal += memory.restitution[contact] * before
         memory.free[2 * count] = normal
-        memory.free[2 * count + 1] = row_product(memory, 2 * count + 1, memory.next_v)
+        memory.free[2 * count + 1] = velocity[contact, 1]
         memory.problem_friction[count] = memory.friction[contact]
         memory.problem_mode[count] = memory.mode[contact]
         memory.candidate[count] = contact
@@ -225,10 +262,7 @@ def select_candidates(
 def select_stops(
     model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
 ) -> int:
-    """Append the joint stops that could act in this step: contacts without friction.
-
-    A stop has a normal row ±1 at its joint and a tangent row of zeros.
-    """
+    """Append the joint stops that could act in this step: contacts without friction."""
     points = model.contact_link.shape[0]
     linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
     for joint in range(model.parent.shape[0]):
@@ -247,10 +281,6 @@ def select_stops(
                     continue
             elif not gap <= activation:
                 continue
-            for j in range(model.parent.shape[0]):
-                memory.jacobian[2 * count, j] = 0.0
-                memory.jacobian[2 * count + 1, j] = 0.0
-            memory.jacobian[2 * count, joint] = sign
             memory.free[2 * count] = normal
             memory.free[2 * count + 1] = 0.0
             memory.problem_friction[count] = 0.0
@@ -262,14 +292,87 @@ def select_stops(
 
 
 @kernel
+def write_rows(model: Model, memory: Memory, count: int) -> None:
+    """Write the Jacobian rows of contact points and stops; those of dry joints are written.
+
+    A stop has a normal row ±1 at its joint and a tangent row of zeros.
+    """
+    points = model.contact_link.shape[0]
+    for place in range(count - memory.dry_joint.shape[0]):
+        candidate = memory.candidate[place]
+        if candidate < points:
+            contact_rows(model, memory, candidate, place)
+            continue
+        for j in range(model.parent.shape[0]):
+            memory.jacobian[2 * place, j] = 0.0
+            memory.jacobian[2 * place + 1, j] = 0.0
+        stop = candidate - points
+        memory.jacobian[2 * place, stop // 2] = 1.0 - 2.0 * (stop % 2)
+
+
+@kernel
+def are_usual(memory: Memory, count: int) -> bool:
+    """Whether there are programs for all candidates."""
+    if memory.programs[DELASSUS] == 0:
+        return False
+    for place in range(count):
+        candidate = memory.candidate[place]
+        if candidate >= memory.usual_place.shape[0] or memory.usual_place[candidate] < 0:
+            return False
+    return True
+
+
+@kernel
+def gather_delassus(model: Model, memory: Memory, count: int) -> None:
+    """Delassus matrix of the candidates out of that of all usual points."""
+    contacts = memory.contacts
+    play(
+        memory.programs[DELASSUS],
+        (
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_rows, memory.point_delassus,
+        ),
+    )  # fmt: skip
+    for place in range(count):
+        row = 2 * memory.usual_place[memory.candidate[place]]
+        for other in range(count):
+            column = 2 * memory.usual_place[memory.candidate[other]]
+            for i in range(2):
+                for j in range(2):
+                    entry = memory.point_delassus[row + i, column + j]
+                    memory.delassus[2 * place + i, 2 * other + j] = entry
+
+
+@kernel
+def push_candidates(model: Model, memory: Memory, count: int) -> None:
+    """Add what the impulses of the candidates, usual points all, do to the velocity."""
+    contacts = memory.contacts
+    for contact in range(model.contact_link.shape[0]):
+        memory.point_impulse[contact, 0] = 0.0
+        memory.point_impulse[contact, 1] = 0.0
+    for place in range(count):
+        memory.point_impulse[memory.candidate[place], 0] = memory.impulse[2 * place]
+        memory.point_impulse[memory.candidate[place], 1] = memory.impulse[2 * place + 1]
+    play(
+        memory.programs[PUSH],
+        (
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_impulse, memory.rate, memory.next_v,
+        ),
+    )  # fmt: skip
+
+
+@kernel
 def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
     count = select_candidates(model, step, scheme, activation, memory)
     count = select_stops(model, step, scheme, activation, count, memory)
+    count = select_dry_joints(model, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
+    dry = points + 2 * nv
     for j in range(nv):
         memory.stop_torque[j] = 0.0
     contacts = memory.contacts
@@ -282,7 +385,13 @@ def solve_contacts(
         memory.residual[i] = 0.0
     if count == 0:
         return True
-    assemble_delassus(model, memory, count)
+    straight = are_usual(memory, count)
+    if straight:
+        gather_delassus(model, memory, count)
+    else:
+        write_rows(model, memory, count)
+        assemble_delassus(model, memory, count)
+        press_dry_joints(model, step, count, memory)
     status = solve_contact_kernel(
         count,
         memory.delassus,
@@ -295,14 +404,20 @@ def solve_contacts(
         memory.residual,
         memory.solver,
     )
-    add_impulse(model, memory, count, memory.next_v)
+    if straight:
+        push_candidates(model, memory, count)
+    else:
+        add_impulse(model, memory, count, memory.next_v)
     for place in range(count):
         contact = memory.candidate[place]
+        if contact >= dry:
+            impulse = memory.impulse[2 * place + 1]
+            note_dry_joint(contact - dry, impulse, step, memory.problem_mode[place], memory)
+            continue
         if contact >= points:
             joint = (contact - points) // 2
-            memory.stop_torque[joint] += (
-                memory.jacobian[2 * place, joint] * memory.impulse[2 * place] / step
-            )
+            sign = 1.0 - 2.0 * ((contact - points) % 2)
+            memory.stop_torque[joint] += sign * memory.impulse[2 * place] / step
             continue
         contacts.force[contact, 0] = memory.impulse[2 * place] / step
         contacts.force[contact, 1] = memory.impulse[2 * place + 1] / step
@@ -346,7 +461,8 @@ def _advance(
     while True:
         if (
             record.row_count[0] >= record.time.shape[0]
-            or record.event_count[0] + 2 * model.contact_link.shape[0] > record.event_time.shape[0]
+            or record.event_count[0] + 2 * (model.contact_link.shape[0] + nv)
+            > record.event_time.shape[0]
         ):
             return RECORD_FULL
         k = span[0]
@@ -355,7 +471,7 @@ def _advance(
         time = start + k * step
         if not sound(memory):
             return DIVERGED
-        observe(model, ground, memory)
+        evaluate_state(model, ground, memory)
         if k % control_every == 0:
             controller(
                 time,

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
-from heelstrike.view.errors import ViewError
 from heelstrike.view.film import Film
 from heelstrike.view.style import checked_target, styled
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from heelstrike.analysis.friction import friction_coefficient, friction_use
 from heelstrike.analysis.support import pushing_feet
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
-from heelstrike.view.errors import ViewError
 from heelstrike.view.impacts import NOTE, scale_without_impacts
 from heelstrike.view.style import (
     BOUND,

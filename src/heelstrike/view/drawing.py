@@ -1,9 +1,9 @@
 """The shape of a robot as line segments: what figures, animations and portraits are made of.
 
 A robot is drawn from its tree alone: a bone from every link to the links it carries, a sole
-through the contact points, and a bone to twice the distance of the centre of mass where a link
-carries nothing, so that a trunk has a height. Massless links, the carriers of a floating base, are
-not drawn.
+through the contact points (or spokes to them, where they lie around the joint), and a bone to twice
+the distance of the centre of mass where a link ends, so that a trunk has a height.
+Massless links, the carriers of a floating base, are not drawn.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ DISC_CORNERS = 16
 THICKEST = 15.0  # points, of a bone that has the whole mass
 THINNEST = 2.5
 DISC_WIDTH = 1.2
+WIDTH_SHARE = 0.74  # of the height of a portrait that the robot may take in width
 LEGS_APART = 0.3  # rad that each leg of a portrait is turned at its root
 
 
@@ -116,25 +117,37 @@ def skeleton(robot: Robot) -> Skeleton:
         if model.mass[link] == 0.0:
             continue
         before = len(bones)
-        for child in np.flatnonzero(model.parent == link):
-            if np.hypot(*(reference[child] - reference[link])) > SAME_PLACE:
-                bones.append((link, nowhere, int(child), nowhere, width[link]))
+        center = model.center_of_mass[link]
+        # The frame of a slide may be anywhere; that of a hinge is on the link.
+        home = nowhere if model.axis[link, 0] != 0.0 else center
+        children = np.flatnonzero(model.parent == link)
+        joints = reference[children] - reference[link]
+        if _is_trunk(robot, link, joints):
+            if np.hypot(*(center - joints[0])) > SAME_PLACE:
+                bones.append((link, joints[0], link, 2.0 * center - joints[0], width[link]))
+            continue
+        for child, place in zip(children, joints, strict=True):
+            if np.hypot(*(place - home)) > SAME_PLACE:
+                bones.append((link, home, int(child), nowhere, width[link]))
         contacts = np.flatnonzero(model.contact_link == link)
         points = model.contact_position[contacts]
-        if len(bones) == before:
+        thickness = width[link]
+        if len(bones) == before and _are_around(points):
+            lines = [(home, p) for p in points]
+            thickness = THINNEST
+        elif len(bones) == before:
             lines = _outline(points)
         else:
-            ends = np.array([nowhere, *(_local_end(bone, reference) for bone in bones[before:])])
-            lines = [(nowhere, p) for p in points if np.hypot(*(ends - p).T).min() > SAME_PLACE]
+            ends = np.array([home, *joints])
+            lines = [(home, p) for p in points if np.hypot(*(ends - p).T).min() > SAME_PLACE]
         for start, end in lines:
-            bones.append((link, start, link, end, width[link]))
+            bones.append((link, start, link, end, thickness))
         for contact in contacts:
             radius = float(model.contact_radius[contact])
             if radius > SAME_PLACE:
                 for start, end in _disc(model.contact_position[contact], radius):
                     bones.append((link, start, link, end, DISC_WIDTH))
-        center = model.center_of_mass[link]
-        if len(bones) == before and np.hypot(*center) > SAME_PLACE:
+        if len(bones) == before and np.hypot(*(center - home)) > SAME_PLACE:
             bones.append((link, nowhere, link, 2.0 * center, width[link]))
     bones.sort(key=lambda bone: side[bone[0]])
     links = np.array([(a, b) for a, _, b, _, _ in bones], dtype=np.int64).reshape(-1, 2)
@@ -147,9 +160,28 @@ def skeleton(robot: Robot) -> Skeleton:
     )
 
 
-def _local_end(bone: Bone, reference: Floats) -> Floats:
-    """Far end of a bone to the next link, in the frame of its own link."""
-    return np.asarray(reference[bone[2]] - reference[bone[0]])
+def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
+    """Whether a link floats and carries all its children in one place, its hip.
+
+    It is drawn from there to as far beyond its centre of mass; its frame may be anywhere.
+    """
+    model = robot.model
+    parent = model.parent[link]
+    return bool(
+        parent >= 0
+        and model.mass[parent] == 0.0
+        and len(joints) > 0
+        and np.ptp(joints, axis=0).max() <= SAME_PLACE
+        and link not in model.contact_link
+    )
+
+
+def _are_around(points: Floats) -> bool:
+    """Whether points lie on all sides of the joint, as those of a wheel: no half-plane is free."""
+    if len(points) < 3:
+        return False
+    angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
+    return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
 
 
 def _outline(points: Floats) -> list[tuple[Floats, Floats]]:
@@ -257,14 +289,15 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         If the file cannot be written.
     """
     model = robot.model
-    q = _legs_apart(robot)
+    q = legs_apart(robot)
     poses = link_poses(robot, q)
     if robot.floating and robot.nc:  # stand on z = 0
         q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
         poses = link_poses(robot, q)
     bones = skeleton(robot)
     low, high = extent(bones.segments(poses.origin, poses.angle))
-    size = max(float((high - low).max()), 1e-3)
+    width, height = high - low
+    size = max(float(height), float(width) / WIDTH_SHARE, 1e-3)
     with styled():
         figure = new_figure(4.6, 5.8)
         axes = figure.add_subplot()
@@ -304,20 +337,22 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         return save_figure(figure, path)
 
 
-def _legs_apart(robot: Robot) -> Floats:
-    """Reference configuration with mirrored legs spread, so that both are seen, feet level."""
+def legs_apart(robot: Robot) -> Floats:
+    """Reference configuration with two legs spread, so that both are seen, feet level."""
     model = robot.model
     q = model.reference.copy()
+    if len(robot.feet) != 2:
+        return q
     leg = legs(robot)
     for index, foot in enumerate(robot.feet):
         chain = [i for i in np.flatnonzero(leg == index) if model.axis[i, 0] != 0.0]
-        if robot.mirror is None or int(robot.mirror.foot[index]) == index or len(chain) < 2:
+        if not chain:
             continue
-        first, last = chain[0], foot.link
-        forward = index < int(robot.mirror.foot[index])
-        turn = -LEGS_APART if forward else LEGS_APART
-        for joint in (first, last):
+        turn = LEGS_APART if index else -LEGS_APART
+        for joint in dict.fromkeys((int(chain[0]), foot.link)):
             sense = model.axis[joint, 0]
+            if sense == 0.0:
+                continue
             moved = np.clip(q[joint] + turn * sense, model.lower[joint], model.upper[joint])
             turn = -(moved - q[joint]) * sense  # what the hip turned, the ankle turns back
             q[joint] = moved

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
-from heelstrike.view.errors import ViewError
 from heelstrike.view.style import save_figure, styled
 
 if TYPE_CHECKING:

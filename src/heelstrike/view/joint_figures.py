@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from heelstrike.analysis.tracking import reference_motion
+from heelstrike.errors import ViewError
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import Run
 from heelstrike.view.drawing import legs
-from heelstrike.view.errors import ViewError
 from heelstrike.view.impacts import NOTE, scale_without_impacts
 from heelstrike.view.style import (
     BOUND,

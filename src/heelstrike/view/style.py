@@ -19,8 +19,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from heelstrike.errors import ViewError
 from heelstrike.robot.robot import Robot
-from heelstrike.view.errors import ViewError
 
 # Okabe and Ito's palette.
 BLUE = "#0072B2"

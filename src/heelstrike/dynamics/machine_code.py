@@ -1,0 +1,109 @@
+"""From an LLVM module to functions that can be called, kept on disk for the next time."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+
+from heelstrike.compilation import cache_directory, source_fingerprint
+
+_OPTIMISATION = 1  # more costs time and gains nothing on straight-line code
+
+_loaded: dict[str, Any] = {}
+"""Engines by key. They hold the code, and live as long as the process."""
+
+
+def can_fuse() -> bool:
+    """Whether this processor multiplies and adds in one instruction."""
+    return llvm.get_process_triple().startswith(("aarch64", "arm64")) or bool(
+        llvm.get_host_cpu_features().get("fma", False)
+    )
+
+
+def addresses(
+    names: Sequence[str], described: bytes, write: Callable[[], ir.Module]
+) -> tuple[int, ...]:
+    """Return the addresses of the functions of a module, which is compiled if it is new.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of the functions.
+    described : bytes
+        What the module depends on besides the sources of this package and the processor.
+    write : callable
+        Writes the module.
+    """
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    key = _key(described)
+    if key not in _loaded:
+        machine = llvm.Target.from_default_triple().create_target_machine(
+            cpu=llvm.get_host_cpu_name(),
+            features=llvm.get_host_cpu_features().flatten(),
+            opt=_OPTIMISATION,
+            jit=True,
+        )
+        code = _read(key)
+        if code is None:
+            code = _compiled(write(), machine)
+            _keep(key, code)
+        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+        engine.finalize_object()
+        _loaded[key] = engine
+    return tuple(_loaded[key].get_function_address(name) for name in names)
+
+
+def _compiled(module: ir.Module, machine: Any) -> bytes:
+    module.triple = machine.triple
+    parsed = llvm.parse_assembly(str(module))
+    parsed.verify()
+    options = llvm.create_pipeline_tuning_options(_OPTIMISATION)
+    passes = llvm.create_pass_builder(machine, options)
+    passes.getModulePassManager().run(parsed, passes)
+    code: bytes = machine.emit_object(parsed)
+    return code
+
+
+def _key(described: bytes) -> str:
+    digest = hashlib.sha256(described)
+    for part in (
+        source_fingerprint(),
+        llvm.get_host_cpu_name(),
+        llvm.get_host_cpu_features().flatten(),
+        str(llvm.llvm_version_info),
+    ):
+        digest.update(b"\0" + part.encode())
+    return digest.hexdigest()
+
+
+def _file(key: str) -> Path:
+    return cache_directory() / f"straight_line.{key[:32]}.o"
+
+
+def _read(key: str) -> bytes | None:
+    try:
+        return _file(key).read_bytes()
+    except OSError:
+        return None
+
+
+def _keep(key: str, code: bytes) -> None:
+    """Write a file that is either whole or not there; without a place to write, do without."""
+    try:
+        directory = cache_directory()
+        directory.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=directory)
+        with os.fdopen(handle, "wb") as file:
+            file.write(code)
+        Path(name).replace(_file(key))
+    except OSError:
+        return

@@ -1,0 +1,467 @@
+"""What a robot consists of, and what is wrong with it."""
+
+from __future__ import annotations
+
+import enum
+import os
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.assembly import UNLIKELY, link_origins
+from heelstrike.robot.library import builtin_robots, load_robot
+from heelstrike.robot.mirror import find_mirror
+from heelstrike.robot.mjcf import read_mjcf
+from heelstrike.robot.model import Floats
+from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
+from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.saving import body_links
+from heelstrike.robot.screening import is_readable
+from heelstrike.robot.urdf import MASSLESS
+from heelstrike.robot.warning import RobotWarning
+
+SAME_HEIGHT = 1e-4
+"""Metres up to which two contact points are equally high."""
+
+ROUND_OFF = 1e-12
+"""Metres, of sums along a leg."""
+
+
+class FindingKind(enum.Enum):
+    """What is wrong with a robot."""
+
+    ASYMMETRY = "left and right differ"
+    INERTIA = "impossible inertia"
+    MASS = "mass missing"
+    FRICTION = "feet of different friction"
+    CONTACT = "contact points above the sole"
+    FOOT = "feet"
+    LIMIT = "limits"
+    UNIT = "units"
+    FILE = "said by the reader"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that looks wrong.
+
+    Attributes
+    ----------
+    kind : FindingKind
+        What it is about.
+    message : str
+        What was found, where, with the numbers.
+    """
+
+    kind: FindingKind
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.kind.value}: {self.message}"
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """A look at a robot.
+
+    Attributes
+    ----------
+    source : str
+        What was looked at.
+    robot : Robot or None
+        The robot, None if the file gives none. If the file holds impossible inertias, it is the
+        robot with the nearest possible ones: to look at, not to simulate.
+    findings : tuple of Finding
+        What looks wrong, nothing for a sound robot.
+    loadable : bool
+        Whether :func:`load_robot` takes the file as it is.
+    """
+
+    source: str
+    robot: Robot | None
+    findings: tuple[Finding, ...]
+    loadable: bool = True
+
+    @property
+    def sound(self) -> bool:
+        """Whether nothing looks wrong."""
+        return not self.findings
+
+    def text(self) -> str:
+        """Return everything in words: tree, masses, limits, contact points, findings."""
+        parts = [] if self.robot is None else [_description(self.robot)]
+        if self.findings:
+            parts.append("\n".join(["findings", *(f"  - {found}" for found in self.findings)]))
+        else:
+            parts.append("findings\n  none")
+        if not self.loadable:
+            shown = "" if self.robot is None else " Above, the inertias are the nearest possible."
+            parts.append(f"load_robot refuses this file as it is.{shown}")
+        return "\n\n".join(parts)
+
+    def __str__(self) -> str:
+        return self.text()
+
+
+def inspect_robot(
+    robot: Robot | str | os.PathLike[str], *, floating: bool = False, projected: bool = False
+) -> Inspection:
+    """Look at a robot for what has fooled others.
+
+    Left and right that differ; inertias that violate the triangle inequality (the sum of two
+    principal moments is never less than the third); links that move without mass; feet of different
+    friction; contact points above the sole; limits that leave the reference configuration out.
+
+    Parameters
+    ----------
+    robot : Robot, str or path
+        A robot, the name of a built-in one, or the path of an MJCF or URDF file. A file tells more
+        than a robot: a planar robot has forgotten its moments of inertia in space.
+    floating, projected : bool
+        As for :func:`load_robot`.
+
+    Raises
+    ------
+    RobotError
+        If there is no such robot, or its file cannot be read at all.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> hs.inspect_robot("bravo7").sound
+    True
+    """
+    if isinstance(robot, Robot):
+        return Inspection(robot.source or robot.name, robot, tuple(_of_robot(robot)))
+    findings: list[Finding] = []
+    path = _file(robot)
+    loadable = True
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RobotWarning)
+        found: Robot | None = None
+        try:
+            found = load_robot(robot, floating=floating, projected=projected)
+        except RobotError as error:
+            if path is None:
+                raise
+            loadable = False
+            findings += _of_inertias(path)
+            try:
+                found = read_mjcf(path, floating=floating, projected=projected, lenient=True)
+            except RobotError as still:
+                findings.append(Finding(FindingKind.FILE, str(still)))
+            if not findings:
+                raise error from None
+        else:
+            if path is not None:
+                findings += _of_inertias(path)
+    said = dict.fromkeys(str(one.message) for one in caught if one.category is RobotWarning)
+    told_below = ("left and right differ", UNLIKELY)
+    findings += [
+        Finding(FindingKind.FILE, words)
+        for words in said
+        if not any(phrase in words for phrase in told_below)
+    ]
+    if found is not None:
+        findings += _of_robot(found)
+    return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), loadable)
+
+
+def _file(robot: str | os.PathLike[str]) -> Path | None:
+    """Path of a robot that comes from a file, None for a built-in robot or where none is."""
+    if not isinstance(robot, str | os.PathLike) or robot in builtin_robots():
+        return None
+    path = Path(os.fspath(robot))
+    return path if is_readable(path) else None
+
+
+def _of_inertias(path: Path) -> Iterator[Finding]:
+    """Inertias that the file states in three dimensions and no body can have; masses of zero."""
+    from heelstrike.robot.mujoco_file import parsed_bodies
+
+    for name, mass, tensor in parsed_bodies(path):
+        if not mass >= MASSLESS:
+            yield Finding(FindingKind.MASS, f"body {name!r} has the mass {mass:g} kg.")
+        if np.all(np.isfinite(tensor)) and not is_possible(tensor):
+            given = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(tensor))
+            yield Finding(
+                FindingKind.INERTIA,
+                f"body {name!r} has the principal moments {given} kg m². No body has: none is "
+                "negative, and the sum of two is at least the third.",
+            )
+
+
+def _of_robot(robot: Robot) -> Iterator[Finding]:
+    yield from _asymmetries(robot)
+    yield from _missing_masses(robot)
+    yield from _numbers(robot)
+    yield from _ranges(robot)
+    yield from _frictions(robot)
+    yield from _soles(robot)
+
+
+def _asymmetries(robot: Robot) -> Iterator[Finding]:
+    friction = robot.contact_friction or (1.0,) * robot.nc
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RobotWarning)
+        find_mirror(
+            robot.model, robot.joint_names, robot.link_names, robot.feet, friction, robot.name
+        )
+    for one in caught:
+        _, _, words = str(one.message).partition("no mirror image: ")
+        differences, _, _ = words.partition(". Gaits")
+        for difference in differences.split("; "):
+            yield Finding(FindingKind.ASYMMETRY, difference)
+
+
+def _missing_masses(robot: Robot) -> Iterator[Finding]:
+    """Find massless links that are bodies of their own, and do not only carry a second joint."""
+    for link in body_links(robot):
+        if robot.model.mass[link] == 0.0:
+            yield Finding(
+                FindingKind.MASS,
+                f"link {robot.link_names[link]!r} moves, by joint {robot.joint_names[link]!r}, and "
+                "has no mass.",
+            )
+
+
+def _frictions(robot: Robot) -> Iterator[Finding]:
+    if not robot.contact_friction:
+        return
+    by_foot = {
+        foot.name: sorted({robot.contact_friction[i] for i in foot.contacts}) for foot in robot.feet
+    }
+    if len({tuple(values) for values in by_foot.values()}) > 1:
+        told = ", ".join(
+            f"{name} {' and '.join(f'{value:g}' for value in values)}"
+            for name, values in by_foot.items()
+        )
+        yield Finding(FindingKind.FRICTION, f"{told}.")
+
+
+def _soles(robot: Robot) -> Iterator[Finding]:
+    """Find contact points that cannot touch flat ground together with the rest of their foot."""
+    bottoms = _bottoms(robot)
+    heights = []
+    for foot in robot.feet:
+        points = bottoms[list(foot.contacts)]
+        heights.append(float(points[:, 1].min()))
+        if _is_wheel(points):
+            continue
+        for contact, height in zip(foot.contacts, points[:, 1] - heights[-1], strict=True):
+            if height > SAME_HEIGHT:
+                yield Finding(
+                    FindingKind.CONTACT,
+                    f"{robot.contact_names[contact]} is {1e3 * height:.3g} mm above the sole of "
+                    f"{foot.name} as the robot stands in its file.",
+                )
+    if not robot.feet:
+        yield Finding(FindingKind.FOOT, "no link ends a leg and has contact points.")
+    if heights and max(heights) - min(heights) > SAME_HEIGHT:
+        told = ", ".join(
+            f"{foot.name} {height:.4g} m" for foot, height in zip(robot.feet, heights, strict=True)
+        )
+        yield Finding(
+            FindingKind.FOOT, f"the soles are not level as the robot stands in its file: {told}."
+        )
+
+
+def _is_wheel(points: Floats) -> bool:
+    """Whether points lie around a link, as spokes do, and not along a sole."""
+    return len(points) > 2 and bool(np.ptp(points[:, 1]) > 0.5 * np.ptp(points[:, 0]))
+
+
+def _bottoms(robot: Robot) -> Floats:
+    """Lowest points (x, z) of the contact discs in the reference configuration, (nc, 2)."""
+    model = robot.model
+    points: Floats = link_origins(model)[model.contact_link] + model.contact_position
+    points[:, 1] -= model.contact_radius
+    points[np.abs(points) < ROUND_OFF] = 0.0
+    return points
+
+
+_ABOUT = {
+    Unlikely.INERTIA: FindingKind.INERTIA,
+    Unlikely.LIMIT: FindingKind.LIMIT,
+    Unlikely.UNIT: FindingKind.UNIT,
+}
+
+
+def _numbers(robot: Robot) -> Iterator[Finding]:
+    found = unlikely_numbers(
+        robot.model, link_origins(robot.model), robot.joint_names, robot.link_names
+    )
+    for about, words in found:
+        yield Finding(_ABOUT[about], words)
+
+
+def _ranges(robot: Robot) -> Iterator[Finding]:
+    """Find joints that stand outside their range, as the knees of some robots do at zero."""
+    model = robot.model
+    for joint, name in enumerate(robot.joint_names):
+        low, start, high = model.lower[joint], model.reference[joint], model.upper[joint]
+        if not low <= start <= high:
+            yield Finding(
+                FindingKind.LIMIT,
+                f"{name} stands at {start:.4g} in the file, outside its range {low:.4g} … "
+                f"{high:.4g}: start a simulation from another state.",
+            )
+
+
+# In words
+
+
+def _description(robot: Robot) -> str:
+    points = _bottoms(robot)
+    lines = [
+        f"{robot.name}: {robot.total_mass:.6g} kg, {robot.nv} coordinates, {robot.nu} actuators, "
+        f"{robot.nc} contact points",
+        "base: " + ("floats (x, z, pitch)" if robot.floating else "does not float as x, z, pitch"),
+        f"left and right: {'alike' if robot.mirror is not None else 'not alike, or not named'}",
+        "",
+        *_table(robot),
+        "",
+        "feet: " + (", ".join(_foot_words(foot, points) for foot in robot.feet) or "none"),
+    ]
+    if robot.nc:
+        lines.append("contact points (x, z of the lowest point as the robot stands in its file)")
+        for i, name in enumerate(robot.contact_names):
+            radius = f", radius {robot.model.contact_radius[i]:g} m"
+            lines.append(
+                f"  {name}: {points[i, 0]:.4g}, {points[i, 1]:.4g} m"
+                + (radius if robot.model.contact_radius[i] else "")
+                + (f", friction {robot.contact_friction[i]:g}" if robot.contact_friction else "")
+            )
+    return "\n".join(lines)
+
+
+def _foot_words(foot: Foot, points: Floats) -> str:
+    length = np.ptp(points[list(foot.contacts), 0])
+    return f"{foot.name} ({len(foot.contacts)} points, {length:.3g} m long)"
+
+
+def _table(robot: Robot) -> list[str]:
+    headings = [
+        ("joint", "moves", "kind", "mass kg", "inertia", "centre m", "range", "torque", "more"),
+        ("", "", "", "", "kg m²", "x, z", "rad, m", "N m, N", ""),
+    ]
+    rows: list[tuple[str, ...]] = [*headings]
+    rows += [_row(robot, joint, indent) for joint, indent in _tree(robot)]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _tree(robot: Robot) -> Iterator[tuple[int, str]]:
+    """Joints in the order of the tree, each with the lines that lead to it."""
+    children: dict[int, list[int]] = {}
+    for joint, parent in enumerate(robot.model.parent.tolist()):
+        children.setdefault(parent, []).append(joint)
+    # A stack, since a chain may be longer than Python recurses.
+    stack = [(joint, "", "") for joint in reversed(children.get(-1, []))]
+    while stack:
+        joint, lead, below = stack.pop()
+        yield joint, lead
+        own = children.get(joint, [])
+        for place, child in reversed(list(enumerate(own))):
+            if len(own) == 1:
+                stack.append((child, below, below))  # a chain needs no lines
+            else:
+                last = place == len(own) - 1
+                stack.append(
+                    (child, below + ("└ " if last else "├ "), below + ("  " if last else "│ "))
+                )
+
+
+def _row(robot: Robot, joint: int, indent: str) -> tuple[str, ...]:
+    model = robot.model
+    turn = model.axis[joint, 0]
+    kind = (
+        f"hinge {'+' if turn > 0 else '-'}y"
+        if turn
+        else f"slide {model.axis[joint, 1] + 0.0:.3g}, {model.axis[joint, 2] + 0.0:.3g}"
+    )
+    mass = model.mass[joint]
+    driven = np.flatnonzero(model.actuator_joint == joint)
+    extra: list[str] = []
+    for label, values in (
+        ("damping", model.damping),
+        ("armature", model.armature),
+        ("spring", model.stiffness),
+        ("dry friction", model.dry_friction),
+    ):
+        if values[joint]:
+            extra.append(f"{label} {values[joint]:.4g}")
+    if np.isfinite(model.speed_limit[joint]):
+        extra.append(f"speed {model.speed_limit[joint]:.4g}")
+    center = model.center_of_mass[joint] + 0.0
+    return (
+        indent + robot.joint_names[joint],
+        robot.link_names[joint],
+        kind,
+        f"{mass:.5g}" if mass else "",
+        f"{model.inertia[joint]:.4g}" if mass else "",
+        f"{center[0]:.4g}, {center[1]:.4g}" if mass else "",
+        _span(model.lower[joint], model.upper[joint]),
+        _span(model.torque_lower[driven[0]], model.torque_upper[driven[0]]) if len(driven) else "",
+        ", ".join(extra),
+    )
+
+
+def _span(low: float, high: float) -> str:
+    if np.isinf(low) and np.isinf(high):
+        return "free"
+    if low == -high:
+        return f"± {high:.4g}"
+    return f"{low:.4g} … {high:.4g}"
+
+
+def facts(inspection: Inspection) -> dict[str, Any]:
+    """Return an inspection as plain numbers and words, for JSON. Infinity becomes None."""
+    robot = inspection.robot
+    result: dict[str, Any] = {
+        "source": inspection.source,
+        "loadable": inspection.loadable,
+        "findings": [
+            {"kind": found.kind.value, "message": found.message} for found in inspection.findings
+        ],
+    }
+    if robot is None:
+        return result
+    model = robot.model
+
+    def numbers(values: Floats) -> list[Any]:
+        plain = np.where(np.isfinite(values), values, np.nan).tolist()
+        return [None if value != value else value for value in plain]
+
+    return result | {
+        "name": robot.name,
+        "mass_kg": robot.total_mass,
+        "floating": robot.floating,
+        "symmetric": robot.mirror is not None,
+        "coordinates": list(robot.joint_names),
+        "links": list(robot.link_names),
+        "parent": model.parent.tolist(),
+        "link_mass_kg": model.mass.tolist(),
+        "link_inertia_kg_m2": model.inertia.tolist(),
+        "link_center_of_mass_m": model.center_of_mass.tolist(),
+        "lower": numbers(model.lower),
+        "upper": numbers(model.upper),
+        "speed_limit": numbers(model.speed_limit),
+        "damping": model.damping.tolist(),
+        "armature": model.armature.tolist(),
+        "dry_friction": model.dry_friction.tolist(),
+        "stiffness": model.stiffness.tolist(),
+        "actuators": list(robot.actuator_names),
+        "torque_lower": numbers(model.torque_lower),
+        "torque_upper": numbers(model.torque_upper),
+        "contact_points": list(robot.contact_names),
+        "feet": [foot.name for foot in robot.feet],
+    }

@@ -1,0 +1,194 @@
+"""A strict look at URDF. MuJoCo's parser passes over in silence what it does not know.
+
+A misspelt ``<dynamcs>`` loses a joint its damping, a forgotten ``upper`` its range, a negative mass
+becomes none: wrong robots that look right. After the format's definition at
+https://wiki.ros.org/urdf/XML.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections import Counter
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.warning import warn
+
+# Attributes of each element, with how many numbers they hold (0: a word), and its children.
+_ORIGIN = {"xyz": 3, "rpy": 3}
+_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+_ATTRIBUTES: dict[str, dict[str, int]] = {
+    "robot": {"name": 0, "version": 0},
+    "link": {"name": 0, "type": 0},
+    "inertial": {},
+    "origin": _ORIGIN,
+    "mass": {"value": 1},
+    "inertia": dict.fromkeys(_MOMENTS, 1),
+    "collision": {"name": 0, "group": 0},
+    "geometry": {},
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {"filename": 0, "scale": 3},
+    "joint": {"name": 0, "type": 0},
+    "parent": {"link": 0},
+    "child": {"link": 0},
+    "axis": {"xyz": 3},
+    "limit": {"lower": 1, "upper": 1, "effort": 1, "velocity": 1},
+    "dynamics": {"damping": 1, "friction": 1},
+}
+_CHILDREN: dict[str, set[str]] = {
+    "robot": {"link", "joint"},
+    "link": {"inertial", "collision"},
+    "inertial": {"origin", "mass", "inertia"},
+    "collision": {"origin", "geometry"},
+    "geometry": {"box", "sphere", "cylinder", "capsule", "mesh"},
+    "joint": {"origin", "parent", "child", "axis", "limit", "dynamics"},
+}
+_SEVERAL = {("robot", "link"), ("robot", "joint"), ("link", "collision")}
+_REQUIRED = {
+    "link": ("name",),
+    "joint": ("name", "type"),
+    "parent": ("link",),
+    "child": ("link",),
+    "mass": ("value",),
+    "inertia": _MOMENTS[:3],
+}
+# What is known, and is about other things than mechanics, or told elsewhere (mimic).
+_OTHER_MATTERS = {
+    "robot": "material transmission gazebo mujoco ros2_control sensor plugin drake",
+    "link": "visual contact gazebo sensor self_collision_checking verbose audio disable",
+    "inertial": "gazebo",
+    "collision": "verbose material surface max_contacts contact_coefficients drake",
+    "geometry": "",
+    "joint": "mimic calibration safety_controller gazebo physics hardwareInterface sensor drake",
+}
+SHOWN = 6  # how many oddities a message lists before it counts the rest
+_BOUNDED = ("revolute", "prismatic")
+
+
+def check_urdf(root: Element, label: str) -> None:
+    """Refuse a URDF whose numbers cannot be meant; warn of what plays no part but may be meant to.
+
+    Raises
+    ------
+    RobotError
+        For numbers that are none, negative masses and the like, names given twice, and macros that
+        nobody expanded.
+
+    Warns
+    -----
+    RobotWarning
+        Of unknown elements and attributes, and joints without the limits that URDF wants.
+    """
+    for element in root.iter():
+        if element.tag.startswith("xacro:"):
+            raise RobotError(
+                f"{label}: <{element.tag}> is a macro of xacro, so this is not a URDF file yet. "
+                "Expand it first: xacro robot.xacro > robot.urdf"
+            )
+    for kind in ("link", "joint"):
+        counts = Counter(element.get("name", "") for element in root.iterfind(kind))
+        twice = [name for name, count in counts.items() if count > 1]
+        if twice:
+            raise RobotError(f"{label}: two {kind}s are called {twice[0]!r}. Rename one.")
+    strange: list[str] = []
+    _check(root, "the robot", label, strange)
+    massive = {
+        link.get("name", "") for link in root.iterfind("link") if link.find("inertial") is not None
+    }
+    for joint in root.iterfind("joint"):
+        parent = joint.find("parent")
+        # The joints of a floating base, on links without mass, have no limits.
+        if parent is not None and (
+            parent.get("link") in massive or joint.find("limit") is not None
+        ):
+            strange += _missing_limits(joint)
+    if strange:
+        shown = "; ".join(strange[:SHOWN])
+        more = f"; and {len(strange) - SHOWN} more" if len(strange) > SHOWN else ""
+        warn(f"{label}: this URDF may not say what is meant: {shown}{more}.")
+
+
+def _check(element: Element, where: str, label: str, strange: list[str]) -> None:
+    tag = element.tag
+    if tag in ("link", "joint"):
+        where = f"{tag} {element.get('name', '')!r}"
+    attributes = _ATTRIBUTES[tag]
+    for name in _REQUIRED.get(tag, ()):
+        if name not in element.attrib:
+            raise RobotError(f"{label}: <{tag}> of {where} lacks the attribute {name!r}.")
+    for name, text in element.attrib.items():
+        if name in attributes:
+            _check_numbers(element, name, text, attributes[name], where, label)
+        elif ":" not in name and not name.startswith("xmlns"):
+            strange.append(
+                f"<{tag}> of {where} has the unknown attribute {name!r}{_guess(name, attributes)}"
+            )
+    known = _CHILDREN.get(tag, set())
+    other = _OTHER_MATTERS.get(tag, "").split()
+    seen: set[str] = set()
+    for child in element:
+        if child.tag in known:
+            if child.tag in seen and (tag, child.tag) not in _SEVERAL:
+                raise RobotError(f"{label}: {where} has two <{child.tag}>. Keep one.")
+            seen.add(child.tag)
+            _check(child, where, label, strange)
+        elif child.tag not in other and ":" not in child.tag:
+            strange.append(
+                f"<{child.tag}> in <{tag}> of {where} is unknown{_guess(child.tag, known)}"
+            )
+    if tag == "inertial" and not {"mass", "inertia"} <= seen:
+        raise RobotError(f"{label}: the <inertial> of {where} needs <mass> and <inertia>.")
+
+
+def _check_numbers(
+    element: Element, name: str, text: str, count: int, where: str, label: str
+) -> None:
+    if count == 0:
+        return
+    what = f"{label}: {name!r} of <{element.tag}> of {where}"
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        values = []
+    # Python reads 1_000 and the digits of all scripts as numbers; MuJoCo reads their beginning.
+    if len(values) != count or "_" in text or not text.isascii():
+        numbers = "a number" if count == 1 else f"{count} numbers"
+        raise RobotError(f"{what} is {text[:60]!r}, where {numbers} must be.")
+    limit = element.tag == "limit"
+    if any(math.isnan(value) or (math.isinf(value) and not limit) for value in values):
+        raise RobotError(f"{what} is {text[:60]!r}, which is no finite number.")
+    signed = element.tag in ("origin", "axis") or name in ("lower", "upper", "ixy", "ixz", "iyz")
+    if not signed and name != "scale" and min(values) < 0.0:
+        raise RobotError(f"{what} is {text[:60]!r}; it must not be negative.")
+    if element.tag == "axis" and not any(values):
+        raise RobotError(f"{what} is zero, which is no direction.")
+
+
+def _missing_limits(joint: Element) -> Iterator[str]:
+    name = joint.get("name", "")
+    limit = joint.find("limit")
+    if joint.get("type") not in _BOUNDED:
+        return
+    if limit is None:
+        yield f"joint {name!r} has no <limit>: it moves freely and has no motor"
+        return
+    ends = [end for end in ("lower", "upper") if end not in limit.attrib]
+    if ends:
+        yield f"<limit> of joint {name!r} has no {' and no '.join(repr(end) for end in ends)}"
+    if "effort" not in limit.attrib:
+        yield f"<limit> of joint {name!r} has no 'effort', so that no motor moves it"
+    lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
+    if not ends and lower >= upper:
+        yield (
+            f"the range of joint {name!r} is empty, from {lower:g} to {upper:g}: it counts as free"
+        )
+
+
+def _guess(name: str, known: set[str] | dict[str, int]) -> str:
+    near = difflib.get_close_matches(name, sorted(known), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""

@@ -1,0 +1,78 @@
+"""Dry friction of the joints as contacts that are always closed.
+
+Dry friction τ of a joint with velocity v and breakaway torque τ_c obeys Coulomb's law with a
+normal force that is known: ``|τ| ≤ τ_c``, and ``τ = −τ_c sign v`` where v is not zero. It enters
+the contact problem as a contact of its own. Its tangent is the joint, its normal is coupled to
+nothing::
+
+    w_n = g λ_n − g τ_c   ⟂ λ_n     so that λ_n = τ_c whatever else happens
+    w_t = v (or v̇),  |λ_t| ≤ λ_n    friction coefficient 1
+
+with τ_c times the length of the step where λ are impulses; g, the Delassus diagonal of the joint,
+makes both rows of one size. So a robot with dry joints, flat feet and joint stops is one problem
+with one certificate.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compilation import kernel
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.memory import Memory
+
+
+@kernel
+def select_dry_joints(model: Model, count: int, memory: Memory) -> int:
+    """Append the joints with dry friction to the candidates of a step; return how many there are.
+
+    They are numbered on from the joint stops.
+    """
+    nv = model.parent.shape[0]
+    first = model.contact_link.shape[0] + 2 * nv
+    for place in range(memory.dry_joint.shape[0]):
+        joint = memory.dry_joint[place]
+        for j in range(nv):
+            memory.jacobian[2 * count, j] = 0.0
+            memory.jacobian[2 * count + 1, j] = 0.0
+        memory.jacobian[2 * count + 1, joint] = 1.0
+        memory.free[2 * count + 1] = memory.next_v[joint]
+        memory.problem_friction[count] = 1.0
+        memory.problem_mode[count] = memory.dry_mode[place]
+        memory.candidate[count] = first + place
+        count += 1
+    return count
+
+
+@kernel
+def press_dry_joint(place: int, limit: float, delassus: Floats, free: Floats) -> None:
+    """Give the candidate at `place` the normal row whose force, or impulse, is `limit`."""
+    weight = delassus[2 * place + 1, 2 * place + 1]
+    delassus[2 * place, 2 * place] = weight
+    free[2 * place] = -weight * limit
+
+
+@kernel
+def press_dry_joints(model: Model, step: float, count: int, memory: Memory) -> None:
+    """Complete the problem of the candidates, of which the dry joints are the last."""
+    number = memory.dry_joint.shape[0]
+    for place in range(number):
+        limit = step * model.dry_friction[memory.dry_joint[place]]
+        press_dry_joint(count - number + place, limit, memory.delassus, memory.free)
+
+
+@kernel
+def note_dry_joint(place: int, impulse: float, step: float, found: int, memory: Memory) -> None:
+    """Keep the torque and the mode that the contact problem found for a dry joint."""
+    memory.friction_torque[memory.dry_joint[place]] = impulse / step
+    memory.dry_mode[place] = found
+
+
+@kernel
+def dry_force(dry_joint: Integers, slide: Integers, limit: Floats, force: Floats) -> None:
+    """Add the friction of the joints that slide, which is known, to the generalised force.
+
+    `slide` tells the direction of every joint in `dry_joint`, zero where it sticks; `limit` is
+    the breakaway torque of every joint of the robot.
+    """
+    for place in range(dry_joint.shape[0]):
+        joint = dry_joint[place]
+        force[joint] -= slide[place] * limit[joint]

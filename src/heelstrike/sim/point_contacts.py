@@ -1,0 +1,125 @@
+"""Several contact points of a robot at once, without a branch: kernels for straight-line code.
+
+`points` (k,) lists the contact points. Rows and components go point by point in that order, normal
+before tangent. Arrays of (nc, 2) have an entry for every contact point of the robot; positions and
+normals are those of :func:`~heelstrike.sim.contact_geometry.locate_contacts`.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compilation import kernel
+from heelstrike.dynamics.kernels import solve_factorized, solve_upper
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Integers, Model
+
+
+@kernel
+def point_delassus(
+    model: Model,
+    points: Integers,
+    tree: Workspace,
+    position: Floats,
+    normal: Floats,
+    factor: Floats,
+    rows: Floats,
+    delassus: Floats,
+) -> None:
+    """Delassus matrix G = J A⁻¹ Jᵀ of the points, (2 k, 2 k); `rows` (2 k, nv) is scratch.
+
+    With A = Lᵀ D L it is Y D⁻¹ Yᵀ, where Y = J L⁻¹.
+    """
+    for place in range(points.shape[0]):
+        contact = points[place]
+        x = position[contact, 0] - tree.pivot[0]
+        z = position[contact, 1] - tree.pivot[1]
+        nx = normal[contact, 0]
+        nz = normal[contact, 1]
+        for j in range(model.parent.shape[0]):
+            rows[2 * place, j] = 0.0
+            rows[2 * place + 1, j] = 0.0
+        j = model.contact_link[contact]
+        while j >= 0:
+            jx = tree.motion[j, 1] + tree.motion[j, 0] * z
+            jz = tree.motion[j, 2] - tree.motion[j, 0] * x
+            rows[2 * place, j] = nx * jx + nz * jz
+            rows[2 * place + 1, j] = nz * jx - nx * jz
+            j = model.parent[j]
+        solve_upper(model, factor, rows[2 * place])
+        solve_upper(model, factor, rows[2 * place + 1])
+    for row in range(rows.shape[0]):
+        for column in range(row + 1):
+            total = 0.0
+            for j in range(model.parent.shape[0]):
+                total += rows[row, j] * factor[j, j] * rows[column, j]
+            delassus[row, column] = total
+            delassus[column, row] = total
+
+
+@kernel
+def point_velocities(
+    model: Model,
+    points: Integers,
+    tree: Workspace,
+    position: Floats,
+    normal: Floats,
+    v: Floats,
+    velocity: Floats,
+) -> None:
+    """Velocities (normal, tangent) of the points under the joint velocity v, into (nc, 2)."""
+    link = tree.force  # scratch
+    for i in range(model.parent.shape[0]):
+        parent = model.parent[i]
+        for k in range(3):
+            link[i, k] = tree.motion[i, k] * v[i]
+            if parent >= 0:
+                link[i, k] += link[parent, k]
+    for place in range(points.shape[0]):
+        contact = points[place]
+        i = model.contact_link[contact]
+        vx = link[i, 1] + link[i, 0] * (position[contact, 1] - tree.pivot[1])
+        vz = link[i, 2] - link[i, 0] * (position[contact, 0] - tree.pivot[0])
+        velocity[contact, 0] = normal[contact, 0] * vx + normal[contact, 1] * vz
+        velocity[contact, 1] = normal[contact, 1] * vx - normal[contact, 0] * vz
+
+
+@kernel
+def push_points(
+    model: Model,
+    points: Integers,
+    tree: Workspace,
+    position: Floats,
+    normal: Floats,
+    factor: Floats,
+    impulse: Floats,
+    force: Floats,
+    v: Floats,
+) -> None:
+    """Add A⁻¹ Jᵀ λ to a velocity, λ (nc, 2) the impulses of the points; `force` is scratch.
+
+    The impulses are gathered link by link, as moments about the pivot and resultants.
+    """
+    link = tree.force  # scratch
+    for i in range(model.parent.shape[0]):
+        for k in range(3):
+            link[i, k] = 0.0
+    for place in range(points.shape[0]):
+        contact = points[place]
+        i = model.contact_link[contact]
+        fx = normal[contact, 0] * impulse[contact, 0] + normal[contact, 1] * impulse[contact, 1]
+        fz = normal[contact, 1] * impulse[contact, 0] - normal[contact, 0] * impulse[contact, 1]
+        x = position[contact, 0] - tree.pivot[0]
+        z = position[contact, 1] - tree.pivot[1]
+        link[i, 0] += z * fx - x * fz
+        link[i, 1] += fx
+        link[i, 2] += fz
+    for i in range(model.parent.shape[0] - 1, -1, -1):
+        parent = model.parent[i]
+        total = 0.0
+        for k in range(3):
+            total += tree.motion[i, k] * link[i, k]
+            if parent >= 0:
+                link[parent, k] += link[i, k]
+        force[i] = total
+    solve_factorized(model, factor, force)
+    for i in range(model.parent.shape[0]):
+        v[i] += force[i]

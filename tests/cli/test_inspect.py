@@ -1,0 +1,113 @@
+"""``heelstrike inspect``."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from heelstrike.cli.main import app
+from heelstrike.robot import builtin_robots, load_robot
+
+
+@pytest.mark.parametrize("name", builtin_robots())
+def test_the_library(name: str) -> None:
+    result = CliRunner().invoke(app, ["inspect", name])
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    robot = load_robot(name)
+    for word in (*robot.joint_names, *robot.link_names, *robot.contact_names):
+        assert word in result.stdout
+    assert result.stdout.endswith("findings\n  none\n")
+    drawing, _, _ = result.stdout.partition(f"{name}: ")
+    assert any("\u2801" <= letter <= "\u28ff" for letter in drawing)
+    assert max(map(len, drawing.splitlines())) <= 72
+
+
+def test_the_sample_in_the_documentation() -> None:
+    page = Path(__file__).parents[2] / "docs" / "robots.md"
+    _, _, after = page.read_text(encoding="utf-8").partition("```text\n")
+    sample, _, _ = after.partition("```")
+    assert CliRunner().invoke(app, ["inspect", "bravo7"]).stdout.endswith(sample)
+
+
+def test_a_picture(tmp_path: Path) -> None:
+    picture = tmp_path / "bravo7.png"
+    result = CliRunner().invoke(app, ["inspect", "bravo7", "--out", str(picture)])
+    assert result.exit_code == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_finding_is_said_and_counts(tmp_path: Path) -> None:
+    path = load_robot("bravo7").save(tmp_path / "r.xml")
+    path.write_text(
+        path.read_text("utf-8").replace('friction="0.75"', 'friction="0.5"', 1), "utf-8"
+    )
+    result = CliRunner().invoke(app, ["inspect", str(path)])
+    assert result.exit_code == 1
+    assert "feet of different friction: right_foot 0.5 and 0.75, left_foot 0.75" in result.stdout
+    assert "left and right differ" in result.stdout
+    assert result.stderr == ""
+    told = json.loads(CliRunner().invoke(app, ["inspect", str(path), "--json"]).stdout)
+    assert len(told["findings"]) == 2
+    assert told["symmetric"] is False
+
+
+def test_a_robot_in_space(tmp_path: Path) -> None:
+    """Projected on request; else there is nothing to draw, and it says why."""
+    path = load_robot("bravo7").save(tmp_path / "r.xml")
+    roll = '<joint name="roll" axis="1 0 0" /><joint name="root_x"'
+    path.write_text(path.read_text("utf-8").replace('<joint name="root_x"', roll, 1), "utf-8")
+    picture = tmp_path / "r.png"
+    result = CliRunner().invoke(app, ["inspect", str(path), "--out", str(picture)])
+    assert result.exit_code == 1
+    assert "'roll' of body 'trunk' turns about (1, 0, 0)" in result.stdout
+    assert "no robot to draw" in result.stderr
+    assert not picture.exists()
+    result = CliRunner().invoke(app, ["inspect", str(path), "--projected"])
+    assert "right_ankle" in result.stdout
+    assert "locked where they stand: roll" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["bravo"], "Did you mean 'bravo7'?"),
+        (["no/such/robot.urdf"], "there is no such file"),
+        (["."], "expected an MJCF file"),
+        (["bravo7", "--out", "no/such/folder/x.png"], "there is no folder"),
+        (["bravo7", "--out", "x.doc"], ".png, .pdf or .svg"),
+    ],
+)
+def test_mistakes(arguments: list[str], said: str) -> None:
+    result = CliRunner().invoke(app, ["inspect", *arguments])
+    assert result.exit_code == 2
+    assert said in " ".join(result.stderr.split())
+    assert "Traceback" not in result.stderr
+
+
+def _inspect(*arguments: str, encoding: str) -> subprocess.CompletedProcess[bytes]:
+    code = "from heelstrike.cli.main import app; app()"
+    return subprocess.run(
+        [sys.executable, "-c", code, "inspect", *arguments],
+        capture_output=True,
+        check=True,
+        timeout=120,
+        env=os.environ | {"PYTHONIOENCODING": encoding},
+    )
+
+
+def test_a_pipe_gets_plain_text() -> None:
+    """No colours, no warnings; without letters for it, no drawing but the rest."""
+    done = _inspect("bravo7", encoding="utf-8")
+    text = done.stdout.decode()
+    assert (done.stderr, "\x1b" in text) == (b"", False)
+    assert "⡇" in text
+    done = _inspect("bravo7", encoding="ascii")
+    assert done.stdout.decode("ascii").startswith("bravo7: 75 kg")
+    assert done.stderr == b""
