@@ -1,7 +1,7 @@
 """Every robot of the library that can walk: its gait, and how far each way through time takes it.
 
 Run with ``python benchmarks/library_gaits.py [ROBOT ...]``. Steps, tracking error (rms of the
-actuated joints over all steps), friction use and slip (of the stance foot, in one second or so) are
+actuated joints over all steps), friction use and slip (in total, of the point that slid most) are
 those of twenty steps, or of as many as the robot took before it fell. On point feet computed torque
 cannot hold the gait, so the tracking error of the first step stands beside that of the walk.
 """

@@ -60,21 +60,25 @@ if TYPE_CHECKING:
     from heelstrike.robot import human as human
     from heelstrike.robot import inspect_robot as inspect_robot
     from heelstrike.robot import load_robot as load_robot
+    from heelstrike.sim import Batch as Batch
     from heelstrike.sim import Compliant as Compliant
     from heelstrike.sim import EventDriven as EventDriven
     from heelstrike.sim import HuntCrossley as HuntCrossley
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
+    from heelstrike.sim import Push as Push
     from heelstrike.sim import Run as Run
     from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import TimeStepping as TimeStepping
     from heelstrike.sim import load_run as load_run
     from heelstrike.sim import simulate as simulate
+    from heelstrike.sim import simulate_batch as simulate_batch
 
 __version__ = "0.1.0"
 
 # Public name -> the package that defines it. The imports above repeat this for type checkers,
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
+    "Batch": "heelstrike.sim",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
@@ -92,6 +96,7 @@ _HOME = {
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
     "PiecewiseGait": "heelstrike.gait",
+    "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
     "RobotError": "heelstrike.errors",
@@ -116,6 +121,7 @@ _HOME = {
     "load_run": "heelstrike.sim",
     "optimize_gait": "heelstrike.gait",
     "simulate": "heelstrike.sim",
+    "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
 }

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, dataclass_transform
 
 import numba
@@ -64,7 +64,7 @@ class Bundle:
     def _numba_type_(self) -> BundleType:
         """Its type to Numba, which looks for it under this name."""
         members = ((name, _member_type(value)) for name, value in self.members().items())
-        return BundleType(type(self).__name__, tuple(members))
+        return _bundle_type(type(self).__name__, tuple(members))
 
     @cached_property
     def table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -72,7 +72,7 @@ class Bundle:
         words: list[int] = []
         for value in self.members().values():
             if isinstance(value, np.ndarray):
-                words += [value.ctypes.data, *value.shape]
+                words += [value.__array_interface__["data"][0], *value.shape]
             elif isinstance(value, Bundle):
                 words.append(value.address)
             elif isinstance(value, float):
@@ -90,6 +90,22 @@ class Bundle:
         """Members only: a copy has a table of its own."""
         return self.members()
 
+    @cached_property
+    def arrays(self) -> tuple[np.ndarray[Any, Any], ...]:
+        """Its arrays and those of the bundles in it."""
+        found: list[np.ndarray[Any, Any]] = []
+        for value in self.members().values():
+            if isinstance(value, np.ndarray):
+                found.append(value)
+            elif isinstance(value, Bundle):
+                found += value.arrays
+        return tuple(found)
+
+    def become(self, other: Bundle) -> None:
+        """Copy what is in the arrays of a bundle of the same kind and shapes."""
+        for mine, its in zip(self.arrays, other.arrays, strict=True):
+            mine[...] = its
+
     def members(self) -> dict[str, Any]:
         """Members by name, in their order."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
@@ -103,8 +119,14 @@ def _member_type(value: Any) -> Any:
             raise TypeError(
                 f"a bundle holds C-contiguous arrays of 64-bit numbers, not {value.dtype}"
             )
-        return types.Array(numba.from_dtype(value.dtype), value.ndim, "C")
+        return _array_type(value.dtype.char, value.ndim)
     return types.float64 if isinstance(value, float) else types.int64
+
+
+@lru_cache
+def _array_type(dtype: str, ndim: int) -> Any:
+    """Type of an array; Numba takes long to make one, and simulations make many bundles."""
+    return types.Array(numba.from_dtype(np.dtype(dtype)), ndim, "C")
 
 
 class BundleType(types.Type):
@@ -124,6 +146,9 @@ class BundleType(types.Type):
                 break
             place += 1 + (kind.ndim if isinstance(kind, types.Array) else 0)
         return place
+
+
+_bundle_type = lru_cache(BundleType)
 
 
 @register_model(BundleType)

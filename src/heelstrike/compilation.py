@@ -19,6 +19,7 @@ from numba import njit
 from numba.core.caching import FunctionCache
 
 from heelstrike.linking import InnerKernelCompiler
+from heelstrike.quick_typing import remembered_typings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -119,7 +120,8 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     """
     options = _OPTIONS | {"no_cfunc_wrapper": not address}
     compiled = _kept_on_disk(njit(**options)(function))
-    compiled.compile(signature)
+    with remembered_typings():
+        compiled.compile(signature)
     compiled.disable_compile()
     result: Function = compiled
     return result

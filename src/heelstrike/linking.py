@@ -13,7 +13,7 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
 
 
 class _UnfinishedLibrary(JITCodeLibrary):
@@ -44,14 +44,20 @@ class _UnfinishedLowering(NativeLowering):
         return True
 
 
+# Passes that look for array expressions and functions to inline, of which kernels have none.
+_NEEDLESS = (NopythonRewrites, InlineOverloads)
+
+
 class InnerKernelCompiler(CompilerBase):
-    """Numba's compiler, ending in :class:`_UnfinishedLowering`."""
+    """Numba's compiler without what kernels do not need, ending in `_UnfinishedLowering`."""
 
     def define_pipelines(self) -> list[Any]:
-        """Replace the step that makes machine code."""
+        """Leave steps out, and replace the one that makes machine code."""
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        for place, (step, _) in enumerate(pipeline.passes):
-            if step is NativeLowering:
-                pipeline.passes[place] = (_UnfinishedLowering, "unfinished lowering")
+        pipeline.passes = [
+            (_UnfinishedLowering, "unfinished lowering") if step is NativeLowering else (step, text)
+            for step, text in pipeline.passes
+            if step not in _NEEDLESS
+        ]
         pipeline.finalize()
         return [pipeline]

@@ -29,6 +29,13 @@ def test_the_library(name: str) -> None:
     assert max(map(len, drawing.splitlines())) <= 72
 
 
+def test_the_sample_in_the_documentation() -> None:
+    page = Path(__file__).parents[2] / "docs" / "robots.md"
+    _, _, after = page.read_text(encoding="utf-8").partition("```text\n")
+    sample, _, _ = after.partition("```")
+    assert CliRunner().invoke(app, ["inspect", "bravo7"]).stdout.endswith(sample)
+
+
 def test_a_picture(tmp_path: Path) -> None:
     picture = tmp_path / "bravo7.png"
     result = CliRunner().invoke(app, ["inspect", "bravo7", "--out", str(picture)])

@@ -15,7 +15,7 @@ from heelstrike import dynamics
 TOLERANCE = 1e-11
 
 
-@pytest.mark.parametrize("case", [*NAMED, *RANDOM[:5]], ids=lambda case: case.name)
+@pytest.mark.parametrize("case", [*NAMED, *RANDOM[1:3]], ids=lambda case: case.name)
 def test_functions_equal_queries(case: RobotCase) -> None:
     robot = case.robot()
     functions = dynamics.CasadiDynamics(robot)

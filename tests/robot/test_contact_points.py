@@ -9,7 +9,7 @@ import pytest
 
 from heelstrike.robot import Robot, RobotWarning, read_mjcf
 
-HINGE = '<joint axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+HINGE = '<joint axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/>'
 
 
 def body_with(geoms: str, more: str = "", world: str = "") -> Robot:

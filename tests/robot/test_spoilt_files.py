@@ -22,7 +22,7 @@ import pytest
 from robot_file_truth import differences
 
 from heelstrike.errors import RobotError
-from heelstrike.robot import Robot, RobotWarning, builtin_robots, load_robot
+from heelstrike.robot import Robot, RobotWarning, builtin_robots, inspect_robot, load_robot
 
 LONGEST = 5.0  # seconds
 EACH = 28  # files of each robot and format: 9 * 2 * 28 = 504
@@ -336,6 +336,56 @@ def test_spoilt_files(name: str, ending: str, tmp_path: Path) -> None:
         if not said and not same(robot, sound):
             assert differences(robot, spoilt) == [], case
     assert 6 <= refused < EACH
+
+
+def _without_root(text: str) -> str:
+    """Fix the trunk to the world, for floating=True to free it."""
+    root = _tree(text)
+    for parent, child in _parents(root):
+        if child.tag == "joint" and child.get("name", "").startswith("root_"):
+            parent.remove(child)
+    for link in root.findall("link"):
+        if link.get("name") == "world" or link.get("name", "").endswith(("_root_x", "_root_z")):
+            root.remove(link)
+    return _text(root)
+
+
+@pytest.mark.parametrize("ending", [".xml", ".urdf"])
+@pytest.mark.parametrize("way", ["floating", "projected", "inspected"])
+def test_spoilt_files_on_other_ways_in(way: str, ending: str, tmp_path: Path) -> None:
+    """Files edited before they are compiled, or only looked at: words, never a traceback."""
+    text = load_robot("bravo7").save(tmp_path / f"sound{ending}").read_text("utf-8")
+    if way == "floating":
+        text = _without_root(text)
+    path = tmp_path / f"spoilt{ending}"
+    options: dict[str, bool] = {} if way == "inspected" else {way: True}
+    enter: Callable[..., object] = inspect_robot if way == "inspected" else load_robot
+    path.write_text(text, encoding="utf-8")
+    enter(path, **options)
+    draw = random.Random(f"{way}{ending}")
+    accepted = 0
+    for slip in (*HAND, *HAND, *MALICE):
+        path.write_text(slip(text, draw), encoding="utf-8", errors="surrogatepass")
+        began = time.perf_counter()
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            warnings.simplefilter("ignore", RobotWarning)
+            try:
+                enter(path, **options)
+            except RobotError:
+                continue
+            finally:
+                assert time.perf_counter() - began < LONGEST, slip.__name__
+        accepted += 1
+    assert accepted > 0
+
+
+def test_a_file_without_a_robot_is_refused_on_all_ways(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xml"
+    path.write_text("<mujoco/>")
+    for options in ({}, {"projected": True}, {"floating": True}):
+        with pytest.raises(RobotError, match=r"robot\.xml"):
+            load_robot(path, **options)
 
 
 @pytest.mark.parametrize("spoil", UNITS, ids=lambda spoil: spoil.__name__)

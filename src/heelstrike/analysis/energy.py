@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.actuation import actuator_power
 from heelstrike.analysis.intervals import event_impulse, impulses_in_events, mean_over_intervals
 from heelstrike.analysis.motion import motion, run_motion
+from heelstrike.dynamics import point_jacobian
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -35,6 +36,8 @@ class EnergyBalance:
         Work of the joint stops, of which the same is true.
     dry_friction : (nt,) float
         Work of dry friction in the joints, never positive in exact motion.
+    pushes : (nt,) float
+        Work of the pushes.
     """
 
     time: Floats
@@ -45,6 +48,7 @@ class EnergyBalance:
     contacts: Floats
     stops: Floats
     dry_friction: Floats
+    pushes: Floats
 
     @property
     def total(self) -> Floats:
@@ -55,8 +59,8 @@ class EnergyBalance:
     def residual(self) -> Floats:
         """Change of energy that no work explains, (nt,), in J: the error of the time method."""
         gained = self.total - self.total[:1]
-        explained = self.actuators + self.dampers + self.contacts + self.stops + self.dry_friction
-        return gained - explained
+        known = self.actuators + self.dampers + self.contacts + self.stops
+        return gained - known - self.dry_friction - self.pushes
 
 
 def energy_balance(run: Run) -> EnergyBalance:
@@ -96,4 +100,23 @@ def energy_balance(run: Run) -> EnergyBalance:
         dry_friction=summed(
             (mean_over_intervals(run, run.friction_torque) * mean).sum(axis=1) * held
         ),
+        pushes=summed(_push_work(run, mean)),
     )
+
+
+def _push_work(run: Run, mean: Floats) -> Floats:
+    """Work of the pushes between the rows, (nt − 1,), in J; `mean` are the mean velocities."""
+    robot = run.robot
+    work = np.zeros(len(mean))
+    for push in run.pushes:
+        link, point = push.place(robot)
+        acting = push.time_within(run.time[:-1], run.time[1:])
+        for row in np.flatnonzero(acting):
+            before = point_jacobian(robot, run.position[row], link, point)[:2]
+            if impulses_in_events(run):
+                after = point_jacobian(robot, run.position[row + 1], link, point)[:2]
+                moved = 0.5 * (before @ run.velocity[row] + after @ run.velocity[row + 1])
+            else:
+                moved = before @ mean[row]
+            work[row] += acting[row] * np.dot(push.force, moved)
+    return work

@@ -70,4 +70,5 @@ def _draw(text: str) -> None:
         text.encode(sys.stdout.encoding or "ascii")
     except UnicodeEncodeError:
         return
-    _print(text)
+    if text:
+        _print(text)

@@ -137,7 +137,8 @@ def walk(
     elif not walked:
         complain(f"the robot took {summary.steps} of {steps} steps in {run.time[-1]:.3g} s")
     if not walked and (reason := why_unstable(planned)):
-        tell(f"{reason} --method event-driven keeps to the gait for longer.")
+        longer = " --method event-driven keeps to the gait for longer."
+        tell(reason + ("" if method is Method.EVENT_DRIVEN else longer))
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)
 

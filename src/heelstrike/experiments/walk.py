@@ -189,8 +189,8 @@ def why_unstable(gait: Gait) -> str | None:
     if not isinstance(gait, PiecewiseGait):
         return None
     return (
-        f"robot {gait.robot!r} stands on point feet, which exert no moment on the ground: no motor "
-        "acts on its tipping about the stance foot. Computed torque makes the joints follow the "
-        "gait, and the first step with them, but an error of that motion grows from step to step "
-        "until the robot falls."
+        f"robot {gait.robot!r} stands on point feet, on which the ground exerts no moment: no "
+        "motor acts on its tipping about the stance foot. Computed torque makes the joints follow "
+        "the gait, and the first step with them, but an error of that motion grows from step to "
+        "step until the robot falls."
     )

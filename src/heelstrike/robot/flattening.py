@@ -89,6 +89,8 @@ def project(spec: Any, label: str) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # they come again when the result is compiled
         model = spec.compile()
+    if model.njnt == 0:
+        return  # no robot at all, which the reader says better
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)

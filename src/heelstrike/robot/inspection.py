@@ -203,6 +203,7 @@ def _of_robot(robot: Robot) -> Iterator[Finding]:
     yield from _asymmetries(robot)
     yield from _missing_masses(robot)
     yield from _numbers(robot)
+    yield from _ranges(robot)
     yield from _frictions(robot)
     yield from _soles(robot)
 
@@ -300,6 +301,19 @@ def _numbers(robot: Robot) -> Iterator[Finding]:
     )
     for about, words in found:
         yield Finding(_ABOUT[about], words)
+
+
+def _ranges(robot: Robot) -> Iterator[Finding]:
+    """Find joints that stand outside their range, as the knees of some robots do at zero."""
+    model = robot.model
+    for joint, name in enumerate(robot.joint_names):
+        low, start, high = model.lower[joint], model.reference[joint], model.upper[joint]
+        if not low <= start <= high:
+            yield Finding(
+                FindingKind.LIMIT,
+                f"{name} stands at {start:.4g} in the file, outside its range {low:.4g} … "
+                f"{high:.4g}: start a simulation from another state.",
+            )
 
 
 # In words

@@ -99,14 +99,10 @@ def _inertias(
 
 def _limits(model: Model, joint_names: Sequence[str]) -> Iterator[tuple[Unlikely, str]]:
     for joint, name in enumerate(joint_names):
-        low, start, high = model.lower[joint], model.reference[joint], model.upper[joint]
-        if not low <= start <= high:
-            yield (
-                Unlikely.LIMIT,
-                f"{name} stands at {start:.4g} in the file, outside its range {low:.4g} … "
-                f"{high:.4g}. Degrees for radians?",
-            )
-        farthest = max((abs(end) for end in (low, high) if np.isfinite(end)), default=0.0)
+        farthest = max(
+            (abs(end) for end in (model.lower[joint], model.upper[joint]) if np.isfinite(end)),
+            default=0.0,
+        )
         if model.axis[joint, 0] and FEW_TURNS[0] < farthest < FEW_TURNS[1]:
             yield (
                 Unlikely.LIMIT,

@@ -1,5 +1,6 @@
 """simulate(), the ways through time, and the run they leave behind."""
 
+from heelstrike.sim.batch import Batch, simulate_batch
 from heelstrike.sim.compliant import Compliant
 from heelstrike.sim.contact_law import (
     BristleFriction,
@@ -10,12 +11,14 @@ from heelstrike.sim.contact_law import (
 from heelstrike.sim.controller import CompiledController, Contacts, Controller, controller_kernel
 from heelstrike.sim.dataset import load_run
 from heelstrike.sim.event_driven import EventDriven
+from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.simulation import simulate
 from heelstrike.sim.status import EventKind, RunStatus, Scheme
 from heelstrike.sim.time_stepping import TimeStepping
 
 __all__ = [
+    "Batch",
     "BristleFriction",
     "Certificates",
     "CompiledController",
@@ -27,6 +30,7 @@ __all__ = [
     "EventKind",
     "HuntCrossley",
     "KelvinVoigt",
+    "Push",
     "RegularisedFriction",
     "Run",
     "RunStatus",
@@ -37,4 +41,5 @@ __all__ = [
     "controller_kernel",
     "load_run",
     "simulate",
+    "simulate_batch",
 ]

@@ -70,6 +70,7 @@ from heelstrike.sim.memory import (
     allocate_memory,
     allocate_record,
 )
+from heelstrike.sim.push import share_over_step
 from heelstrike.sim.recording import (
     JOINT_STOP,
     LIFTOFF,
@@ -467,6 +468,7 @@ def _advance(
             )
             if not limit_torque(model, memory):
                 return BAD_CONTROLLER
+        share_over_step(memory.pushes, time, step)
         evaluate(model, ground, laws, held, True, False, time, memory, work)
         recorded = k % span[RECORD_EVERY] == 0 or k == last
         row = record.row_count[0]

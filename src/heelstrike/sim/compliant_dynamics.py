@@ -52,6 +52,7 @@ from heelstrike.sim.contact_law import (
     normal_force,
 )
 from heelstrike.sim.memory import Memory
+from heelstrike.sim.push import add_pushes
 from heelstrike.sim.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
@@ -367,6 +368,7 @@ def evaluate(
     factorize(model, memory.mass_matrix, memory.factor)
     bias_force(model, memory.tree, memory.rate)
     passive_force(model, memory.q, memory.v, memory.force)
+    add_pushes(model, memory.tree, memory.pushes, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     rate = work.acceleration

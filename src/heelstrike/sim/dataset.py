@@ -30,6 +30,7 @@ from heelstrike.sim.contact_law import (
     RegularisedFriction,
 )
 from heelstrike.sim.event_driven import EventDriven
+from heelstrike.sim.push import Push
 from heelstrike.sim.robot_dataset import robot_from_dataset, robot_to_dataset
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.status import EventKind, RunStatus
@@ -69,6 +70,7 @@ _LABELS = {
     "axis": ["x", "z"],
     "component": ["normal", "tangent"],
     "condition": ["complementarity", "cone", "non-penetration"],
+    "window": ["start", "duration"],
 }
 _METHODS = {kind.__name__: kind for kind in (TimeStepping, EventDriven, Compliant)}
 _LAWS = {
@@ -154,6 +156,29 @@ def to_dataset(run: Run) -> xarray.Dataset:
             ("segment",),
             ground.restitution,
             {"units": "1", "long_name": "restitution of the segments of the ground"},
+        ),
+    }
+    places = [push.place(robot) for push in run.pushes]
+    variables |= {
+        "push_link": (
+            ("push",),
+            np.array([link for link, _ in places], dtype=np.int64),
+            {"units": "1", "long_name": "index of the link that was pushed"},
+        ),
+        "push_point": (
+            ("push", "axis"),
+            np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
+            {"units": "m", "long_name": "where it was pushed, in the axes of the link"},
+        ),
+        "push_force": (
+            ("push", "axis"),
+            np.array([push.force for push in run.pushes], dtype=np.float64).reshape(-1, 2),
+            {"units": "N", "long_name": "force of the push on the robot"},
+        ),
+        "push_window": (
+            ("push", "window"),
+            np.array([(p.start, p.duration) for p in run.pushes], dtype=np.float64).reshape(-1, 2),
+            {"units": "s", "long_name": "beginning and duration of the push"},
         ),
     }
     coordinates: dict[str, Any] = {
@@ -409,7 +434,33 @@ def _run(source: Path, dataset: xarray.Dataset, robot: Robot) -> Run:
         steps=int(text.number("steps")),
         saturations=int(text.number("saturations")),
         timing=Timing(text.number("compile_s"), text.number("wall_s")),
+        pushes=_pushes(source, dataset, robot),
     )
+
+
+def _pushes(source: Path, dataset: xarray.Dataset, robot: Robot) -> tuple[Push, ...]:
+    if "push_link" not in dataset.variables:
+        return ()  # files of versions that knew no pushes
+    count = len(_numbers(source, dataset, "push_link", (None,)))
+    link, window, force, point = (
+        _numbers(source, dataset, f"push_{name}", shape).tolist()
+        for name, shape in (
+            ("link", (count,)),
+            ("window", (count, 2)),
+            ("force", (count, 2)),
+            ("point", (count, 2)),
+        )
+    )
+    try:
+        pushes = tuple(
+            Push(int(link[i]), force=force[i], start=start, duration=duration, point=point[i])
+            for i, (start, duration) in enumerate(window)
+        )
+        for push in pushes:
+            push.place(robot)
+    except HeelstrikeError as error:
+        raise RunFileError(f"{source}: damaged: {error}") from error
+    return pushes
 
 
 def _ground(source: Path, dataset: xarray.Dataset, text: _Attributes) -> Ground:

@@ -68,6 +68,7 @@ from heelstrike.sim.event_phase import (
     LENGTH,
     LET_PASS,
     LONGEST,
+    NEXT_PUSH,
     OUTPUT_PERIOD,
     PAUSE,
     PAUSE_STEP,
@@ -93,6 +94,7 @@ from heelstrike.sim.memory import (
     allocate_memory,
     allocate_record,
 )
+from heelstrike.sim.push import switch_at
 from heelstrike.sim.recording import center_height, limit_torque, sound
 from heelstrike.sim.status import EventKind
 
@@ -521,13 +523,17 @@ def control(
     memory: Memory,
     phase: Phase,
 ) -> int:
-    """Ask the controller, if it is due; return BAD, SAME or JUMPED."""
+    """Ask the controller, if it is due, and let pushes begin and end.
+
+    Returns BAD, SAME or JUMPED, which is what the forces did.
+    """
     clock, count = phase.clock, phase.count
     nv = model.parent.shape[0]
+    jumped, clock[NEXT_PUSH] = switch_at(memory.pushes, clock[TIME])
     period = clock[SAMPLE_PERIOD]
     if period > 0.0:
         if clock[TIME] < count[SAMPLE] * period:
-            return SAME
+            return JUMPED if jumped else SAME
         count[SAMPLE] += 1
     state = phase.begin
     forward_kinematics(model, state[:nv], memory.tree)
@@ -539,7 +545,6 @@ def control(
     )  # fmt: skip
     if not limit_torque(model, memory):
         return BAD
-    jumped = False
     for i in range(memory.torque.shape[0]):
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
@@ -550,7 +555,7 @@ def control(
 @kernel
 def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
     """Time that the next step may not pass."""
-    stop = min(clock[END], clock[PAUSE])
+    stop = min(clock[END], clock[PAUSE], clock[NEXT_PUSH])
     if clock[SAMPLE_PERIOD] > 0.0:
         stop = min(stop, count[SAMPLE] * clock[SAMPLE_PERIOD])
     for contact in range(accumulation.shape[0]):
@@ -798,6 +803,7 @@ class _EventDrivenEngine:
         clock[OUTPUT_PERIOD] = method.output_period or 0.0
         clock[SAMPLE_PERIOD] = setting.control_period or 0.0
         clock[LONGEST] = method.max_step
+        clock[NEXT_PUSH] = np.inf
         clock[LAST_EVENT] = -np.inf
         clock[LAST_IMPACT] = -np.inf
         clock[LAST_ROW] = -np.inf

@@ -37,6 +37,7 @@ from heelstrike.sim.event_candidates import share_redundant
 from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
+from heelstrike.sim.push import add_pushes
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
@@ -256,13 +257,14 @@ def watch_forces(
 def free_acceleration(
     model: Model, memory: Memory, dry_joint: Integers, slide: Integers, state: Floats
 ) -> None:
-    """Acceleration without contact, A⁻¹ (B Γ + passive − H), into ``memory.rate``.
+    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``memory.rate``.
 
     The equations of the state have been evaluated. Dry friction of the joints that move is one of
     the passive forces; `slide` ends with theirs.
     """
     nv = model.parent.shape[0]
     passive_force(model, state[:nv], state[nv:], memory.force)
+    add_pushes(model, memory.tree, memory.pushes, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     first = slide.shape[0] - dry_joint.shape[0]

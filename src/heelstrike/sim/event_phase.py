@@ -27,7 +27,8 @@ RELATIVE = 10
 ABSOLUTE = 11
 FALLEN = 12  # height of the centre of mass below which the robot has fallen, m
 LAST_ROW = 13  # time of the last row of the record
-CLOCKS = 14
+NEXT_PUSH = 14  # when a push begins or ends next
+CLOCKS = 15
 
 # Places in ``Phase.count``.
 STARTED = 0  # whether the first contact modes are being, or have been, decided
@@ -112,7 +113,7 @@ class Phase(Bundle):
         Stages of the step and coefficients of its dense output.
     torque : (nu,) float
         Torques at the end of the step, to see whether the controller jumps.
-    clock : (14,) float
+    clock : (15,) float
     count : (15,) int
         Their places are module constants.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
 from heelstrike.sim.programs import straight_line_programs, usual_points
+from heelstrike.sim.push import Push, Pushes, pushes_on
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -103,6 +105,8 @@ class Memory(Bundle):
         Velocities and impulses of contact points.
     solver : ContactWorkspace
         Memory of the contact solvers.
+    pushes : Pushes
+        Forces from outside.
     tally : (3,) int
     extreme : (4,) float
         Counts and worst values of the run; their places are module constants.
@@ -154,11 +158,12 @@ class Memory(Bundle):
     point_velocity: Floats
     point_impulse: Floats
     solver: ContactWorkspace
+    pushes: Pushes
     tally: Integers
     extreme: Floats
 
 
-def allocate_memory(robot: Robot) -> Memory:
+def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nv, nu, nc = robot.nv, robot.nu, robot.nc
     stops = np.isfinite(robot.model.lower).sum() + np.isfinite(robot.model.upper).sum()
@@ -214,6 +219,7 @@ def allocate_memory(robot: Robot) -> Memory:
         point_velocity=np.zeros((nc, 2)),
         point_impulse=np.zeros((nc, 2)),
         solver=contact_workspace(max(capacity, 1)),
+        pushes=pushes_on(robot, pushes),
         tally=np.zeros(TALLIES, dtype=np.int64),
         extreme=np.zeros(EXTREMES),
     )

@@ -14,6 +14,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.engine import Method
+from heelstrike.sim.push import Push
 from heelstrike.sim.status import EventKind, RunStatus
 
 if TYPE_CHECKING:
@@ -147,6 +148,8 @@ class Run:
     timing : Timing
     error : Exception or None
         What the controller raised, if that ended the run.
+    pushes : tuple of Push
+        What pushed the robot.
     """
 
     robot: Robot
@@ -173,6 +176,7 @@ class Run:
     saturations: int
     timing: Timing
     error: Exception | None = field(default=None, repr=False)
+    pushes: tuple[Push, ...] = ()
 
     def __repr__(self) -> str:
         last = self.time[-1] if len(self.time) else 0.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clock_time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
-from heelstrike.dynamics import center_of_mass
+from heelstrike.dynamics.kernels import center_of_mass, forward_kinematics
+from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -42,6 +43,7 @@ from heelstrike.sim.memory import (
     allocate_record,
     joined,
 )
+from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.status import EventKind, RunStatus
 from heelstrike.sim.time_stepping import TimeStepping
@@ -64,6 +66,7 @@ def simulate(
     control_period: float | None = None,
     record_every: int = 1,
     stop_when_fallen: bool | None = None,
+    pushes: Sequence[Push] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Simulate a robot on the ground under a controller.
@@ -93,6 +96,8 @@ def simulate(
     stop_when_fallen : bool, optional
         End the run when the height of the centre of mass above the ground drops below half of what
         it was at first. By default true for floating robots with several feet.
+    pushes : sequence of Push
+        Forces from outside, each on a point of the robot over a window of time.
     progress : callable, optional
         Called now and then with the simulated time.
 
@@ -107,6 +112,39 @@ def simulate(
         If the arguments are not usable, or the state is not one that the method can begin with;
         raised before anything is simulated, except for a torque of the wrong shape, which ends the
         run with status ``controller_failed``.
+    """
+    loop = prepared(
+        robot=robot,
+        state=state,
+        duration=duration,
+        method=method,
+        ground=ground,
+        control_period=control_period,
+        record_every=record_every,
+        stop_when_fallen=stop_when_fallen,
+        pushes=pushes,
+        progress=progress,
+    )
+    return loop.run(controller)
+
+
+def prepared(
+    *,
+    robot: Robot,
+    state: State,
+    duration: float,
+    method: Method | None,
+    ground: Ground | None,
+    control_period: float | None,
+    record_every: int,
+    stop_when_fallen: bool | None,
+    pushes: Sequence[Push],
+    progress: Callable[[float], None] | None = None,
+    work: Workspace | None = None,
+) -> Loop:
+    """Check the arguments of :func:`simulate` and return the simulation, not yet begun.
+
+    `work` is scratch for the robot's kinematics.
     """
     method = TimeStepping() if method is None else method
     ground = Ground() if ground is None else ground
@@ -125,9 +163,14 @@ def simulate(
         raise SimulationError(f"record_every must be at least 1, got {record_every}")
     if stop_when_fallen is None:
         stop_when_fallen = robot.floating and len(robot.feet) > 1
-    x, z = center_of_mass(robot, state.q)
-    height = z - float(ground.height(x))
-    loop = _Loop(
+    fallen_height = -np.inf
+    if stop_when_fallen:
+        work = workspace(robot.nv) if work is None else work
+        center = np.zeros(2)
+        forward_kinematics(robot.model, state.q, work)
+        center_of_mass(robot.model, work, center)
+        fallen_height = FALL_FRACTION * (center[1] - float(ground.height(center[0])))
+    return Loop(
         robot=robot,
         ground=ground,
         method=method,
@@ -135,10 +178,20 @@ def simulate(
         duration=duration,
         control_period=control_period,
         record_every=record_every,
-        fallen_height=FALL_FRACTION * height if stop_when_fallen else -np.inf,
+        fallen_height=fallen_height,
+        pushes=_checked_pushes(robot, pushes),
         progress=progress,
     )
-    return loop.run(controller)
+
+
+def _checked_pushes(robot: Robot, pushes: Sequence[Push]) -> tuple[Push, ...]:
+    if isinstance(pushes, Push):
+        return _checked_pushes(robot, (pushes,))
+    for push in pushes:
+        if not isinstance(push, Push):
+            raise SimulationError(f"pushes must be Push(...), got {push!r}")
+        push.place(robot)
+    return tuple(pushes)
 
 
 def _check_state(robot: Robot, state: State) -> None:
@@ -153,9 +206,39 @@ def _check_state(robot: Robot, state: State) -> None:
             raise SimulationError(f"state.{name} of joint {joint!r} is not finite")
 
 
+def compiled_form(
+    robot: Robot, controller: Controller | CompiledController | None
+) -> CompiledController | None:
+    """Return a controller in the form that runs inside the compiled loop, None if it has none.
+
+    Raises
+    ------
+    ControllerError
+        If it is no controller at all.
+    """
+    if controller is None:
+        return CompiledController(hold_torque, np.zeros(robot.nu), np.zeros(0))
+    if isinstance(controller, CompiledController):
+        return controller
+    make = getattr(controller, "compiled", None)
+    compiled = make() if callable(make) else None
+    if isinstance(compiled, CompiledController):
+        return compiled
+    if not callable(getattr(controller, "torque", None)):
+        raise ControllerError(
+            f"a controller needs a method torque(t, state, contacts), "
+            f"{type(controller).__name__} has none"
+        )
+    return None
+
+
 @dataclass
-class _Loop:
-    """One simulation in progress."""
+class Loop:
+    """One simulation in progress.
+
+    With `keep_rows` false, rows and events are counted and forgotten. `stopped` is asked now and
+    then whether to end early.
+    """
 
     robot: Robot
     ground: Ground
@@ -165,10 +248,29 @@ class _Loop:
     control_period: float | None
     record_every: int
     fallen_height: float
+    pushes: tuple[Push, ...]
     progress: Callable[[float], None] | None
+    keep_rows: bool = True
+    stopped: Callable[[], bool] | None = None
 
     def run(self, controller: Controller | CompiledController | None) -> Run:
-        self.memory: Memory = allocate_memory(self.robot)
+        """Simulate from beginning to end."""
+        self.begin()
+        return self.result(*self.advance(controller))
+
+    def begin(self, memory: Memory | None = None, record: Record | None = None) -> None:
+        """Allocate everything, compile, and check what only the method can.
+
+        Parameters
+        ----------
+        memory : Memory, optional
+            Memory to use, as `allocate_memory` makes it for this robot and these pushes.
+        record : Record, optional
+            Empty record of an earlier simulation of this robot, to be used again.
+        """
+        if memory is None:
+            memory = allocate_memory(self.robot, self.pushes)
+        self.memory: Memory = memory
         self.memory.q[:] = self.state.q
         self.memory.v[:] = self.state.v
         self.memory.stiffness[:] = self.robot.model.stiffness
@@ -185,39 +287,59 @@ class _Loop:
                 fallen_height=self.fallen_height,
             )
         )
-        self.records: list[Record] = []
-        self._new_record()
-        begin = clock_time.perf_counter()
+        self.event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self.error: Exception | None = None
+        self.records: list[Record] = [] if record is None else [record]
+        if record is None:
+            self._new_record()
+
+    def advance(
+        self, controller: Controller | CompiledController | None
+    ) -> tuple[RunStatus, str, Timing]:
+        """Simulate to the end; return how that came and how long it took."""
+        begin = clock_time.perf_counter()
         try:
             status, message = self._walk(controller)
         except KeyboardInterrupt:
             status = RunStatus.INTERRUPTED
-            message = f"interrupted at t = {self.engine.time:.6g} s"
+            message = self._interrupted()
+        self.final_state = self._state_now()
+        if not self.keep_rows:
+            self._count_events()
         wall_s = clock_time.perf_counter() - begin
-        return self._result(status, message, Timing(self.engine.compile_s, wall_s))
+        return status, message, Timing(self.engine.compile_s, wall_s)
+
+    def _state_now(self) -> State:
+        """State of the row just written, if one was; event-driven rows lie on the constraints."""
+        record = self.records[-1]
+        row = int(record.row_count[0]) - 1
+        if row >= 0 and record.time[row] == self.engine.time:
+            return State(record.q[row], record.v[row])
+        return State(self.memory.q, self.memory.v)
+
+    def _interrupted(self) -> str:
+        return f"interrupted at t = {self.engine.time:.6g} s"
+
+    def _count_events(self) -> None:
+        """Count the events of the record and forget it."""
+        record = self.records[-1]
+        kinds = record.event_kind[: record.event_count[0]]
+        self.event_counts += np.bincount(kinds, minlength=len(EventKind))
+        record.row_count[0] = record.event_count[0] = 0
 
     def _new_record(self) -> None:
+        if self.records and not self.keep_rows:
+            self._count_events()
+            return
         rows = min(CHUNK, self.engine.rows_left + 2)
         self.records.append(
             allocate_record(self.robot, rows, max(256, 16 * (self.robot.nc + 2 * self.robot.nv)))
         )
 
     def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
-        if controller is None:
-            zero = np.zeros(self.robot.nu)
-            return self._run_compiled(CompiledController(hold_torque, zero, np.zeros(0)))
-        compiled = controller
-        if not isinstance(controller, CompiledController):
-            make = getattr(controller, "compiled", None)
-            compiled = make() if callable(make) else controller
-        if isinstance(compiled, CompiledController):
+        compiled = compiled_form(self.robot, controller)
+        if compiled is not None:
             return self._run_compiled(compiled)
-        if not callable(getattr(controller, "torque", None)):
-            raise ControllerError(
-                f"a controller needs a method torque(t, state, contacts), "
-                f"{type(controller).__name__} has none"
-            )
         return self._run_python(controller)  # type: ignore[arg-type]
 
     def _run_compiled(self, controller: CompiledController) -> tuple[RunStatus, str]:
@@ -234,6 +356,8 @@ class _Loop:
                 self.progress(self.engine.time)
             if code != PAUSED:
                 return self._ending(code)
+            if self.stopped is not None and self.stopped():
+                return RunStatus.INTERRUPTED, self._interrupted()
 
     def _run(
         self,
@@ -304,7 +428,8 @@ class _Loop:
             f"the controller asked for a torque that is not finite at {now}, actuator {actuator!r}"
         )
 
-    def _result(self, status: RunStatus, message: str, timing: Timing) -> Run:
+    def result(self, status: RunStatus, message: str, timing: Timing) -> Run:
+        """Return the record of the simulation."""
         rows = joined(self.records)
         counters = self.memory.solver.counters
         extreme = self.memory.extreme
@@ -352,4 +477,5 @@ class _Loop:
             saturations=int(self.memory.tally[SATURATIONS]),
             timing=timing,
             error=self.error,
+            pushes=self.pushes,
         )

@@ -65,6 +65,7 @@ from heelstrike.sim.engine import (
 from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
 from heelstrike.sim.point_contacts import point_velocities
 from heelstrike.sim.programs import DELASSUS, PUSH, VELOCITIES
+from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.recording import (
     center_height,
     limit_torque,
@@ -179,6 +180,20 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
     solve_mass_matrix(model, memory, memory.rate)
     for i in range(nv):
         memory.next_v[i] = memory.v[i] + memory.rate[i]
+
+
+@kernel
+def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
+    """Add to the free velocity what pushes do in this step."""
+    if not share_over_step(memory.pushes, time, step):
+        return
+    nv = model.parent.shape[0]
+    for i in range(nv):
+        memory.rate[i] = 0.0
+    add_pushes(model, memory.tree, memory.pushes, memory.rate)
+    solve_mass_matrix(model, memory, memory.rate)
+    for i in range(nv):
+        memory.next_v[i] += step * memory.rate[i]
 
 
 @kernel
@@ -473,6 +488,7 @@ def _advance(
             if not limit_torque(model, memory):
                 return BAD_CONTROLLER
         free_velocity(model, step, scheme, memory)
+        push_robot(model, time, step, memory)
         solved = solve_contacts(model, step, scheme, clock[3], order, memory)
         note_extremes(model, memory)
         note_events(model, record, time, step, memory)

@@ -51,12 +51,13 @@ def draw_energy(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa: AR
                 ("dampers", balance.dampers, PURPLE),
                 ("joint stops", balance.stops, SKY),
                 ("dry friction", balance.dry_friction, ORANGE),
+                ("pushes", balance.pushes, BLUE),
                 ("residual", balance.residual, INK),
             ),
         ),
     ):
         for label, values, color in curves:
-            if label not in ("dampers", "joint stops", "dry friction") or values.any():
+            if label not in ("dampers", "joint stops", "dry friction", "pushes") or values.any():
                 axes.plot(time, values[rows], color=color, label=label)
         axes.set_title(title, loc="left")
         axes.set_ylabel("energy (J)")

@@ -25,10 +25,17 @@ def terminal_drawing(robot: Robot, *, lines: int = 20) -> str:
         The robot.
     lines : int
         Height of the drawing in lines; the width follows.
+
+    Returns
+    -------
+    str
+        Lines; nothing for a robot without extent.
     """
     q = legs_apart(robot)
     poses = link_poses(robot, q)
     segments = skeleton(robot).segments(poses.origin, poses.angle)
+    if not len(segments):
+        return ""
     low, high = extent(segments)
     # A dot is about square: letters are twice as high as wide, and hold 4 x 2 dots.
     size = np.maximum(high - low, 1e-9)

@@ -1,0 +1,545 @@
+"""simulate_batch(): many simulations in one call, on several threads."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
+from heelstrike.dynamics.workspace import workspace
+from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.controller import CompiledController, Controller
+from heelstrike.sim.engine import Method
+from heelstrike.sim.memory import (
+    COMPLEMENTARITY,
+    CONE,
+    NON_PENETRATION,
+    PENETRATION,
+    SATURATIONS,
+    STEPS,
+    Memory,
+    Record,
+    allocate_memory,
+)
+from heelstrike.sim.push import Push, pushes_on
+from heelstrike.sim.run import Run, Timing
+from heelstrike.sim.simulation import Loop, compiled_form, prepared
+from heelstrike.sim.status import EventKind, RunStatus
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+NO_ROWS = 2**62
+"""Steps between two rows of runs that are not recorded: more than any run has."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """What many simulations came to.
+
+    Attributes
+    ----------
+    position : (n, nq) float
+    velocity : (n, nv) float
+        State of each run when it ended (m, rad; m/s, rad/s).
+    time : (n,) float
+        When that was, in s.
+    status : tuple of RunStatus
+        How each run ended.
+    message : tuple of str
+        The same in a person's words.
+    steps, saturations : (n,) int
+        Steps taken; times that a torque was clipped to its limit.
+    events : (n, 10) int
+        Events of each kind, in the order of :class:`~heelstrike.sim.status.EventKind`.
+    penetration : (n,) float
+        Deepest penetration of a contact point, in m.
+    complementarity, cone, non_penetration : (n,) float
+        Largest relative residuals of the contact problems.
+    solves, shortcuts, fallbacks, failures : (n,) int
+        Contact problems of each run, and how they were solved; see
+        :class:`~heelstrike.sim.run.SolverCount`.
+    threads : int
+        Threads that worked on it.
+    timing : Timing
+        Seconds spent compiling, or loading compiled code, and simulating.
+    """
+
+    position: Floats
+    velocity: Floats
+    time: Floats
+    status: tuple[RunStatus, ...]
+    message: tuple[str, ...]
+    steps: Integers
+    saturations: Integers
+    events: Integers
+    penetration: Floats
+    complementarity: Floats
+    cone: Floats
+    non_penetration: Floats
+    solves: Integers
+    shortcuts: Integers
+    fallbacks: Integers
+    failures: Integers
+    threads: int
+    timing: Timing
+    _runs: tuple[Run | None, ...] | None = field(default=None, repr=False)
+
+    def __len__(self) -> int:
+        return len(self.status)
+
+    @property
+    def completed(self) -> NDArray[np.bool_]:
+        """Which runs lasted as long as they were asked to, (n,)."""
+        return np.array([status is RunStatus.COMPLETED for status in self.status], dtype=bool)
+
+    def run(self, index: int) -> Run:
+        """Return the record of one run, as :func:`~heelstrike.simulate` would have.
+
+        Raises
+        ------
+        SimulationError
+            If the batch was not recorded, or was interrupted before this run began.
+        IndexError
+            If there is no such run.
+        """
+        if not -len(self) <= index < len(self):
+            raise IndexError(f"there is no run {index} in a batch of {len(self)}")
+        run = None if self._runs is None else self._runs[index]
+        if run is not None:
+            return run
+        if self._runs is None:
+            raise SimulationError(
+                "this batch kept final states only; call simulate_batch with record_every=1, or "
+                "another number of steps between two rows, to have its runs"
+            )
+        raise SimulationError(f"the batch was interrupted before run {index} began")
+
+    def __str__(self) -> str:
+        counts = [
+            f"{count} {status.value}"
+            for status in RunStatus
+            if (count := sum(each is status for each in self.status))
+        ]
+        return f"{len(self)} runs: {', '.join(counts)}"
+
+
+def simulate_batch(
+    robot: Robot | Sequence[Robot],
+    controller: (
+        Controller | CompiledController | Sequence[Controller | CompiledController] | None
+    ) = None,
+    *,
+    state: State | Sequence[State],
+    duration: ArrayLike,
+    parameters: ArrayLike | None = None,
+    pushes: Push | Sequence[Push] | Sequence[Sequence[Push]] = (),
+    ground: Ground | Sequence[Ground] | None = None,
+    method: Method | None = None,
+    control_period: float | None = None,
+    record_every: int | None = None,
+    stop_when_fallen: bool | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | bool | None = None,
+) -> Batch:
+    """Simulate many runs at once.
+
+    Each argument is either for all runs or has one entry a run; n is their number. The results are
+    those of n calls of :func:`~heelstrike.simulate` to the last bit, whatever the number of
+    threads.
+
+    Parameters
+    ----------
+    robot : Robot, or sequence of n
+        Robots may differ in every number, but must have as many coordinates, actuators and contact
+        points.
+    controller : controller, sequence of n, or None
+        Stock controllers, and others in compiled form (`CompiledController`). Each run has a memory
+        of its own. A Python controller would run one at a time: call `simulate` instead.
+    state : State, or sequence of n
+        Where the runs start: `q` (nq,) or (n, nq), `v` (nv,) or (n, nv).
+    duration : float, or (n,) float
+        Time to simulate in seconds.
+    parameters : (p,) or (n, p) float, optional
+        Numbers of the controller, in the place of its own `CompiledController.parameters`.
+    pushes : Push, sequence of Push, or sequence of n sequences of Push
+        Forces from outside; a plain sequence acts in every run.
+    ground : Ground, or sequence of n
+        The ground; flat with μ = 0.75 and no restitution by default.
+    method : Method
+        Way through time of all runs; ``TimeStepping()`` by default.
+    control_period : float, optional
+        Time between two calls of the controller; see :func:`~heelstrike.simulate`.
+    record_every : int, optional
+        Steps between two rows of the records; by default nothing is kept but how each run ended,
+        so that memory does not grow with the duration. The runs are those of `simulate` with the
+        same `record_every`, or a huge one: writing an event-driven row may change a last digit.
+    stop_when_fallen : bool, optional
+        See :func:`~heelstrike.simulate`.
+    threads : int, optional
+        Threads to work with; by default one a processor.
+    progress : callable or bool, optional
+        Called with the numbers of finished and of all runs; true shows a bar, false nothing. By
+        default there is a bar on a terminal and nothing elsewhere.
+
+    Returns
+    -------
+    Batch
+        How every run ended. A fall or a failure ends its own run only; Ctrl-C ends all, and those
+        that had not begun are where they started.
+
+    Raises
+    ------
+    SimulationError, ControllerError
+        If the arguments are not usable; raised before anything is simulated.
+
+    Examples
+    --------
+    Pushes of different strength against a robot that stands on stiff joints::
+
+        pushes = [[Push("trunk", force=(f, 0.0), start=0.1, duration=0.1)] for f in range(100)]
+        batch = simulate_batch(robot, controller, state=state, duration=2.0, pushes=pushes)
+        print(batch, batch.completed)
+    """
+    begin = perf_counter()
+    if record_every is not None and record_every < 1:
+        raise SimulationError(f"record_every must be at least 1 or None, got {record_every}")
+    workers = (os.cpu_count() or 1) if threads is None else threads
+    if workers < 1:
+        raise SimulationError(f"threads must be at least 1, got {threads}")
+    entries = {
+        "robot": _listed(robot),
+        "controller": _listed(controller),
+        "state": _states(state),
+        "duration": _durations(duration),
+        "parameters": _rows(parameters),
+        "pushes": _pushes(pushes),
+        "ground": _listed(ground),
+    }
+    count = _number_of_runs(entries)
+    every = {name: _Entries(values) for name, values in entries.items()}
+    _check_robots(entries["robot"])
+    work = workspace(entries["robot"][0].nv)
+
+    def loop(index: int) -> Loop:
+        try:
+            return prepared(
+                robot=every["robot"][index],
+                state=every["state"][index],
+                duration=every["duration"][index],
+                method=method,
+                ground=every["ground"][index],
+                control_period=control_period,
+                record_every=NO_ROWS if record_every is None else record_every,
+                stop_when_fallen=stop_when_fallen,
+                pushes=every["pushes"][index],
+                work=work,
+            )
+        except SimulationError as error:
+            if count == 1:
+                raise
+            raise SimulationError(f"run {index}: {error}") from error
+
+    compiled = [_compiled(every["robot"][0], each) for each in entries["controller"]]
+    controllers = _Entries(compiled)
+
+    def controller_of(index: int) -> CompiledController:
+        numbers = every["parameters"][index]
+        own: CompiledController = controllers[index]
+        return own if numbers is None else replace(own, parameters=numbers)
+
+    _check_parameters(compiled, entries["parameters"])
+    loops = [loop(index) for index in range(count)]
+    # What only the method can refuse (and compiling) comes before the first run, too.
+    for index in _first_of_each(entries["ground"], count):
+        loops[index].begin()
+    crew = _Crew(loops, controller_of, recorded=record_every is not None)
+    compile_s = loops[0].engine.compile_s
+    with _shown(progress, count) as show:
+        crew.work(min(workers, count), show)
+    timing = Timing(compile_s, perf_counter() - begin - compile_s)
+    return crew.batch(min(workers, count), timing)
+
+
+class _Entries:
+    """The entries of an argument: as many as there are runs, or one for all."""
+
+    def __init__(self, values: Sequence[Any]) -> None:
+        self._values = values
+
+    def __getitem__(self, index: int) -> Any:
+        return self._values[index if len(self._values) > 1 else 0]
+
+
+def _listed(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, Sequence) else [value]
+
+
+def _states(state: State | Sequence[State]) -> Sequence[State]:
+    if isinstance(state, Sequence):
+        return state
+    if not isinstance(state, State):
+        raise SimulationError(f"state must be a State or several, got {type(state).__name__}")
+    if state.q.ndim == 1 and state.v.ndim == 1:
+        return [state]
+    for name, array in (("q", state.q), ("v", state.v)):
+        if array.ndim not in (1, 2):
+            raise SimulationError(
+                f"state.{name} must have shape (n{name},) or (runs, n{name}), got {array.shape}"
+            )
+    q, v = np.atleast_2d(state.q), np.atleast_2d(state.v)
+    if len(q) != len(v) and 1 not in (len(q), len(v)):
+        raise SimulationError(f"state.q is for {len(q)} runs and state.v for {len(v)}")
+    size = max(len(q), len(v))
+    return [State(q[i % len(q)], v[i % len(v)]) for i in range(size)]
+
+
+def _durations(duration: ArrayLike) -> Sequence[float]:
+    values = np.asarray(duration, dtype=np.float64)
+    if values.ndim > 1 or values.size == 0:
+        raise SimulationError(f"duration must be one number or one a run, got shape {values.shape}")
+    listed: list[float] = np.atleast_1d(values).tolist()
+    return listed
+
+
+def _rows(parameters: ArrayLike | None) -> Sequence[Floats | None]:
+    if parameters is None:
+        return [None]
+    values = np.asarray(parameters, dtype=np.float64)
+    if values.ndim not in (1, 2) or not np.all(np.isfinite(values)):
+        raise SimulationError(
+            f"parameters must be finite numbers of shape (p,) or (runs, p), got shape "
+            f"{values.shape}"
+        )
+    return list(np.atleast_2d(values))
+
+
+def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
+    if isinstance(pushes, Push):
+        return [(pushes,)]
+    if not isinstance(pushes, Sequence):
+        raise SimulationError(f"pushes must be Push(...) or several, got {pushes!r}")
+    if all(isinstance(each, Push) for each in pushes):
+        return [tuple(pushes)]
+    if all(isinstance(each, Sequence) for each in pushes):
+        return [tuple(each) for each in pushes]
+    raise SimulationError(
+        "pushes are either a sequence of Push for all runs, or one such sequence a run; this "
+        "mixes the two"
+    )
+
+
+def _number_of_runs(entries: dict[str, Sequence[Any]]) -> int:
+    sizes = {name: len(values) for name, values in entries.items()}
+    for name, size in sizes.items():
+        if size == 0:
+            raise SimulationError(f"{name} is empty: there is nothing to simulate")
+    several = {name: size for name, size in sizes.items() if size > 1}
+    if len(set(several.values())) > 1:
+        described = ", ".join(f"{name} for {size}" for name, size in several.items())
+        raise SimulationError(
+            f"the arguments are for different numbers of runs: {described}. Each must have one "
+            "entry for all runs, or as many as the others"
+        )
+    return max(several.values(), default=1)
+
+
+def _check_robots(robots: Sequence[Any]) -> None:
+    for index, robot in enumerate(robots):
+        if not isinstance(robot, Robot):
+            raise SimulationError(f"robot must be a Robot or several, got {robot!r}")
+        for name, what in (("nv", "coordinates"), ("nu", "actuators"), ("nc", "contact points")):
+            first, other = getattr(robots[0], name), getattr(robot, name)
+            if first != other:
+                raise SimulationError(
+                    f"the robots of a batch must be built alike: robot {index} has {other} "
+                    f"{what}, the first has {first}"
+                )
+
+
+def _compiled(robot: Robot, controller: Any) -> CompiledController:
+    compiled = compiled_form(robot, controller)
+    if compiled is None:
+        raise ControllerError(
+            f"{type(controller).__name__} runs in Python, so a batch of it would run one at a "
+            "time. Compile it with controller_kernel and hand over a CompiledController, or call "
+            "simulate for each run"
+        )
+    return compiled
+
+
+def _check_parameters(compiled: Sequence[CompiledController], rows: Sequence[Any]) -> None:
+    if rows[0] is None:
+        return
+    for controller in compiled:
+        if len(controller.parameters) != len(rows[0]):
+            raise SimulationError(
+                f"the controller has {len(controller.parameters)} parameters, but there are "
+                f"{len(rows[0])} in each row of `parameters`"
+            )
+
+
+def _first_of_each(grounds: Sequence[Any], count: int) -> list[int]:
+    """First run on each different ground."""
+    if len(grounds) == 1:
+        return [0]
+    first: dict[int, int] = {}
+    for index in range(count):
+        first.setdefault(id(grounds[index]), index)
+    return list(first.values())
+
+
+@contextmanager
+def _shown(
+    progress: Callable[[int, int], None] | bool | None, count: int
+) -> Iterator[Callable[[int, int], None]]:
+    """Make a function that shows how many runs are finished."""
+    if callable(progress):
+        yield progress
+        return
+    if progress is False or (progress is None and not sys.stderr.isatty()):
+        yield lambda *_: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+    from rich.progress import TimeRemainingColumn as Remaining
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Remaining())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("simulating", total=count)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+class _Crew:
+    """Threads that take one run after the other."""
+
+    def __init__(
+        self,
+        loops: list[Loop],
+        controller_of: Callable[[int], CompiledController],
+        *,
+        recorded: bool,
+    ) -> None:
+        self._loops: list[Loop | None] = list(loops)
+        self._controller_of = controller_of
+        self._recorded = recorded
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._next = 0
+        self._done = 0
+        count = len(loops)
+        robot = loops[0].robot
+        self._count = count
+        self._runs: list[Run | None] = [None] * count
+        self._q = np.array([loop.state.q for loop in loops]).reshape(count, robot.nq)
+        self._v = np.array([loop.state.v for loop in loops]).reshape(count, robot.nv)
+        self._time = np.zeros(count)
+        self._status = [RunStatus.INTERRUPTED] * count
+        self._message = ["interrupted before it began"] * count
+        self._tally = np.zeros((count, 2), dtype=np.int64)
+        self._events = np.zeros((count, len(EventKind)), dtype=np.int64)
+        self._extreme = np.zeros((count, 4))
+        self._counters = np.zeros((count, 4), dtype=np.int64)
+
+    def work(self, threads: int, show: Callable[[int, int], None]) -> None:
+        """Simulate everything; Ctrl-C ends the runs at work and leaves the others."""
+        with ThreadPoolExecutor(threads, thread_name_prefix="heelstrike") as pool:
+            futures: set[Future[None]] = {pool.submit(self._take_runs) for _ in range(threads)}
+            try:
+                while futures:
+                    done, futures = wait(futures, timeout=0.1, return_when=FIRST_EXCEPTION)
+                    show(self._done, self._count)
+                    for future in done:
+                        future.result()
+            except KeyboardInterrupt:
+                pass
+            finally:
+                self._stop.set()
+
+    def _take_runs(self) -> None:
+        """Work of one thread, which allocates memory once for all of its runs, if they allow it."""
+        memory = fresh = shape = record = None
+        while not self._stop.is_set():
+            with self._lock:
+                index = self._next
+                self._next += 1
+            if index >= self._count:
+                return
+            loop = self._loops[index]
+            assert loop is not None
+            limits = np.isfinite(loop.robot.model.lower), np.isfinite(loop.robot.model.upper)
+            needed = len(loop.pushes), np.count_nonzero(limits)
+            if memory is None or fresh is None or shape != needed:
+                memory = allocate_memory(loop.robot, loop.pushes)
+                fresh = allocate_memory(loop.robot, loop.pushes)
+                shape = needed
+                record = None
+            else:
+                memory.become(fresh)
+                memory.pushes.become(pushes_on(loop.robot, loop.pushes))
+            record = self._simulate(index, loop, memory, record)
+            with self._lock:
+                self._done += 1
+
+    def _simulate(
+        self, index: int, loop: Loop, memory: Memory, record: Record | None
+    ) -> Record | None:
+        """Simulate one run; return its record if the next may use it."""
+        loop.keep_rows = self._recorded
+        loop.stopped = self._stop.is_set
+        loop.begin(memory, record)
+        status, message, timing = loop.advance(self._controller_of(index))
+        self._q[index] = loop.final_state.q
+        self._v[index] = loop.final_state.v
+        self._time[index] = loop.engine.time
+        self._status[index] = status
+        self._message[index] = message
+        self._tally[index] = memory.tally[[STEPS, SATURATIONS]]
+        places = [PENETRATION, COMPLEMENTARITY, CONE, NON_PENETRATION]
+        self._extreme[index] = memory.extreme[places]
+        self._counters[index] = memory.solver.counters[[SOLVES, SHORTCUTS, FALLBACKS, FAILURES]]
+        if self._recorded:
+            run = loop.result(status, message, timing)
+            self._runs[index] = run
+            kinds = [event.kind for event in run.events]
+            loop.event_counts += np.bincount(kinds, minlength=len(EventKind)).astype(np.int64)
+        self._events[index] = loop.event_counts
+        self._loops[index] = None
+        return None if self._recorded else loop.records[-1]
+
+    def batch(self, threads: int, timing: Timing) -> Batch:
+        """Return what came out."""
+        return Batch(
+            position=self._q,
+            velocity=self._v,
+            time=self._time,
+            status=tuple(self._status),
+            message=tuple(self._message),
+            steps=self._tally[:, 0].copy(),
+            saturations=self._tally[:, 1].copy(),
+            events=self._events,
+            penetration=self._extreme[:, 0].copy(),
+            complementarity=self._extreme[:, 1].copy(),
+            cone=self._extreme[:, 2].copy(),
+            non_penetration=self._extreme[:, 3].copy(),
+            solves=self._counters[:, 0].copy(),
+            shortcuts=self._counters[:, 1].copy(),
+            fallbacks=self._counters[:, 2].copy(),
+            failures=self._counters[:, 3].copy(),
+            threads=threads,
+            timing=timing,
+            _runs=tuple(self._runs) if self._recorded else None,
+        )

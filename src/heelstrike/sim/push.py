@@ -1,0 +1,200 @@
+"""Pushes: forces that somebody else applies to the robot for a while."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from heelstrike.bundle import Bundle
+from heelstrike.compilation import kernel
+from heelstrike.dynamics.kernels import point_position
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Push:
+    """A constant force on a point of a link over a window of time.
+
+    Parameters
+    ----------
+    link : str or int
+        Name of the body, or index of the link.
+    force : (2,) float
+        Force (x, z) on the robot in world axes, in N.
+    start, duration : float
+        When it begins and how long it lasts, in s.
+    point : (2,) float, optional
+        Where it acts, in the axes of the link, in m; by default at the link's centre of mass.
+
+    Raises
+    ------
+    SimulationError
+        If a number is missing or not finite, or the duration is negative.
+
+    Notes
+    -----
+    Event-driven simulation begins and ends it at the instant. Methods with a fixed step apply its
+    mean over each step, so that its impulse is exact wherever the window lies.
+
+    Examples
+    --------
+    >>> Push("trunk", force=(60.0, 0.0), start=1.0, duration=0.1)
+    Push(link='trunk', force=(60.0, 0.0), start=1.0, duration=0.1, point=None)
+    """
+
+    link: str | int
+    force: tuple[float, float] = field(kw_only=True)
+    start: float = field(kw_only=True)
+    duration: float = field(kw_only=True)
+    point: tuple[float, float] | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "force", _pair("force", self.force))
+        if self.point is not None:
+            object.__setattr__(self, "point", _pair("point", self.point))
+        for name, lowest in (("start", -np.inf), ("duration", 0.0)):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= lowest):
+                least = " ≥ 0" if lowest == 0.0 else ""
+                raise SimulationError(
+                    f"the {name} of a push must be a finite number{least}, got {value}"
+                )
+
+    @property
+    def end(self) -> float:
+        """When it ends, in s."""
+        return self.start + self.duration
+
+    def place(self, robot: Robot) -> tuple[int, tuple[float, float]]:
+        """Link of `robot` on which it acts, and the point in the axes of that link.
+
+        Raises
+        ------
+        SimulationError
+            If the robot has no such link.
+        """
+        if isinstance(self.link, str):
+            # A body with several joints is a chain of links: the last one carries its mass.
+            named = [i for i, name in enumerate(robot.link_names) if name == self.link]
+            if not named:
+                raise SimulationError(
+                    f"a push acts on link {self.link!r}, which robot {robot.name!r} does not have; "
+                    f"its links are {', '.join(dict.fromkeys(robot.link_names))}"
+                )
+            index = named[-1]
+        else:
+            index = int(self.link)
+            if not 0 <= index < robot.nv:
+                raise SimulationError(
+                    f"a push acts on link {index}, but robot {robot.name!r} has links 0 to "
+                    f"{robot.nv - 1}"
+                )
+        if self.point is not None:
+            return index, self.point
+        x, z = robot.model.center_of_mass[index]
+        return index, (float(x), float(z))
+
+    def time_within(self, begin: Floats, end: Floats) -> Floats:
+        """Seconds that it acts within each of the intervals from `begin` to `end`."""
+        return np.maximum(np.minimum(end, self.end) - np.maximum(begin, self.start), 0.0)
+
+
+def _pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+    try:
+        x, z = (float(number) for number in value)
+    except (TypeError, ValueError):
+        raise SimulationError(
+            f"the {name} of a push must be two numbers (x, z), got {value!r}"
+        ) from None
+    if not (np.isfinite(x) and np.isfinite(z)):
+        raise SimulationError(f"the {name} of a push must be finite, got {value!r}")
+    return x, z
+
+
+class Pushes(Bundle):
+    """The pushes of a simulation as the kernels see them.
+
+    Attributes
+    ----------
+    link : (np,) int
+    point, position, force : (np, 2) float
+        Points in the axes of their links and, scratch, in the world; forces in world axes.
+    start, end : (np,) float
+    share : (np,) float
+        How much of each push acts in the step being computed, 0 to 1.
+    """
+
+    link: Integers
+    point: Floats
+    position: Floats
+    force: Floats
+    start: Floats
+    end: Floats
+    share: Floats
+
+
+def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:
+    """Return the arrays of some pushes on a robot."""
+    places = [push.place(robot) for push in pushes]
+    return Pushes(
+        link=np.array([link for link, _ in places], dtype=np.int64),
+        point=np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
+        position=np.zeros((len(places), 2)),
+        force=np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
+        start=np.array([push.start for push in pushes], dtype=np.float64),
+        end=np.array([push.end for push in pushes], dtype=np.float64),
+        share=np.zeros(len(places)),
+    )
+
+
+@kernel
+def share_over_step(pushes: Pushes, time: float, step: float) -> bool:
+    """Find how much of each push acts in the step from `time` on; return whether any does."""
+    any_acts = False
+    for i in range(pushes.link.shape[0]):
+        acting = min(time + step, pushes.end[i]) - max(time, pushes.start[i])
+        pushes.share[i] = max(acting, 0.0) / step
+        any_acts = any_acts or acting > 0.0
+    return any_acts
+
+
+@kernel
+def switch_at(pushes: Pushes, time: float) -> tuple[bool, float]:
+    """Let the pushes act that do so from `time` on.
+
+    Returns whether anything changed, and when it next will.
+    """
+    changed = False
+    following = np.inf
+    for i in range(pushes.link.shape[0]):
+        acts = 1.0 if pushes.start[i] <= time and time < pushes.end[i] else 0.0
+        changed = changed or acts != pushes.share[i]
+        pushes.share[i] = acts
+        if pushes.start[i] > time:
+            following = min(following, pushes.start[i])
+        if pushes.end[i] > time:
+            following = min(following, pushes.end[i])
+    return changed, following
+
+
+@kernel
+def add_pushes(model: Model, tree: Workspace, pushes: Pushes, force: Floats) -> None:
+    """Add the generalised force Jᵀf of the pushes to `force`."""
+    for i in range(pushes.link.shape[0]):
+        if pushes.share[i] > 0.0:
+            j = pushes.link[i]
+            fx = pushes.share[i] * pushes.force[i, 0]
+            fz = pushes.share[i] * pushes.force[i, 1]
+            position = pushes.position[i]
+            point_position(tree, j, pushes.point[i], position)
+            x = position[0] - tree.pivot[0]
+            z = position[1] - tree.pivot[1]
+            while j >= 0:
+                force[j] += fx * (tree.motion[j, 1] + tree.motion[j, 0] * z)
+                force[j] += fz * (tree.motion[j, 2] - tree.motion[j, 0] * x)
+                j = model.parent[j]
