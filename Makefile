@@ -8,6 +8,7 @@
 #   make clean   forget everything that was built or installed
 
 PYTHON ?= python3
+WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
@@ -22,7 +23,7 @@ walk: $(VENV)/installed
 	$(BIN)/heelstrike walk --out walk
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest
+	$(BIN)/pytest -n $(WORKERS) --dist loadfile
 
 bench: $(VENV)/installed
 	$(BIN)/heelstrike bench --out bench
