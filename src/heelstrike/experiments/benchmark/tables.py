@@ -111,7 +111,7 @@ def _threads(part: dict[str, Any]) -> Iterator[Table]:
 def _scaling(part: dict[str, Any]) -> Iterator[Table]:
     for name, title in (
         ("joints", "µs a step of a chain of hinges"),
-        ("contacts", "µs a step of a sled on many points"),
+        ("contacts", "µs a step of a plank on many points"),
     ):
         table = _table(title, name, "heelstrike", "MuJoCo Euler")
         for row in part[name]:
