@@ -2,17 +2,19 @@
 #
 #   make walk    bravo7 designs a gait and walks it; results in walk/
 #   make test    all tests
+#   make bench   speed beside other engines; table, JSON and figures in bench/
 #   make check   formatting, lint, types, layers
 #   make docs    the documentation site, in site/
 #   make clean   forget everything that was built or installed
 
 PYTHON ?= python3
+WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help walk test check docs clean
+.PHONY: help walk test bench check docs clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -21,7 +23,10 @@ walk: $(VENV)/installed
 	$(BIN)/heelstrike walk --out walk
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest
+	$(BIN)/pytest -n $(WORKERS) --dist loadfile
+
+bench: $(VENV)/installed
+	$(BIN)/heelstrike bench --out bench
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff format --check .
@@ -34,7 +39,7 @@ docs: $(VENV)/installed-docs
 
 clean:
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
-	rm -rf build dist site walk paper
+	rm -rf build dist site walk paper bench
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # One environment for all targets. Each stamp says what has been installed into it; a later

@@ -71,9 +71,15 @@ def mjcf_truth(text: str, names: tuple[str, ...], q: np.ndarray) -> Truth:
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     data.qpos[:] = q
-    mujoco.mj_forward(model, data)
+    # Not mj_forward: it would complain of singular matrices into a file in the work directory.
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_makeM(model, data)
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
+    gravity = np.zeros(model.nv)
+    mujoco.mj_comVel(model, data)
+    mujoco.mj_rne(model, data, 0, gravity)
     torque = np.zeros((model.nv, 2))
     for actuator in range(model.nu):
         limits = model.actuator_ctrlrange[actuator] * model.actuator_gear[actuator, 0]
@@ -104,7 +110,7 @@ def mjcf_truth(text: str, names: tuple[str, ...], q: np.ndarray) -> Truth:
         points += [(*(place + end * along)[::2], radius) for end in ends]
     result = {
         "mass matrix": mass,
-        "gravity": data.qfrc_bias.copy(),
+        "gravity": gravity,
         "damping": model.dof_damping,
         "dry friction": model.dof_frictionloss,
         "stiffness": model.jnt_stiffness,

@@ -17,7 +17,7 @@ from numba.core.types.functions import BaseFunction
 import heelstrike
 from heelstrike import compilation
 from heelstrike.compilation import compiled_for, kernel, uncompiled
-from heelstrike.quick_typing import remembered_typings
+from heelstrike.quick_compiling import quick_compiling
 
 SOURCE = Path(heelstrike.__file__).parent
 
@@ -100,10 +100,10 @@ def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:
     before = BaseFunction.get_call_type
 
     def enter() -> None:
-        with remembered_typings():
+        with quick_compiling():
             pass
 
-    with remembered_typings():
+    with quick_compiling():
         other = threading.Thread(target=enter)
         other.start()
         other.join(0.1)

@@ -19,7 +19,7 @@ from numba import njit
 from numba.core.caching import FunctionCache
 
 from heelstrike.linking import InnerKernelCompiler
-from heelstrike.quick_typing import remembered_typings
+from heelstrike.quick_compiling import quick_compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -87,6 +87,7 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]) -> None:
         update_wrapper(self, function)
         self.py_func = function
+        self._called = False
         options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
         self._part = njit(**options, pipeline_class=InnerKernelCompiler)(function)
 
@@ -97,7 +98,12 @@ class Kernel:
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
-        return self._callable(*arguments)
+        if self._called:
+            return self._callable(*arguments)
+        with quick_compiling():
+            result = self._callable(*arguments)
+        self._called = True
+        return result
 
     @cached_property
     def _callable(self) -> Any:
@@ -128,7 +134,7 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     """
     options = _OPTIONS | {"no_cfunc_wrapper": not address}
     compiled = _kept_on_disk(njit(**options)(function))
-    with remembered_typings():
+    with quick_compiling():
         compiled.compile(signature)
     compiled.disable_compile()
     result: Function = compiled

@@ -14,6 +14,7 @@ from heelstrike.robot import (
     FindingKind,
     Inspection,
     RobotBuilder,
+    RobotWarning,
     builtin_robots,
     human,
     inspect_robot,
@@ -146,6 +147,21 @@ def test_an_inertia_that_violates_the_triangle_inequality(tmp_path: Path) -> Non
     assert inspection.robot is not None
     assert not inspection.loadable
     assert "refuses this file" in inspection.text()
+
+
+def test_a_file_that_asks_for_other_inertias(tmp_path: Path) -> None:
+    """MuJoCo replaces 1, 3, 1 by their mean, 5/3: the file wants it so, but it is not silent."""
+    text = SOUND.replace('diaginertia="1 1 1"', 'diaginertia="1 3 1"')
+    text = text.replace("<compiler", '<compiler balanceinertia="true"')
+    path = tmp_path / "biped.xml"
+    inspection = look(path, text)
+    assert inspection.loadable
+    assert FindingKind.INERTIA in {one.kind for one in inspection.findings}
+    with pytest.warns(RobotWarning, match="inertias of trunk violate the triangle inequality"):
+        robot = load_robot(path)
+    assert robot.model.inertia[2] == pytest.approx(5.0 / 3.0)
+    sound = SOUND.replace("<compiler", '<compiler balanceinertia="true"')
+    assert look(path, sound).sound
 
 
 def test_a_tensor_that_violates_the_triangle_inequality(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import CompiledController, Contacts, RunStatus, controller_kernel
 from heelstrike.sim import batch as batch_module
 from heelstrike.sim.engine import Engine, Method, Setting
+from heelstrike.sim.status import EventKind
 
 ROWS = ("time", "position", "velocity", "torque", "contact_force", "gap", "slip_velocity")
 RUNS = 8
@@ -116,7 +117,7 @@ def test_one_entry_serves_all_runs() -> None:
     assert len(batch) == 4
     assert np.all(batch.completed)
     assert batch.position.shape == (4, 9)
-    assert batch.events.shape == (4, 10)
+    assert batch.events.shape == (4, len(EventKind))
     for speed, position in zip(speeds, batch.position, strict=True):
         run = hs.simulate(
             walking.bravo7(), controller(), state=hs.State(start.q, speed), duration=0.3

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -14,8 +13,7 @@ from synthetic_runs import make_run, pendulum
 
 import heelstrike as hs
 from heelstrike.view import ViewError, animate
-from heelstrike.view.film import Film, frames
-from heelstrike.view.style import styled
+from heelstrike.view.film import frames
 
 # 8-bit red, green, blue of what is drawn.
 LEFT_LEG = (213, 94, 0)
@@ -72,19 +70,6 @@ def test_gif(tmp_path: Path) -> None:
 def test_slow_motion_has_more_frames(tmp_path: Path) -> None:
     path = animate(walking.walk(steps=1), tmp_path / "slow.mp4", speed=0.5, size=(320, 180))
     assert imageio_ffmpeg.count_frames_and_secs(str(path))[0] == 43
-
-
-def test_drawing_is_fast() -> None:
-    """14 s of walking at 30 frames a second in a few seconds: under 20 ms a frame."""
-    with styled():
-        film = Film(walking.walk(steps=2), (960, 540), 30.0, 1.0)
-        film.draw(0)
-        cost = []
-        for index in range(len(film)):
-            start = time.perf_counter()
-            film.draw(index)
-            cost.append(time.perf_counter() - start)
-    assert np.median(cost) < 0.02
 
 
 def test_frames_carry_the_impulses_between_them() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import llvmlite.binding as llvm
 from llvmlite import ir
+from numba import config
 
 from heelstrike.compilation import cache_directory, source_fingerprint
 
@@ -27,9 +28,19 @@ _loading = threading.Lock()
 
 def can_fuse() -> bool:
     """Whether this processor multiplies and adds in one instruction."""
-    return llvm.get_process_triple().startswith(("aarch64", "arm64")) or bool(
-        llvm.get_host_cpu_features().get("fma", False)
+    return llvm.get_process_triple().startswith(("aarch64", "arm64")) or "+fma" in (
+        _processor()[1].split(",")
     )
+
+
+def _processor() -> tuple[str, str]:
+    """Name and features of the processor to compile for, as Numba has them."""
+    settings: Any = config
+    name = settings.CPU_NAME or llvm.get_host_cpu_name()
+    features = settings.CPU_FEATURES
+    if features is None:
+        features = "" if settings.CPU_NAME else llvm.get_host_cpu_features().flatten()
+    return name, features
 
 
 def addresses(
@@ -56,11 +67,9 @@ def addresses(
 def _engine(key: str, write: Callable[[], ir.Module]) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
+    cpu, features = _processor()
     machine = llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(),
-        features=llvm.get_host_cpu_features().flatten(),
-        opt=_OPTIMISATION,
-        jit=True,
+        cpu=cpu, features=features, opt=_OPTIMISATION, jit=True
     )
     code = _read(key)
     if code is None:
@@ -87,8 +96,7 @@ def _key(described: bytes) -> str:
     digest = hashlib.sha256(described)
     for part in (
         source_fingerprint(),
-        llvm.get_host_cpu_name(),
-        llvm.get_host_cpu_features().flatten(),
+        *_processor(),
         str(llvm.llvm_version_info),
     ):
         digest.update(b"\0" + part.encode())

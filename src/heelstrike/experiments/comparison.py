@@ -47,9 +47,10 @@ class Difference:
     status : str
         How its run ended.
     touchdowns : int
-        Touchdowns of feet after the start.
+        Touchdowns of feet after the start; more than steps if a foot chatters.
     touchdown_s : float
-        Largest difference of a touchdown's time, in s.
+        Largest difference in time, in s, between a touchdown of the reference and the nearest of
+        the same foot.
     impulse_Ns : float
         Largest difference of the normal impulse of a landing foot, added up over `LANDING`.
     zmp_m : float
@@ -227,15 +228,14 @@ def _named(methods: Sequence[Method] | Mapping[str, Method]) -> dict[str, Method
 
 def _difference(name: str, run: Run, reference: Run) -> Difference:
     ours, theirs = _landings(run), _landings(reference)
-    shared = min(len(ours), len(theirs))
-    landing = ours[:shared] - theirs[:shared]
+    landing = _nearest(ours, theirs[theirs[:, 1] <= run.time[-1]])
     _, series = _against(run, reference)
     return Difference(
         method=name,
         status=run.status.value,
         touchdowns=len(ours),
-        touchdown_s=_largest(landing[:, 0]),
-        impulse_Ns=_largest(landing[:, 1]),
+        touchdown_s=_largest(landing[:, 1]),
+        impulse_Ns=_largest(landing[:, 2]),
         zmp_m=_root_mean_square(series["zmp"]),
         energy_J=_root_mean_square(series["energy"]),
         position=float(series["position"][-1]) if len(series["position"]) else math.nan,
@@ -247,14 +247,28 @@ def _difference(name: str, run: Run, reference: Run) -> Difference:
 
 
 def _landings(run: Run) -> Floats:
-    """Time and normal impulse of every landing of a foot, (n, 2)."""
+    """Foot, time and normal impulse of every landing, (n, 3)."""
     found = []
     for stance in stances(run):
         if stance.touchdown == run.time[0]:
             continue
         contacts = list(run.robot.feet[stance.foot].contacts)
-        found.append((stance.touchdown, _landing_impulse(run, contacts, stance.touchdown)))
-    return np.array(found, dtype=np.float64).reshape(-1, 2)
+        impulse = _landing_impulse(run, contacts, stance.touchdown)
+        found.append((stance.foot, stance.touchdown, impulse))
+    return np.array(found, dtype=np.float64).reshape(-1, 3)
+
+
+def _nearest(ours: Floats, theirs: Floats) -> Floats:
+    """Differences of the landings of a foot that are nearest in time to those of the reference.
+
+    A foot that chatters lands more often than it should.
+    """
+    found = []
+    for landing in theirs:
+        same = ours[ours[:, 0] == landing[0]]
+        if len(same):
+            found.append(same[np.argmin(np.abs(same[:, 1] - landing[1]))] - landing)
+    return np.array(found, dtype=np.float64).reshape(-1, 3)
 
 
 def _landing_impulse(run: Run, contacts: list[int], touchdown: float) -> float:

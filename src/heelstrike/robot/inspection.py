@@ -18,7 +18,7 @@ from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.mjcf import read_mjcf
 from heelstrike.robot.model import Floats
-from heelstrike.robot.plausibility import Unlikely, unlikely_numbers
+from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.saving import body_links
 from heelstrike.robot.screening import is_readable
@@ -187,11 +187,8 @@ def _of_inertias(path: Path) -> Iterator[Finding]:
     for name, mass, tensor in parsed_bodies(path):
         if not mass >= MASSLESS:
             yield Finding(FindingKind.MASS, f"body {name!r} has the mass {mass:g} kg.")
-        if not np.all(np.isfinite(tensor)):
-            continue
-        moments = np.linalg.eigvalsh(tensor)
-        if moments[0] < 0.0 or moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):
-            given = ", ".join(f"{moment:.4g}" for moment in moments)
+        if np.all(np.isfinite(tensor)) and not is_possible(tensor):
+            given = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(tensor))
             yield Finding(
                 FindingKind.INERTIA,
                 f"body {name!r} has the principal moments {given} kg m². No body has: none is "

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.flattening import float_in_plane, project
+from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.screening import screen
 from heelstrike.robot.urdf import let_massless_links_pass, prepare_urdf, urdf_text
 from heelstrike.robot.urdf_check import check_urdf
@@ -132,6 +133,8 @@ def parse(
         raise _unreadable(label, error) from error
     for remark in remarks:
         warn(f"{label}: {remark}")
+    if not lenient:
+        _warn_of_mended_inertias(source, xml, label)
     return MujocoFile(model, pose, xml, label)
 
 
@@ -155,6 +158,10 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
             spec = _parsed(path, xml, label)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
+    return _stated(spec)
+
+
+def _stated(spec: Any) -> list[tuple[str, float, NDArray[np.float64]]]:
     result = []
     for body in spec.bodies:
         if not body.explicitinertial or body.id == 0:
@@ -167,6 +174,21 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
             tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         result.append((body.name, float(body.mass), tensor))
     return result
+
+
+def _warn_of_mended_inertias(source: Path | str, xml: Element, label: str) -> None:
+    """Warn of inertias that MuJoCo changed because the file says ``balanceinertia="true"``."""
+    if not any(compiler.get("balanceinertia") == "true" for compiler in xml.iter("compiler")):
+        return
+    with _warnings_into([]), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        stated = _stated(_parsed(source, xml, label))
+    mended = [name for name, _, tensor in stated if not is_possible(tensor)]
+    if mended:
+        warn(
+            f"{label}: the inertias of {', '.join(mended)} violate the triangle inequality, and "
+            'balanceinertia="true" in the file lets MuJoCo replace them by others.'
+        )
 
 
 def _unreadable(label: str, error: Exception) -> RobotError:

@@ -31,6 +31,14 @@ class Unlikely(enum.Enum):
     UNIT = "unit"
 
 
+def is_possible(tensor: Floats) -> bool:
+    """Whether a body can have a tensor of inertia (3, 3): no principal moment is more than two."""
+    if not np.all(np.isfinite(tensor)):
+        return False
+    moments = np.linalg.eigvalsh(tensor)
+    return bool(moments[0] >= 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - 1e-9))
+
+
 def unlikely_numbers(
     model: Model, origin: Floats, joint_names: Sequence[str], link_names: Sequence[str]
 ) -> Iterator[tuple[Unlikely, str]]:

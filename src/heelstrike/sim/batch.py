@@ -64,7 +64,7 @@ class Batch:
         The same in a person's words.
     steps, saturations : (n,) int
         Steps taken; times that a torque was clipped to its limit.
-    events : (n, 10) int
+    events : (n, kinds) int
         Events of each kind, in the order of :class:`~heelstrike.sim.status.EventKind`.
     penetration : (n,) float
         Deepest penetration of a contact point, in m.

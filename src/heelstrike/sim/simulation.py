@@ -418,6 +418,9 @@ class Loop:
             return RunStatus.FELL, (
                 f"the robot fell at {now}: its centre of mass is below half its first height"
             )
+        reason = getattr(self.engine, "reason", "")
+        if code == DIVERGED and reason:
+            return RunStatus.DIVERGED, f"the simulation could not go on at {now}: {reason}"
         if code == DIVERGED:
             return RunStatus.DIVERGED, (
                 f"the state stopped being finite at {now}; try a smaller step or softer gains"

@@ -1,0 +1,225 @@
+"""Instructions a step, counted by callgrind: the noise-free companion of the times.
+
+The compiled loops of three scenarios run under valgrind, and what they execute is counted: the same
+number each time for the same code, compiler and step, whatever else the machine does. Kernels are
+compiled for Haswell, since valgrind knows no AVX-512.
+
+Counts are kept in benchmarks/instructions.json. A count that grew by more than 2 % fails the run;
+whoever means it writes the new counts down with --update and commits them.
+
+Needs valgrind and a C compiler. Run: python benchmarks/instructions.py [--update]
+"""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+KEPT = Path(__file__).with_name("instructions.json")
+TOLERANCE = 0.02
+STEP = 1e-3
+
+# What valgrind 3.19 can run.
+TARGET = {
+    "NUMBA_CPU_NAME": "haswell",
+    "NUMBA_CPU_FEATURES": "+64bit,+avx,+avx2,+bmi,+bmi2,+cmov,+cx16,+cx8,+f16c,+fma,+fxsr,+lzcnt,"
+    "+mmx,+movbe,+popcnt,+sse,+sse2,+sse3,+sse4.1,+sse4.2,+ssse3,+xsave",
+    # Python and the C library spread their hash tables and addresses; the loops do not care.
+    "PYTHONHASHSEED": "0",
+}
+
+SWITCH = """
+#include <valgrind/callgrind.h>
+void begin(void) { CALLGRIND_START_INSTRUMENTATION; CALLGRIND_ZERO_STATS; }
+void end(const char *name) { CALLGRIND_DUMP_STATS_AT(name); CALLGRIND_STOP_INSTRUMENTATION; }
+"""
+
+
+def scenarios() -> dict[str, Any]:
+    """Scenarios by name: what to simulate, steps to let pass, and steps to count."""
+    from heelstrike.experiments.benchmark.scenarios import falling, standing, walking
+
+    walk = walking()
+    assert walk.own is not None
+    return {
+        "standing, knees straight": (standing("bravo7", bent=False), 100, 500),
+        "standing, knees bent": (standing("bravo7"), 100, 500),
+        "standing, walker2d": (standing("walker2d"), 100, 500),
+        "walking, computed torque": (replace(walk, feedback=walk.own), 0, 1000),
+        "falling": (falling("bravo7"), 0, 400),
+    }
+
+
+def prepare(folder: Path) -> None:
+    """Write down what the counted process needs, and compile everything it will run."""
+    for number, (name, (scenario, first, count)) in enumerate(scenarios().items()):
+        compiled = None if scenario.feedback is None else scenario.feedback.compiled()
+        np.savez(
+            folder / f"scenario{number}.npz",
+            name=name,
+            robot=scenario.robot.name,
+            kernel="" if compiled is None else compiled.kernel.__name__,
+            q=scenario.state.q,
+            v=scenario.state.v,
+            parameters=np.zeros(0) if compiled is None else compiled.parameters,
+            memory=np.zeros(0) if compiled is None else compiled.memory,
+            first=first,
+            count=count,
+        )
+
+
+def count(folder: Path, switch: Any) -> None:
+    """Run the scenarios, counting (or, without a switch, only compiling)."""
+    from heelstrike import Ground, State, load_robot
+    from heelstrike.experiments.benchmark.scenarios import FRICTION
+    from heelstrike.sim import CompiledController
+    from heelstrike.sim.engine import PAUSED
+    from heelstrike.sim.simulation import compiled_form, prepared
+
+    for file in sorted(folder.glob("scenario*.npz")):
+        given = np.load(file)
+        robot = load_robot(str(given["robot"]))
+        name = str(given["kernel"])
+        controller = compiled_form(robot, None)
+        if name:
+            module = "computed_torque" if name == "computed_torque" else "joint_feedback"
+            kernel = getattr(__import__(f"heelstrike.control.{module}", fromlist=[name]), name)
+            controller = CompiledController(kernel, given["parameters"], given["memory"])
+        assert controller is not None
+        loop = prepared(
+            robot=robot,
+            state=State(given["q"], given["v"]),
+            duration=10.0,
+            method=None,
+            ground=Ground(friction=FRICTION),
+            control_period=None,
+            record_every=2**62,
+            stop_when_fallen=False,
+            pushes=(),
+        )
+        loop.begin()
+        parameters = np.ascontiguousarray(controller.parameters)
+        memory = controller.memory.copy()
+
+        def advance(
+            steps: int,
+            loop: Any = loop,
+            kernel: Any = controller.kernel,
+            parameters: Any = parameters,
+            memory: Any = memory,
+        ) -> None:
+            loop.engine.pause_after(steps)
+            if loop.engine.advance(kernel, parameters, memory, loop.records[-1]) != PAUSED:
+                raise RuntimeError(f"the run ended early at t = {loop.engine.time} s")
+
+        advance(int(given["first"]))
+        for label, steps in (("call", 0), ("steps", int(given["count"]))):
+            if switch is not None:
+                switch.begin()
+            advance(steps)
+            if switch is not None:
+                switch.end(f"{file.stem} {label}".encode())
+
+
+def measure() -> dict[str, float]:
+    """Instructions a step of every scenario."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None or shutil.which("valgrind") is None:
+        sys.exit("instructions are counted by valgrind with a switch in C: install both")
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "switch.c").write_text(SWITCH)
+        library = folder / "switch.so"
+        subprocess.run(
+            [compiler, "-shared", "-fPIC", "-O1", "-o", library, folder / "switch.c"], check=True
+        )
+        environment = os.environ | TARGET
+        child = [sys.executable, __file__, "--child", name]
+        subprocess.run([*child, "--prepare"], env=environment, check=True)
+        subprocess.run(
+            [
+                "valgrind",
+                "--tool=callgrind",
+                "--instr-atstart=no",
+                "--smc-check=all-non-file",
+                f"--callgrind-out-file={name}/counts",
+                *child,
+            ],
+            env=environment,
+            check=True,
+            stderr=subprocess.DEVNULL,
+        )
+        totals = {}
+        for file in folder.glob("counts*"):
+            text = file.read_text(errors="replace")
+            said = re.search(r"Client Request: (\S+) (\w+)", text)
+            total = re.search(r"^(?:totals|summary): (\d+)", text, re.MULTILINE)
+            if said and total:
+                totals[said.group(1), said.group(2)] = int(total.group(1))
+        result = {}
+        for file in sorted(folder.glob("scenario*.npz")):
+            given = np.load(file)
+            extra = totals[file.stem, "steps"] - totals[file.stem, "call"]
+            result[str(given["name"])] = round(extra / int(given["count"]), 1)
+        return result
+
+
+def compare(found: dict[str, float], kept: dict[str, Any]) -> list[str]:
+    """Names of the scenarios that take more instructions than they did; print all."""
+    worse = []
+    print(f"{'':28s} {'kept':>10s} {'now':>10s} {'change':>9s}")
+    for name, number in found.items():
+        before = kept.get("instructions_a_step", {}).get(name)
+        change = "" if before is None else f"{100.0 * (number / before - 1.0):+8.2f}%"
+        was = "–" if before is None else f"{before:10.1f}"
+        print(f"{name:28s} {was:>10s} {number:10.1f} {change:>9s}")
+        if before is not None and number > (1.0 + TOLERANCE) * before:
+            worse.append(name)
+    return worse
+
+
+def main() -> None:
+    """Count, compare, and keep if asked to."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--update", action="store_true", help="keep the counts of this run")
+    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
+    parser.add_argument("--prepare", action="store_true", help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child is not None:
+        if options.prepare:
+            prepare(options.child)
+            count(options.child, None)
+        else:
+            count(options.child, ctypes.CDLL(str(options.child / "switch.so")))
+        return
+    kept = json.loads(KEPT.read_text()) if KEPT.exists() else {}
+    found = measure()
+    worse = compare(found, kept)
+    if options.update:
+        versions = {name: version(name) for name in ("numba", "llvmlite", "numpy")}
+        content = {
+            "step_s": STEP,
+            "target": TARGET["NUMBA_CPU_NAME"],
+            "versions": versions,
+            "instructions_a_step": found,
+        }
+        KEPT.write_text(json.dumps(content, indent=2) + "\n")
+    elif worse:
+        sys.exit(f"more than {100 * TOLERANCE:g} % more instructions: {', '.join(worse)}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""The results as figures."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from heelstrike.view.style import (
+    BLUE,
+    BOUND,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    new_figure,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+OURS, THEIRS = BLUE, VERMILION
+
+
+def draw(parts: dict[str, Any]) -> dict[str, Figure]:
+    """Figures of the parts that were measured, by name."""
+    with styled():
+        return {
+            f"benchmark_{name}": make(parts[name])
+            for name, make in _MAKERS.items()
+            if name in parts
+        }
+
+
+def _steps(part: dict[str, Any]) -> Figure:
+    rows = [row for row in part["rows"] if "heelstrike_us" in row]
+    figure = new_figure(7.0, 0.9 + 0.62 * len(rows))
+    axes = figure.add_subplot()
+    place = np.arange(len(rows))[::-1]
+    axes.barh(
+        place + 0.19, [r["heelstrike_us"] for r in rows], 0.36, color=OURS, label="heelstrike"
+    )
+    if any("mujoco_us" in row for row in rows):
+        theirs = [row.get("mujoco_us", 0.0) for row in rows]
+        axes.barh(
+            place - 0.19, theirs, 0.36, color=THEIRS, hatch="///", edgecolor="white", label="MuJoCo"
+        )
+    for y, row in zip(place, rows, strict=True):
+        if "times_faster" in row:
+            axes.annotate(
+                f"{row['times_faster']:.1f} ×",
+                (row["heelstrike_us"], y + 0.19),
+                xytext=(4, 0),
+                textcoords="offset points",
+                va="center",
+                color=INK,
+            )
+    axes.set_yticks(place, [row["scenario"] for row in rows])
+    axes.grid(False, axis="y")
+    axes.set_xlabel("time to compute a step of 1 ms (µs)")
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    return figure
+
+
+_MARKS = (
+    (BLUE, "o", "-"),
+    (GREEN, "s", "-"),
+    (SKY, "D", "-"),
+    (PURPLE, "v", "-"),
+    (ORANGE, "^", "-"),
+)
+_PEER_MARKS = ("o", "s", "D", "v", "^", "P")
+
+
+def _precision(part: dict[str, Any]) -> Figure:
+    figure = new_figure(8.0, 5.0)
+    axes = figure.add_subplot()
+    names = list(dict.fromkeys(point["series"] for point in part["points"]))
+    own, others = 0, 0
+    for name in names:
+        points = sorted(
+            (p for p in part["points"] if p["series"] == name), key=lambda p: p["seconds"]
+        )
+        seconds, error = zip(*((p["seconds"], p["error_rad"]) for p in points), strict=True)
+        if name.startswith("MuJoCo"):
+            color, mark, line = THEIRS, _PEER_MARKS[others % 6], "--"
+            if "default" in name:
+                color = GREY
+            others += 1
+        else:
+            color, mark, line = _MARKS[own % 5]
+            own += 1
+        axes.loglog(seconds, error, color=color, marker=mark, linestyle=line, ms=5, label=name)
+    axes.axhline(part["goal_rad"], **BOUND)
+    axes.annotate(
+        f"{part['goal_rad']:g} rad",
+        (1.0, part["goal_rad"]),
+        xycoords=("axes fraction", "data"),
+        xytext=(-2, 3),
+        textcoords="offset points",
+        ha="right",
+    )
+    axes.set_xlabel(f"computing time for {part['duration_s']:g} s of walking (s)")
+    axes.set_ylabel("largest error of a joint's last position (rad)")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
+    return figure
+
+
+def _threads(part: dict[str, Any]) -> Figure:
+    figure = new_figure(5.0, 3.6)
+    axes = figure.add_subplot()
+    for rows, label, color, mark in (
+        (part["rows"], "heelstrike", OURS, "o"),
+        (part.get("mujoco", []), "MuJoCo", THEIRS, "s"),
+    ):
+        if rows:
+            number = [row["threads"] for row in rows]
+            rate = [row["steps_per_s"] / 1e6 for row in rows]
+            axes.plot(number, rate, color=color, marker=mark, label=label)
+            axes.plot(
+                number, [rate[0] * n / number[0] for n in number], color=color, ls=":", lw=1.0
+            )
+    axes.set_xticks([row["threads"] for row in part["rows"]])
+    axes.set_ylim(0.0)
+    axes.set_xlabel("threads (dotted: in proportion)")
+    axes.set_ylabel("walking steps of 1 ms computed a second (10⁶/s)")
+    axes.legend()
+    return figure
+
+
+def _scaling(part: dict[str, Any]) -> Figure:
+    figure = new_figure(8.0, 3.8)
+    left, right = figure.subplots(1, 2)
+    for axes, name, label in (
+        (left, "joints", "hinges of a chain without contact"),
+        (right, "contacts", "contact points under a sled"),
+    ):
+        size = np.array([row["size"] for row in part[name]])
+        for key, engine, color, mark in (
+            ("heelstrike_us", "heelstrike", OURS, "o"),
+            ("mujoco_us", "MuJoCo Euler", THEIRS, "s"),
+        ):
+            if key in part[name][0]:
+                axes.plot(
+                    size, [r[key] for r in part[name]], color=color, marker=mark, label=engine
+                )
+        if name == "joints":
+            axes.set_xscale("log")
+        else:
+            axes.set_xscale("symlog", linthresh=1.0)
+        axes.set_yscale("log")
+        axes.set_xticks(size, [str(n) for n in size])
+        axes.minorticks_off()
+        axes.set_xlabel(label)
+        axes.set_ylabel("time to compute a step (µs)")
+        axes.legend(loc="upper left")
+    return figure
+
+
+_MAKERS = {
+    "steps": _steps,
+    "precision": _precision,
+    "threads": _threads,
+    "scaling": _scaling,
+}

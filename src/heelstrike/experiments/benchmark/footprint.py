@@ -1,0 +1,91 @@
+"""What it takes to begin: import, compiling, memory; each in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+IMPORT = """
+import json, time
+begin = time.perf_counter()
+import heelstrike
+print(json.dumps({"seconds": time.perf_counter() - begin}))
+"""
+
+FIRST_STEP = """
+import json, time
+begin = time.perf_counter()
+import heelstrike as hs
+robot = hs.load_robot("bravo7")
+gait = hs.load_gait(GAIT, robot)
+run = hs.simulate(robot, hs.ComputedTorque(robot, gait), state=gait.initial_state, duration=0.001)
+assert run.completed
+print(json.dumps({"seconds": time.perf_counter() - begin}))
+"""
+
+MEMORY = """
+import json, resource
+import heelstrike as hs
+robot = hs.load_robot("bravo7")
+gait = hs.load_gait(GAIT, robot)
+control = hs.ComputedTorque(robot, gait)
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+def walk(duration, every):
+    return hs.simulate(robot, control, state=gait.initial_state, duration=duration,
+                       record_every=every)
+walk(SHORT, 1000)
+before = peak()
+run = walk(LONG, 1000 * round(LONG / SHORT))
+print(json.dumps({"before_MiB": before, "after_MiB": peak(), "status": run.status.value,
+                  "steps": run.steps, "rows": len(run.time)}))
+"""
+
+
+def measure_footprint(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: ARG001
+    """Seconds to import and to the first step, with and without compiled code; memory in MiB."""
+    from heelstrike.experiments.benchmark.scenarios import walk_gait
+
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "gait.json"
+        walk_gait()[1].save(file)
+        names = {"GAIT": repr(str(file))}
+        result: dict[str, Any] = {
+            "import_s": _best(IMPORT, {}, 3 if quick else 7)["seconds"],
+            "warm_first_step_s": _best(FIRST_STEP, names, 2 if quick else 5)["seconds"],
+        }
+        short, long = (14.0, 70.0) if quick else (60.0, 600.0)
+        memory = _run(MEMORY, names | {"SHORT": repr(short), "LONG": repr(long)})
+        memory |= {"short_s": short, "long_s": long}
+        result["memory"] = memory
+        if not quick:
+            cache = str(Path(folder) / "cache")
+            cold = _run(FIRST_STEP, names, NUMBA_CACHE_DIR=cache)
+            result["cold_first_step_s"] = cold["seconds"]
+    return result
+
+
+def _best(code: str, names: dict[str, str], times: int) -> dict[str, Any]:
+    return min((_run(code, names) for _ in range(times)), key=lambda result: result["seconds"])
+
+
+def _run(code: str, names: dict[str, str], **variables: str) -> dict[str, Any]:
+    for name, value in names.items():
+        code = code.replace(name, value)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | variables,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode != 0:
+        raise RuntimeError(f"a measurement failed:\n{done.stderr}")
+    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return result

@@ -1,0 +1,45 @@
+"""Times that mean something on a machine with other work: best of many, turn and turn about."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Mapping
+from time import perf_counter
+
+Work = Callable[[], float]
+"""Something to be timed; returns its own seconds, or what should count as such."""
+
+
+def timed(work: Callable[[], object]) -> Work:
+    """Return work that times itself."""
+
+    def timing() -> float:
+        begin = perf_counter()
+        work()
+        return perf_counter() - begin
+
+    return timing
+
+
+def best_of(works: Mapping[str, Work], *, seconds: float, least: int = 5) -> dict[str, float]:
+    """Best time of each, in turn until `seconds` are over and each ran `least` times.
+
+    Whatever else the machine does makes times longer, never shorter; taking turns lets it hit all
+    of them alike.
+    """
+    best = dict.fromkeys(works, float("inf"))
+    for work in works.values():
+        work()
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        end = perf_counter() + seconds
+        rounds = 0
+        while rounds < least or perf_counter() < end:
+            for name, work in works.items():
+                best[name] = min(best[name], work())
+            rounds += 1
+    finally:
+        if enabled:
+            gc.enable()
+    return best

@@ -1,0 +1,91 @@
+"""``heelstrike bench``: the quick form runs, its runs are valid, and it says what is missing."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from heelstrike.cli.bench import Part
+from heelstrike.cli.main import app
+from heelstrike.experiments.benchmark import PARTS
+
+
+def bench(out: Path, *parts: Part, options: tuple[str, ...] = ()) -> Any:
+    chosen = [word for part in parts for word in ("--part", part.value)]
+    return CliRunner().invoke(app, ["bench", "--quick", "--out", str(out), *chosen, *options])
+
+
+def test_the_command_knows_all_parts() -> None:
+    assert [part.value for part in Part] == list(PARTS)
+
+
+def test_every_engine_that_is_timed_stands_as_it_should(tmp_path: Path) -> None:
+    result = bench(tmp_path, Part.STEPS)
+    assert result.exit_code == 0, result.stderr
+    for word in ("heelstrike", "MuJoCo", "standing", "walking", "falling"):
+        assert word in result.stdout
+    written = json.loads((tmp_path / "benchmark.json").read_text())
+    assert (tmp_path / "benchmark_steps.png").stat().st_size > 10_000
+    rows = written["steps"]["rows"]
+    assert len(rows) == 5
+    for row in rows:
+        assert "invalid" not in row
+        assert "mujoco_invalid" not in row
+        assert row["heelstrike_check"]["complementarity"] <= 1e-9
+        assert row["heelstrike_us"] > 0.0
+        # Rows are ratios of times of one run: on any machine the exact step is the cheaper one.
+        assert row["times_faster"] > 1.0, row["scenario"]
+    for row in rows[:3]:
+        for engine in ("heelstrike", "mujoco"):
+            assert row[f"{engine}_check"]["active_contacts"] == 4.0
+            assert row[f"{engine}_check"]["weight_carried"] == pytest.approx(1.0, abs=1e-2)
+
+
+def test_json_alone_on_standard_output(tmp_path: Path) -> None:
+    result = bench(tmp_path, Part.SCALING, options=("--json",))
+    assert result.exit_code == 0, result.stderr
+    printed = json.loads(result.stdout)
+    assert printed == json.loads((tmp_path / "benchmark.json").read_text())
+    assert printed["machine"]["versions"]["numba"]
+    assert [row["size"] for row in printed["scaling"]["joints"]] == [2, 8, 30]
+
+
+def test_a_missing_engine_is_named_and_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    result = bench(tmp_path, Part.SCALING)
+    assert result.exit_code == 0, result.stderr
+    assert "not installed" in result.stderr
+    assert "mujoco" in result.stderr
+    written = json.loads((tmp_path / "benchmark.json").read_text())
+    assert written["peers"]["mujoco"] == "not installed"
+    assert all("mujoco_us" not in row for row in written["scaling"]["joints"])
+
+
+@pytest.mark.slow
+def test_the_whole_quick_form(tmp_path: Path) -> None:
+    begin = time.perf_counter()
+    result = bench(tmp_path)
+    seconds = time.perf_counter() - begin
+    assert result.exit_code == 0, result.stderr
+    written = json.loads((tmp_path / "benchmark.json").read_text())
+    for part in PARTS:
+        assert part in written
+    # A minute on a quiet machine, compiled code given: generous here, for others may be at work.
+    assert seconds < 300.0
+    precision = written["precision"]
+    assert len(precision["touchdowns_s"]) >= 2
+    assert precision["to_goal"]["heelstrike"]["error_rad"] <= 1e-4
+    assert written["threads"]["same_for_all_threads"]
+    assert written["endurance"]["failures"] == 0
+    assert written["endurance"]["unfinished"] == 0
+    assert written["endurance"]["complementarity"] <= 1e-9
+    memory = written["footprint"]["memory"]
+    assert memory["after_MiB"] - memory["before_MiB"] <= 2.0
