@@ -44,7 +44,13 @@ def source_fingerprint() -> str:
 
 
 def cache_directory() -> Path:
-    """Return the directory in which machine code is kept."""
+    """Return the directory in which machine code is kept.
+
+    Raises
+    ------
+    RuntimeError
+        If there is no place to write.
+    """
     return Path(FunctionCache(source_fingerprint.__wrapped__).cache_path)
 
 
@@ -66,6 +72,8 @@ def _kept_on_disk(compiled: Any) -> Any:
         compiled._cache = _PackageCache(compiled.py_func)
     except AttributeError:  # a Numba that keeps its books differently
         compiled.enable_caching()
+    except RuntimeError:  # typed at a prompt, or no place to write: compiled anew every time
+        pass
     return compiled
 
 
