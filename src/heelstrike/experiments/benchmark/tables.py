@@ -87,7 +87,7 @@ def _precision(part: dict[str, Any]) -> Iterator[Table]:
 
 def _threads(part: dict[str, Any]) -> Iterator[Table]:
     table = _table(
-        f"{part['runs']} walks, {part['steps']} steps, "
+        f"{part['runs']} walks of {part['duration_s']:g} s, {part['steps']} steps, "
         f"{'identical' if part['same_for_all_threads'] else 'NOT THE SAME'} on all threads",
         "threads",
         "million steps a second",
