@@ -14,8 +14,6 @@ from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
     BASIS,
-    BLOCK,
-    LOWER,
     PIVOT_ROW,
     POINT,
     REST_TOLERANCE,
@@ -85,40 +83,39 @@ def list_equations(
 def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
     """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
 
-    Elimination in the order of the rows, G = L D Lᵀ, the right-hand side as one more column. Whole
-    blocks of columns are updated at a time, since what is left of the pivot is of no more use.
-    ``squares[LOWER]`` receives L, with 1/D on its diagonal, zero for rows that depend on others.
+    Elimination in the order of the rows, A = L D Lᵀ, with 1/D on the diagonal, zero for rows that
+    depend on others.
     """
     source, matrix, x = work.labels[SOURCE], work.tableau, work.vectors[POINT]
-    lower = work.squares[LOWER]
-    blocks = size // BLOCK + 1
-    for i in range(size):
-        for j in range(size):
-            matrix[i, j] = delassus[source[i], source[j]]
-        matrix[i, size] = -free[source[i]]
     dependent = 0
-    for k in range(size):
-        diagonal = delassus[source[k], source[k]]
-        pivot = matrix[k, k]
-        inverse = 0.0
+    for i in range(size):
+        total = -free[source[i]]
+        for j in range(i):
+            entry = delassus[source[i], source[j]]
+            for k in range(j):
+                entry -= matrix[i, k] * matrix[j, k]
+            # Until row i is finished, its entries still carry their D.
+            matrix[i, j] = entry
+        pivot = delassus[source[i], source[i]]
+        diagonal = pivot
+        for j in range(i):
+            ratio = matrix[i, j] * matrix[j, j]
+            pivot -= ratio * matrix[i, j]
+            total -= ratio * x[j]
+            matrix[i, j] = ratio
+        x[i] = total
         if pivot > GOOD_PIVOT * diagonal:
-            inverse = 1.0 / pivot
+            matrix[i, i] = 1.0 / pivot
         elif abs(pivot) <= NO_PIVOT * diagonal:
+            matrix[i, i] = 0.0
             dependent += 1
         else:
             return False
-        lower[k, k] = inverse
-        x[k] = matrix[k, size] * inverse
-        for i in range(k + 1, size):
-            ratio = matrix[i, k] * inverse
-            lower[i, k] = ratio
-            for block in range(blocks):
-                for j in range(BLOCK):
-                    column = block * BLOCK + j
-                    matrix[i, column] -= ratio * matrix[k, column]
+    for i in range(size):
+        x[i] *= matrix[i, i]
     for i in range(size - 1, -1, -1):
         for j in range(i):
-            x[j] -= lower[i, j] * x[i]
+            x[j] -= matrix[i, j] * x[i]
     if dependent > 0:
         shorten(size, work)
     return True
@@ -132,11 +129,11 @@ def shorten(size: int, work: ContactWorkspace) -> None:
     orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
     counts 1/m.
     """
-    lower, x, basis = work.squares[LOWER], work.vectors[POINT], work.squares[BASIS]
+    matrix, x, basis = work.tableau, work.vectors[POINT], work.squares[BASIS]
     sharers = work.vectors[SHARERS]
     found = 0
     for row in range(size):
-        if lower[row, row] != 0.0:
+        if matrix[row, row] != 0.0:
             continue
         direction = basis[found]
         for i in range(size):
@@ -144,7 +141,7 @@ def shorten(size: int, work: ContactWorkspace) -> None:
         direction[row] = 1.0
         for i in range(row, -1, -1):
             for j in range(i):
-                direction[j] -= lower[i, j] * direction[i]
+                direction[j] -= matrix[i, j] * direction[i]
         for earlier in range(found):
             remove_part(size, basis[earlier], sharers, direction)
         remove_part(size, direction, sharers, x)

@@ -67,11 +67,7 @@ MATRIX = 0  # the scaled problem
 BASIS = 1  # free directions of the equations, one a row
 EDGES = 2  # cone edges in terms of the basis; velocities that the basis causes
 DUAL = 3  # dictionary of the least-norm split
-LOWER = 4  # factor of the sticking contacts' equations
-SQUARES = 5
-
-BLOCK = 8
-"""Columns that are worked on at a time; no matrix has fewer."""
+SQUARES = 4
 
 
 class ContactWorkspace(Bundle):
@@ -111,5 +107,5 @@ def contact_workspace(capacity: int) -> ContactWorkspace:
         labels=np.zeros((LABELS, 2 * pairs + 2), np.int64),
         vectors=vectors,
         squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
-        tableau=np.zeros((pairs, max(pairs + 2, BLOCK))),
+        tableau=np.zeros((pairs, pairs + 2)),
     )
