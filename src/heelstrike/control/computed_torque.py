@@ -207,18 +207,22 @@ def has_landed(
 def read_encoders(
     t: float, q: Floats, model: Model, parameters: Floats, memory: Floats, samples: Floats
 ) -> None:
-    """Take a sample of the rounded joint positions when one is due; the newest comes first."""
+    """Take a sample of the rounded joint positions when one is due.
+
+    Samples of all joints follow each other, the newest first.
+    """
     due = memory[SAMPLED] + parameters[ENCODER_PERIOD]
     if memory[SAMPLES] > 0.0 and t < due - 1e-6 * parameters[ENCODER_PERIOD]:
         return
     resolution = parameters[ENCODER_RESOLUTION]
-    for i in range(model.actuator_joint.shape[0]):
+    nu = model.actuator_joint.shape[0]
+    for i in range(nu):
         for k in range(SAMPLES_KEPT - 1, 0, -1):
-            samples[k, i] = samples[k - 1, i]
+            samples[k * nu + i] = samples[(k - 1) * nu + i]
         reading = q[model.actuator_joint[i]]
         if resolution > 0.0:
             reading = resolution * np.round(reading / resolution)
-        samples[0, i] = reading
+        samples[i] = reading
     memory[SAMPLED] = t
     memory[SAMPLES] = min(memory[SAMPLES] + 1.0, float(SAMPLES_KEPT))
 
@@ -226,14 +230,14 @@ def read_encoders(
 @kernel
 def estimated_velocity(samples: Floats, count: int, period: float, i: int) -> float:
     """Slope at the newest sample of the polynomial through all of them, at most a cubic."""
+    nu = samples.shape[0] // SAMPLES_KEPT
+    newest, second = samples[i], samples[nu + i]
+    third, oldest = samples[2 * nu + i], samples[3 * nu + i]
     if count >= 4:
-        rise = (
-            11.0 * samples[0, i] - 18.0 * samples[1, i] + 9.0 * samples[2, i] - 2.0 * samples[3, i]
-        )
-        return rise / (6.0 * period)
+        return (11.0 * newest - 18.0 * second + 9.0 * third - 2.0 * oldest) / (6.0 * period)
     if count == 3:
-        return (3.0 * samples[0, i] - 4.0 * samples[1, i] + samples[2, i]) / (2.0 * period)
-    return (samples[0, i] - samples[1, i]) / period
+        return (3.0 * newest - 4.0 * second + third) / (2.0 * period)
+    return (newest - second) / period
 
 
 @controller_kernel
@@ -256,7 +260,7 @@ def computed_torque(
     stiffness = parameters[HEADER : HEADER + nu]
     damping = parameters[HEADER + nu : HEADER + 2 * nu]
     place = HEADER + 2 * nu
-    coefficients = parameters[place : place + 8 * nu].reshape((2, 4, nu))
+    cubics = place  # for either stance foot four coefficients a joint
     place += 8 * nu
     a = int(parameters[place])
     b = int(parameters[place + 1])
@@ -265,20 +269,19 @@ def computed_torque(
     side = parameters[place + 5 : place + 5 + contacts.gap.shape[0]]
     # The blocks of the memory.
     place = MEMORY_HEADER
-    samples = memory[place : place + SAMPLES_KEPT * nu].reshape((SAMPLES_KEPT, nu))
+    samples = memory[place : place + SAMPLES_KEPT * nu]
     place += SAMPLES_KEPT * nu
     acceleration = memory[place : place + nv]
     force = memory[place + nv : place + 2 * nv]
     passive = memory[place + 2 * nv : place + 3 * nv]
     measured_q = memory[place + 3 * nv : place + 4 * nv]
     measured_v = memory[place + 4 * nv : place + 5 * nv]
-    columns = memory[place + 5 * nv : place + 8 * nv].reshape((nv, 3))
 
     restart_at_touchdown(t, contacts, parameters, memory, side)
     stance = int(memory[STANCE])
     link = int(links[stance])
     landed = has_landed(t, contacts, tree, link, parameters, memory, side)
-    work = tree
+    work, other = tree, scratch
     for j in range(nv):
         measured_q[j] = q[j]
         measured_v[j] = v[j]
@@ -286,8 +289,8 @@ def computed_torque(
     if not exact:
         read_encoders(t, q, model, parameters, memory, samples)
         for i in range(nu):
-            measured_q[model.actuator_joint[i]] = samples[0, i]
-        work = scratch
+            measured_q[model.actuator_joint[i]] = samples[i]
+        work, other = scratch, tree
         forward_kinematics(model, measured_q, scratch)
         pitch = int(parameters[PITCH])
         measured_q[pitch] -= parameters[PITCH_SIGN] * scratch.angle[link]
@@ -300,10 +303,11 @@ def computed_torque(
         phase = parameters[LATEST]
     for i in range(nu):
         joint = model.actuator_joint[i]
-        a0 = coefficients[stance, 0, i]
-        a1 = coefficients[stance, 1, i]
-        a2 = coefficients[stance, 2, i]
-        a3 = coefficients[stance, 3, i]
+        cubic = cubics + 4 * nu * stance + i
+        a0 = parameters[cubic]
+        a1 = parameters[cubic + nu]
+        a2 = parameters[cubic + 2 * nu]
+        a3 = parameters[cubic + 3 * nu]
         position = a0 + phase * (a1 + phase * (a2 + phase * a3))
         velocity = a1 + phase * (2.0 * a2 + phase * 3.0 * a3)
         feedforward = 2.0 * a2 + 6.0 * a3 * phase
@@ -322,6 +326,7 @@ def computed_torque(
             acceleration[joint] += damping[i] * (velocity - measured_v[joint])
 
     # Unactuated coordinates of the robot on its stance foot (eq. 29, 34).
+    columns = other.force  # scratch of the workspace that is not in use
     foot_columns(model, work, link, columns)
     if not exact:
         x = 0.0
