@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import pickle
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -76,3 +78,19 @@ def test_an_array_that_compiled_code_would_misread_is_refused(row: np.ndarray) -
     members = make().members() | {"row": row}
     with pytest.raises(TypeError, match="C-contiguous"):
         everything(Outer(**members), np.zeros(8))
+
+
+def test_threads_that_ask_at_once_get_one_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compiled code holds the address: a second table in the place of the first would free it."""
+    barrier, make_table = threading.Barrier(2), Bundle._new_table
+
+    def together(bundle: Bundle) -> np.ndarray:
+        barrier.wait(10.0)
+        return make_table(bundle)
+
+    monkeypatch.setattr(Bundle, "_new_table", together)
+    bundle = Inner(np.arange(3.0))
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(lambda _: bundle.table, range(2))
+    assert first is second is bundle.table
+    assert bundle.address == first.ctypes.data

@@ -6,13 +6,18 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numba import types
+from numba.core.types.functions import BaseFunction
 
 import heelstrike
 from heelstrike import compilation
-from heelstrike.compilation import kernel, uncompiled
+from heelstrike.compilation import compiled_for, kernel, uncompiled
+from heelstrike.quick_compiling import quick_compiling
 
 SOURCE = Path(heelstrike.__file__).parent
 
@@ -81,3 +86,26 @@ def test_the_fingerprint_covers_every_compiled_package() -> None:
         text = file.read_text()
         if package != "compilation.py" and ("kernel\ndef " in text or "compiled_for(" in text):
             assert package in compilation._COMPILED, file
+
+
+def test_a_function_without_a_file_is_compiled_and_not_kept() -> None:
+    """As it is when somebody types a controller at Python's prompt."""
+    scope: dict[str, Any] = {}
+    exec("def double(x):\n    return 2.0 * x", scope)
+    compiled = compiled_for(types.float64(types.float64), scope["double"])
+    assert compiled(1.5) == 3.0
+
+
+def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:
+    before = BaseFunction.get_call_type
+
+    def enter() -> None:
+        with quick_compiling():
+            pass
+
+    with quick_compiling():
+        other = threading.Thread(target=enter)
+        other.start()
+        other.join(0.1)
+    other.join()
+    assert BaseFunction.get_call_type is before

@@ -66,9 +66,14 @@ class Bundle:
         members = ((name, _member_type(value)) for name, value in self.members().items())
         return _bundle_type(type(self).__name__, tuple(members))
 
-    @cached_property
+    @property
     def table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
         """One word for every number and bundle, and address and shape of every array."""
+        # Of two threads that ask at once both get the same one, which lives as long as the bundle.
+        made: np.ndarray[Any, np.dtype[np.int64]] | None = self.__dict__.get("_table")
+        return self.__dict__.setdefault("_table", self._new_table()) if made is None else made
+
+    def _new_table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
         words: list[int] = []
         for value in self.members().values():
             if isinstance(value, np.ndarray):

@@ -287,3 +287,26 @@ def test_impacts_and_wrong_words_are_refused() -> None:
         hs.contact_inverse_dynamics(robot, q, v, v, distribution="fair")
     with pytest.raises(RobotError, match="right_foot_heel"):
         hs.contact_inverse_dynamics(robot, q, v, v, contacts=["nose"])
+
+
+def test_motors_at_every_joint_need_no_ground() -> None:
+    """Of the forces that will do, none has the least norm: the torques are those in the air."""
+    builder = hs.RobotBuilder("arm")
+    upper = builder.hinge("shoulder", None, at=(0.0, 1.0), mass=1.0, inertia=0.1, torque=50.0)
+    lower = builder.hinge(
+        "elbow",
+        upper,
+        at=(0.0, -0.5),
+        mass=1.0,
+        inertia=0.1,
+        center_of_mass=(0.1, 0.0),
+        torque=50.0,
+    )
+    builder.contact(lower, (0.0, -0.5))
+    arm = builder.build()
+    q, v, a = np.zeros(2), np.zeros(2), np.array([1.0, -2.0])
+    for distribution in ForceDistribution:
+        found = hs.contact_inverse_dynamics(arm, q, v, a, contacts=[0], distribution=distribution)
+        assert found.feasible
+        assert not found.contact_force.any()
+        np.testing.assert_array_equal(found.torque, dynamics.inverse_dynamics(arm, q, v, a))

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -11,8 +14,9 @@ import pytest
 from llvmlite import ir
 from robot_cases import NAMED, RANDOM, RobotCase
 
+from heelstrike.compilation import kernel
 from heelstrike.dynamics import machine_code
-from heelstrike.dynamics.straight_line import play
+from heelstrike.dynamics.straight_line import Recording, add_function, play
 from heelstrike.dynamics.tape import Tape, Value
 from heelstrike.dynamics.trigonometry import sine_and_cosine
 from heelstrike.dynamics.workspace import workspace
@@ -73,8 +77,8 @@ def test_equals_the_kernels(case: RobotCase) -> None:
     assert programs[0]
     for seed in range(3):
         loops, straight = arguments(case, seed), arguments(case, seed)
-        for place, kernel in enumerate(KERNELS):
-            kernel(*loops[place])
+        for place, loop in enumerate(KERNELS):
+            loop(*loops[place])
             if programs[place]:
                 called(programs[place], *straight[place])
             else:
@@ -137,3 +141,90 @@ def test_a_tape_folds_zeros_and_ones_and_does_nothing_twice() -> None:
     assert isinstance(b * a, Value)
     assert (b * a).place == product.place
     assert len(tape.operations) == count
+
+
+def test_a_tape_tells_a_number_from_the_place_of_a_value() -> None:
+    tape = Tape()
+    _, second, third = tape.array("x", (3,))
+    assert second.place == 1
+    assert (third + second).place != (third + 1.0).place
+
+
+@kernel
+def exchange(x: np.ndarray, y: np.ndarray) -> None:
+    first = x[0]
+    x[0] = x[1]
+    x[1] = y[0]
+    y[0] = first
+
+
+@fused
+def test_everything_is_read_before_anything_is_written() -> None:
+    x, y = np.array([1.0, 2.0]), np.array([3.0])
+    module = ir.Module("exchange")
+    add_function(module, Recording(exchange, {"x": x, "y": y}))
+    (address,) = machine_code.addresses(["exchange"], b"test of exchange", lambda: module)
+    called(address, x, y)
+    assert (x.tolist(), y.tolist()) == ([2.0, 3.0], [1.0])
+
+
+def constant(number: float) -> ir.Module:
+    """Module of a function that writes a number."""
+    module = ir.Module("constant")
+    pointer = ir.DoubleType().as_pointer()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer]), "constant")
+    builder = ir.IRBuilder(function.append_basic_block())
+    builder.store(ir.Constant(ir.DoubleType(), number), function.args[0])
+    builder.ret_void()
+    return module
+
+
+def test_threads_that_ask_at_once_get_one_engine(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The engine holds the code: a second one in its place would free what others are to call."""
+    monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
+    written = []
+
+    def write() -> ir.Module:
+        written.append(time.sleep(0.1))
+        return constant(1.0)
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(
+            lambda _: machine_code.addresses(["constant"], b"test of threads", write), range(2)
+        )
+    assert first == second
+    assert len(written) == 1
+
+
+def test_spoilt_files_and_no_place_for_files_cost_time_only(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A file may be cut short by a loss of power; LLVM would crash on it."""
+    monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
+    described = b"test of spoilt files"
+    key = machine_code._key(described)
+    file = machine_code._file(key)
+
+    def loaded(number: float) -> float:
+        machine_code._loaded.pop(key, None)
+        (address,) = machine_code.addresses(["constant"], described, lambda: constant(number))
+        result = np.zeros(1)
+        called(address, result)
+        return float(result[0])
+
+    assert loaded(1.0) == 1.0
+    kept = file.read_bytes()
+    assert loaded(2.0) == 1.0  # from the file
+    for spoilt in (b"", kept[: len(kept) // 2], kept[:-1], bytes(len(kept))):
+        file.write_bytes(spoilt)
+        assert loaded(3.0) == 3.0
+        assert len(file.read_bytes()) == len(kept)
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+
+    def nowhere() -> Path:
+        raise RuntimeError("no locator available")
+
+    monkeypatch.setattr(machine_code, "cache_directory", nowhere)
+    assert loaded(4.0) == 4.0

@@ -259,3 +259,16 @@ def test_names_that_xml_must_quote(tmp_path: Path) -> None:
 def test_another_ending(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match=r"MJCF \(.xml\) or URDF \(.urdf\), not as '.json'"):
         load_robot("bravo7").save(tmp_path / "r.json")
+
+
+def test_a_place_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(RobotError, match="cannot be written"):
+        load_robot("rabbit").save(tmp_path / "nowhere" / "rabbit.xml")
+
+
+def test_names_that_xml_cannot_hold(tmp_path: Path) -> None:
+    builder = RobotBuilder("bell\a")
+    builder.hinge("joint", None, mass=1.0, inertia=0.1)
+    with pytest.raises(RobotError, match="XML cannot hold"):
+        builder.build().save(tmp_path / "bell.xml")
+    assert not any(tmp_path.iterdir())

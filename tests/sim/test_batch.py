@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import tracemalloc
+import weakref
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,9 @@ import walking
 import heelstrike as hs
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import CompiledController, Contacts, RunStatus, controller_kernel
-from heelstrike.sim.engine import Method
+from heelstrike.sim import batch as batch_module
+from heelstrike.sim.engine import Engine, Method, Setting
+from heelstrike.sim.status import EventKind
 
 ROWS = ("time", "position", "velocity", "torque", "contact_force", "gap", "slip_velocity")
 RUNS = 8
@@ -114,7 +117,7 @@ def test_one_entry_serves_all_runs() -> None:
     assert len(batch) == 4
     assert np.all(batch.completed)
     assert batch.position.shape == (4, 9)
-    assert batch.events.shape == (4, 10)
+    assert batch.events.shape == (4, len(EventKind))
     for speed, position in zip(speeds, batch.position, strict=True):
         run = hs.simulate(
             walking.bravo7(), controller(), state=hs.State(start.q, speed), duration=0.3
@@ -288,3 +291,69 @@ def test_a_batch_without_records_says_how_to_have_them() -> None:
         batch.run(0)
     with pytest.raises(IndexError):
         batch.run(1)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_robots_of_one_size_and_another_structure(threads: int) -> None:
+    """Numbers that are 0 or 1 are so in the code; dry joints are contacts that others lack."""
+    robot = hs.load_robot("compass_gait")
+
+    def other(leg: float, dry: float) -> hs.Robot:
+        model: Model = dataclasses.replace(  # type: ignore[type-var]
+            robot.model,
+            mass=np.array([0.0, 10.0, leg, leg]),
+            dry_friction=np.array([0.0, 0.0, 0.0, dry]),
+        )
+        return dataclasses.replace(robot, model=model)
+
+    robots = [other(1.0, 0.0), other(5.0, 0.0), other(5.0, 2.0), other(5.0, 0.0)]
+    state = robot.state(velocity={3: 1.0, 0: 0.5})
+    batch = hs.simulate_batch(robots, state=state, duration=0.05, threads=threads)
+    for i, each in enumerate(robots):
+        alone = hs.simulate(each, state=state, duration=0.05)
+        np.testing.assert_array_equal(batch.position[i], alone.position[-1])
+        np.testing.assert_array_equal(batch.velocity[i], alone.velocity[-1])
+
+
+class Careful(hs.TimeStepping):
+    def engine(self, setting: Setting) -> Engine:
+        if setting.memory.q[0] > 1.0:
+            raise hs.SimulationError("too far")
+        return super().engine(setting)
+
+
+def test_what_only_the_method_refuses_comes_before_the_first_run() -> None:
+    start, seen = walking.gait().initial_state, []
+    with pytest.raises(hs.SimulationError, match="run 2: too far"):
+        hs.simulate_batch(
+            walking.bravo7(),
+            controller(),
+            state=hs.State(start.q + np.outer([0.0, 0.5, 2.0], np.eye(9)[0]), start.v),
+            duration=0.01,
+            method=Careful(),
+            progress=lambda done, total: seen.append(done),
+        )
+    assert not seen
+
+
+def test_runs_are_let_go_when_they_are_finished(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, alive = [], []
+
+    def watched(**options: Any) -> Any:
+        loop = prepared(**options)
+        begun.append(weakref.ref(loop))
+        return loop
+
+    def count(done: int, total: int) -> None:
+        if done == total:
+            alive[:] = [loop for loop in begun if loop() is not None]
+
+    prepared = batch_module.prepared
+    monkeypatch.setattr(batch_module, "prepared", watched)
+    start = walking.gait().initial_state
+    hs.simulate_batch(
+        walking.bravo7(), controller(), state=[start] * 3, duration=0.01, progress=count,
+        record_every=1,
+    )  # fmt: skip
+    assert len(begun) == 3
+    assert not alive

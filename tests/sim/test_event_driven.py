@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mechanisms
 import numpy as np
 import pytest
@@ -18,6 +20,10 @@ from heelstrike.sim import (
     RunStatus,
     controller_kernel,
 )
+from heelstrike.sim.engine import DIVERGED
+from heelstrike.sim.event_driven import EVENTS_WITHOUT_END
+from heelstrike.sim.event_phase import REASON
+from heelstrike.sim.simulation import prepared
 
 Floats = NDArray[np.float64]
 
@@ -253,3 +259,47 @@ def test_zeno_does_not_hang() -> None:
     (end,) = [e for e in run.events if e.kind is EventKind.ZENO]
     assert end.time == pytest.approx(np.sqrt(2e-3 / 9.81) * 1.99 / 0.01, abs=1e-7)
     assert np.abs(run.velocity[-1]).max() == 0.0
+
+
+FORWARD = hs.Push("block", force=(20.0, 0.0), start=0.1, duration=0.2)
+BACK = hs.Push("block", force=(-10.0, 0.0), start=0.3, duration=0.1)
+
+
+@pytest.mark.parametrize(
+    ("speed", "options"),
+    [
+        (0.4, {"pushes": [FORWARD], "control_period": 1e-3, "duration": 0.5}),
+        (0.3, {"pushes": [FORWARD, BACK], "duration": 0.5}),
+        (0.4, {"pushes": [FORWARD], "control_period": 1e-3, "duration": 0.1 + 0.2}),
+    ],
+    ids=["a push and a sample", "two pushes", "a sample and the end"],
+)
+def test_instants_that_differ_by_rounding_are_one(speed: float, options: dict[str, Any]) -> None:
+    """Pushes, samples of the controller and the end may fall on 0.3 s and on 0.1 s + 0.2 s.
+
+    No friction: the velocity of the block, of 10 kg, is what the pushes give it.
+    """
+    assert FORWARD.end > 300 * 1e-3
+    builder = hs.RobotBuilder("block")
+    builder.floating_base("block", (0.0, 0.1), mass=10.0, inertia=0.5)
+    builder.sole("block", heel=(-0.2, -0.1), toe=(0.2, -0.1))
+    block = builder.build()
+    run = hs.simulate(
+        block, state=block.reference_state(), ground=hs.Ground(friction=0.0),
+        method=hs.EventDriven(), **options,
+    )  # fmt: skip
+    assert run.status is RunStatus.COMPLETED, run.message
+    assert run.time[-1] == options["duration"]
+    np.testing.assert_allclose(run.velocity[-1], [speed, 0.0, 0.0], atol=1e-9)
+
+
+def test_why_it_could_not_go_on_is_told() -> None:
+    loop = prepared(
+        robot=walking.bravo7(), state=walking.gait().initial_state, duration=1.0,
+        method=hs.EventDriven(), ground=None, control_period=None, record_every=1,
+        stop_when_fallen=None, pushes=(),
+    )  # fmt: skip
+    loop.begin()
+    loop.engine._phase.count[REASON] = EVENTS_WITHOUT_END  # type: ignore[attr-defined]
+    _, message = loop._ending(DIVERGED)
+    assert "events followed each other" in message

@@ -138,6 +138,7 @@ def test_pushes_are_saved_with_the_run(tmp_path: Path) -> None:
         ({"force": (1.0,)}, "two numbers"),
         ({"force": (np.nan, 0.0)}, "finite"),
         ({"start": np.inf}, "start"),
+        ({"start": "0"}, "start"),
         ({"duration": -0.1}, "duration"),
         ({"point": 3.0}, "point"),
     ],
@@ -159,6 +160,12 @@ def test_a_push_needs_a_link(link: Any, words: str) -> None:
             duration=0.1,
             pushes=[push],
         )
+
+
+@pytest.mark.parametrize("link", [None, 1.9, True])
+def test_a_link_has_a_name_or_an_index(link: Any) -> None:
+    with pytest.raises(hs.SimulationError, match="name or index"):
+        hs.Push(link, force=(1.0, 0.0), start=0.0, duration=0.1)
 
 
 def test_something_that_is_no_push() -> None:

@@ -63,7 +63,7 @@ def distribute(
     count = friction.size
     if count == 0:
         return np.zeros((0, 2)), True
-    unit = float(np.abs(load).max()) or 1.0
+    unit = float(np.abs(load).max(initial=0.0)) or 1.0
     shortest = np.asarray(np.linalg.lstsq(effect, load / unit, rcond=None)[0], np.float64)
     _, values, rows = np.linalg.svd(effect)
     rank = int(np.sum(values > max(effect.shape) * np.finfo(float).eps * values.max(initial=0.0)))

@@ -62,7 +62,7 @@ def contact_forward_dynamics(
 
     Points that touch (gap below 1e-6 m) and neither separate nor slide (velocity below 1e-6 m/s)
     may stay, slip or lift as the forces decide; points that slide go on doing so; points that
-    separate are free. The joints' own stops do not act.
+    separate are free. The joints' own stops and dry friction do not act.
 
     Parameters
     ----------

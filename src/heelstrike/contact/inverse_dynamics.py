@@ -78,7 +78,8 @@ def contact_inverse_dynamics(
 
     Coordinates without a motor, such as those of a floating trunk, must be moved by the ground
     alone: their rows say what the contact forces have to make up. Where many forces do, as on two
-    feet or along a flat sole, `distribution` says which to take; the torques follow.
+    feet or along a flat sole, `distribution` says which to take; the torques follow. Dampers and
+    springs are the passive forces; joint stops and dry friction do not act.
 
     Parameters
     ----------

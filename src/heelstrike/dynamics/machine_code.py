@@ -5,26 +5,42 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 from llvmlite import ir
+from numba import config
 
 from heelstrike.compilation import cache_directory, source_fingerprint
 
+_DIGEST = 32  # bytes
 _OPTIMISATION = 1  # more costs time and gains nothing on straight-line code
 
 _loaded: dict[str, Any] = {}
 """Engines by key. They hold the code, and live as long as the process."""
 
+_loading = threading.Lock()
+"""Held while an engine is made: a second one of the same key would take the first one's place."""
+
 
 def can_fuse() -> bool:
     """Whether this processor multiplies and adds in one instruction."""
-    return llvm.get_process_triple().startswith(("aarch64", "arm64")) or bool(
-        llvm.get_host_cpu_features().get("fma", False)
+    return llvm.get_process_triple().startswith(("aarch64", "arm64")) or "+fma" in (
+        _processor()[1].split(",")
     )
+
+
+def _processor() -> tuple[str, str]:
+    """Name and features of the processor to compile for, as Numba has them."""
+    settings: Any = config
+    name = settings.CPU_NAME or llvm.get_host_cpu_name()
+    features = settings.CPU_FEATURES
+    if features is None:
+        features = "" if settings.CPU_NAME else llvm.get_host_cpu_features().flatten()
+    return name, features
 
 
 def addresses(
@@ -41,25 +57,28 @@ def addresses(
     write : callable
         Writes the module.
     """
+    key = _key(described)
+    with _loading:
+        if key not in _loaded:
+            _loaded[key] = _engine(key, write)
+        return tuple(_loaded[key].get_function_address(name) for name in names)
+
+
+def _engine(key: str, write: Callable[[], ir.Module]) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    key = _key(described)
-    if key not in _loaded:
-        machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(),
-            features=llvm.get_host_cpu_features().flatten(),
-            opt=_OPTIMISATION,
-            jit=True,
-        )
-        code = _read(key)
-        if code is None:
-            code = _compiled(write(), machine)
-            _keep(key, code)
-        engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
-        engine.add_object_file(llvm.ObjectFileRef.from_data(code))
-        engine.finalize_object()
-        _loaded[key] = engine
-    return tuple(_loaded[key].get_function_address(name) for name in names)
+    cpu, features = _processor()
+    machine = llvm.Target.from_default_triple().create_target_machine(
+        cpu=cpu, features=features, opt=_OPTIMISATION, jit=True
+    )
+    code = _read(key)
+    if code is None:
+        code = _compiled(write(), machine)
+        _keep(key, code)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return engine
 
 
 def _compiled(module: ir.Module, machine: Any) -> bytes:
@@ -77,8 +96,7 @@ def _key(described: bytes) -> str:
     digest = hashlib.sha256(described)
     for part in (
         source_fingerprint(),
-        llvm.get_host_cpu_name(),
-        llvm.get_host_cpu_features().flatten(),
+        *_processor(),
         str(llvm.llvm_version_info),
     ):
         digest.update(b"\0" + part.encode())
@@ -90,20 +108,26 @@ def _file(key: str) -> Path:
 
 
 def _read(key: str) -> bytes | None:
+    """Code that was kept, if it is whole: LLVM would crash on half of it."""
     try:
-        return _file(key).read_bytes()
-    except OSError:
+        kept = _file(key).read_bytes()
+    except (OSError, RuntimeError):
         return None
+    digest, code = kept[:_DIGEST], kept[_DIGEST:]
+    return code if hashlib.sha256(code).digest() == digest else None
 
 
 def _keep(key: str, code: bytes) -> None:
-    """Write a file that is either whole or not there; without a place to write, do without."""
+    """Write code and its digest to a file; without a place to write, do without."""
     try:
         directory = cache_directory()
         directory.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(dir=directory)
-        with os.fdopen(handle, "wb") as file:
-            file.write(code)
-        Path(name).replace(_file(key))
-    except OSError:
+    except (OSError, RuntimeError):
         return
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(hashlib.sha256(code).digest() + code)
+        Path(name).replace(_file(key))
+    except OSError:  # no space left; on Windows, somebody is reading the file
+        Path(name).unlink(missing_ok=True)

@@ -168,9 +168,12 @@ class _Writer:
         for place, operation in enumerate(operations):
             if operation[0] != READ:
                 self._value(place)
+        stores = [
+            (self._value(entry.place if isinstance(entry, Value) else float(entry)), name, index)
+            for name, index, entry in self.recording.written()
+        ]
         # All that is read has been read: nothing is overwritten too early.
-        for name, index, entry in list(self.recording.written()):
-            value = self._value(entry.place if isinstance(entry, Value) else float(entry))
+        for value, name, index in stores:
             self.builder.store(value, self._slot(name, index))
         self.builder.ret_void()
 

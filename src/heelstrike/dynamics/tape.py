@@ -67,7 +67,7 @@ class Tape:
 
     def __init__(self) -> None:
         self.operations: list[tuple[Any, ...]] = []
-        self._places: dict[tuple[Any, ...], int] = {}
+        self._places: dict[tuple[Any, ...], int] = {}  # by the kinds of operands, too: 1 == 1.0
 
     def record(self, operation: int, *operands: Any) -> Value:
         """Return the value of an operation, new or done before."""
@@ -88,7 +88,8 @@ class Tape:
         return result
 
     def _value(self, entry: tuple[Any, ...]) -> Value:
-        place = self._places.setdefault(entry, len(self.operations))
+        key = (*entry, *map(type, entry))
+        place = self._places.setdefault(key, len(self.operations))
         if place == len(self.operations):
             self.operations.append(entry)
         return Value(self, place)

@@ -313,7 +313,7 @@ class Robot:
         Raises
         ------
         RobotError
-            If the ending is another one.
+            If the ending is another one, or the file cannot be written.
 
         Warns
         -----

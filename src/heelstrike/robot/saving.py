@@ -39,7 +39,17 @@ def save_robot(robot: Robot, path: str | os.PathLike[str]) -> Path:
             f"not as {kind or 'nothing'!r}."
         )
     ElementTree.indent(root)
-    file.write_text(ElementTree.tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+    text = ElementTree.tostring(root, encoding="unicode") + "\n"
+    try:
+        ElementTree.fromstring(text)  # written by ourselves
+    except ElementTree.ParseError:
+        raise RobotError(
+            f"{file}: a name of robot {robot.name!r} has a character that XML cannot hold."
+        ) from None
+    try:
+        file.write_text(text, encoding="utf-8")
+    except (OSError, ValueError) as error:
+        raise RobotError(f"{file}: the robot cannot be written: {error}.") from error
     return file
 
 

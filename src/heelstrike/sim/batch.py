@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Any
@@ -63,7 +64,7 @@ class Batch:
         The same in a person's words.
     steps, saturations : (n,) int
         Steps taken; times that a torque was clipped to its limit.
-    events : (n, 10) int
+    events : (n, kinds) int
         Events of each kind, in the order of :class:`~heelstrike.sim.status.EventKind`.
     penetration : (n,) float
         Deepest penetration of a contact point, in m.
@@ -235,7 +236,7 @@ def simulate_batch(
     work = workspace(entries["robot"][0].nv)
 
     def loop(index: int) -> Loop:
-        try:
+        with _naming(index, count):
             return prepared(
                 robot=every["robot"][index],
                 state=every["state"][index],
@@ -248,10 +249,6 @@ def simulate_batch(
                 pushes=every["pushes"][index],
                 work=work,
             )
-        except SimulationError as error:
-            if count == 1:
-                raise
-            raise SimulationError(f"run {index}: {error}") from error
 
     compiled = [_compiled(every["robot"][0], each) for each in entries["controller"]]
     controllers = _Entries(compiled)
@@ -264,10 +261,15 @@ def simulate_batch(
     _check_parameters(compiled, entries["parameters"])
     loops = [loop(index) for index in range(count)]
     # What only the method can refuse (and compiling) comes before the first run, too.
-    for index in _first_of_each(entries["ground"], count):
-        loops[index].begin()
-    crew = _Crew(loops, controller_of, recorded=record_every is not None)
+    for index, each in enumerate(loops):
+        with _naming(index, count):
+            if index == 0:
+                each.begin()
+            else:
+                each.new_engine(loops[0].memory)
     compile_s = loops[0].engine.compile_s
+    crew = _Crew(loops, controller_of, recorded=record_every is not None)
+    del loops, each  # the crew lets go of each when it is finished
     with _shown(progress, count) as show:
         crew.work(min(workers, count), show)
     timing = Timing(compile_s, perf_counter() - begin - compile_s)
@@ -392,14 +394,15 @@ def _check_parameters(compiled: Sequence[CompiledController], rows: Sequence[Any
             )
 
 
-def _first_of_each(grounds: Sequence[Any], count: int) -> list[int]:
-    """First run on each different ground."""
-    if len(grounds) == 1:
-        return [0]
-    first: dict[int, int] = {}
-    for index in range(count):
-        first.setdefault(id(grounds[index]), index)
-    return list(first.values())
+@contextmanager
+def _naming(index: int, count: int) -> Iterator[None]:
+    """Tell which of several runs an error is about."""
+    try:
+        yield
+    except SimulationError as error:
+        if count == 1:
+            raise
+        raise SimulationError(f"run {index}: {error}") from error
 
 
 @contextmanager
@@ -471,7 +474,7 @@ class _Crew:
 
     def _take_runs(self) -> None:
         """Work of one thread, which allocates memory once for all of its runs, if they allow it."""
-        memory = fresh = shape = record = None
+        memory = fresh = robot = record = None
         while not self._stop.is_set():
             with self._lock:
                 index = self._next
@@ -480,16 +483,20 @@ class _Crew:
                 return
             loop = self._loops[index]
             assert loop is not None
-            limits = np.isfinite(loop.robot.model.lower), np.isfinite(loop.robot.model.upper)
-            needed = len(loop.pushes), np.count_nonzero(limits)
-            if memory is None or fresh is None or shape != needed:
-                memory = allocate_memory(loop.robot, loop.pushes)
-                fresh = allocate_memory(loop.robot, loop.pushes)
-                shape = needed
+            # Straight-line code, dry joints and sizes of the memory are those of its robot.
+            if (
+                memory is None
+                or fresh is None
+                or robot is not loop.robot
+                or len(memory.pushes.link) != len(loop.pushes)
+            ):
+                robot = loop.robot
+                memory = allocate_memory(robot, loop.pushes)
+                fresh = deepcopy(memory)
                 record = None
             else:
                 memory.become(fresh)
-                memory.pushes.become(pushes_on(loop.robot, loop.pushes))
+                memory.pushes.become(pushes_on(robot, loop.pushes))
             record = self._simulate(index, loop, memory, record)
             with self._lock:
                 self._done += 1

@@ -43,7 +43,7 @@ from heelstrike.sim.engine import (
 from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import evaluate, project
 from heelstrike.sim.event_gaps import gap_now, gap_velocity
-from heelstrike.sim.event_location import integrate, total_weight
+from heelstrike.sim.event_location import integrate, shortest_step, total_weight
 from heelstrike.sim.event_modes import (
     JOINT_STOP,
     adopt_modes,
@@ -564,6 +564,16 @@ def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
 
 
 @kernel
+def end_bounces(memory: Memory, record: Record, phase: Phase) -> None:
+    """Let the points rest whose accumulating impacts have come to an end by now."""
+    for contact in range(phase.closed.shape[0]):
+        if phase.accumulation[contact] <= phase.clock[TIME]:
+            if contact < memory.contacts.gap.shape[0]:
+                log_event(record, phase.accumulation[contact], ZENO, contact, 0.0, 0.0)
+            phase.accumulation[contact] = np.inf
+
+
+@kernel
 def end_step(memory: Memory, record: Record, phase: Phase) -> None:
     """Move time and state to the end of the finished step."""
     clock = phase.clock
@@ -577,11 +587,7 @@ def end_step(memory: Memory, record: Record, phase: Phase) -> None:
     for contact in range(points):
         memory.contacts.force[contact, 0] = phase.end_force[contact, 0]
         memory.contacts.force[contact, 1] = phase.end_force[contact, 1]
-    for contact in range(phase.closed.shape[0]):
-        if phase.accumulation[contact] <= clock[TIME]:
-            if contact < points:
-                log_event(record, phase.accumulation[contact], ZENO, contact, 0.0, 0.0)
-            phase.accumulation[contact] = np.inf
+    end_bounces(memory, record, phase)
     phase.count[FINISHED] = 0
     memory.tally[STEPS] += 1
     if phase.count[FIRED] == 1:
@@ -722,6 +728,11 @@ def _advance(
         if over:
             return DONE
         stop = next_stop(clock, count, phase.accumulation)
+        if stop - clock[TIME] < shortest_step(clock[TIME]):
+            # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
+            clock[TIME] = stop
+            end_bounces(memory, record, phase)
+            continue
         if not integrate(
             controller, model, ground, parameters, kept, spare, memory, phase, stop, weight
         ):

@@ -3,9 +3,6 @@
 Closed points have no normal acceleration, sticking ones no tangential acceleration either, and
 sliding ones feel friction μ λ_n against the direction of sliding. With the contact forces λ that
 this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of the paper.
-
-Small kernels take the few arrays they need and not whole bundles of them: every array of a bundle
-costs compile time in every kernel that takes it.
 """
 
 from __future__ import annotations

@@ -57,6 +57,12 @@ SHORTEST_STEP = 8.0
 
 
 @kernel
+def shortest_step(time: float) -> float:
+    """Length below which a step would not move time on by a meaningful number."""
+    return SHORTEST_STEP * 2.2e-16 * max(abs(time), 1e-3)
+
+
+@kernel
 def take_step(
     controller: Any,
     model: Model,
@@ -271,7 +277,7 @@ def integrate(
         while True:
             if time + 1.0001 * length >= stop:
                 length = stop - time
-            if length < SHORTEST_STEP * 2.2e-16 * max(abs(time), 1e-3):
+            if length < shortest_step(time):
                 return False
             error = take_step(
                 controller, model, ground, parameters, kept, spare, memory, phase, length

@@ -271,27 +271,31 @@ class Loop:
         if memory is None:
             memory = allocate_memory(self.robot, self.pushes)
         self.memory: Memory = memory
-        self.memory.q[:] = self.state.q
-        self.memory.v[:] = self.state.v
         self.memory.stiffness[:] = self.robot.model.stiffness
         self.memory.damping[:] = self.robot.model.damping
         self.ground_model = self.ground.model()
-        self.engine: Engine = self.method.engine(
+        self.engine: Engine = self.new_engine(memory)
+        self.event_counts = np.zeros(len(EventKind), dtype=np.int64)
+        self.error: Exception | None = None
+        self.records: list[Record] = [] if record is None else [record]
+        if record is None:
+            self._new_record()
+
+    def new_engine(self, memory: Memory) -> Engine:
+        """Put the initial state into a memory and make an engine, which checks what it needs."""
+        memory.q[:] = self.state.q
+        memory.v[:] = self.state.v
+        return self.method.engine(
             Setting(
                 robot=self.robot,
-                ground=self.ground_model,
-                memory=self.memory,
+                ground=self.ground.model(),
+                memory=memory,
                 duration=self.duration,
                 control_period=self.control_period,
                 record_every=self.record_every,
                 fallen_height=self.fallen_height,
             )
         )
-        self.event_counts = np.zeros(len(EventKind), dtype=np.int64)
-        self.error: Exception | None = None
-        self.records: list[Record] = [] if record is None else [record]
-        if record is None:
-            self._new_record()
 
     def advance(
         self, controller: Controller | CompiledController | None
@@ -414,6 +418,9 @@ class Loop:
             return RunStatus.FELL, (
                 f"the robot fell at {now}: its centre of mass is below half its first height"
             )
+        reason = getattr(self.engine, "reason", "")
+        if code == DIVERGED and reason:
+            return RunStatus.DIVERGED, f"the simulation could not go on at {now}: {reason}"
         if code == DIVERGED:
             return RunStatus.DIVERGED, (
                 f"the state stopped being finite at {now}; try a smaller step or softer gains"
