@@ -46,9 +46,21 @@ def event_impulse(run: Run) -> Floats:
     for event in run.events:
         if event.kind not in IMPULSIVE or event.impulse == (0.0, 0.0):
             continue
-        first = int(np.searchsorted(run.time, event.time - SAME_INSTANT))
-        row = min(first, len(impulse) - 1)
+        row = _interval_of(event.time, run.time)
         nx, nz = run.contact_normal[row, event.contact]
         normal, tangent = event.impulse
         impulse[row, event.contact] += (normal * nx + tangent * nz, normal * nz - tangent * nx)
     return impulse
+
+
+def _interval_of(instant: float, time: Floats) -> int:
+    """Interval between two rows whose ends are nearest to an instant: the one of a jump there.
+
+    Rows of the output period may lie as near as 1e-12 s beside it.
+    """
+    first = int(np.searchsorted(time, instant - SAME_INSTANT))
+    last = int(np.searchsorted(time, instant + SAME_INSTANT, side="right"))
+    if last - first < 2:
+        return min(first, len(time) - 2)
+    away = np.abs(time[first:last] - instant)
+    return first + int(np.argmin(away[:-1] + away[1:]))
