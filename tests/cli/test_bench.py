@@ -83,4 +83,5 @@ def test_the_whole_quick_form(tmp_path: Path) -> None:
     assert written["endurance"]["complementarity"] <= 1e-9
     assert set(written["footprint"]["allocations_a_step"].values()) == {0.0}
     memory = written["footprint"]["memory"]
-    assert memory["after_MiB"] - memory["before_MiB"] <= 2.0
+    if memory["before_MiB"] is not None:  # a system without /proc does not say
+        assert memory["after_MiB"] - memory["before_MiB"] <= 2.0

@@ -140,6 +140,9 @@ def _footprint(part: dict[str, Any]) -> Iterator[Table]:
     for method, number in part["allocations_a_step"].items():
         table.add_row(f"allocations a step, {method}", f"{number:g}")
     memory = part["memory"]
+    if memory["before_MiB"] is None:
+        yield table
+        return
     table.add_row(
         f"peak memory after {memory['short_s']:g} s of walking", f"{memory['before_MiB']:.0f} MiB"
     )
