@@ -303,3 +303,10 @@ def test_why_it_could_not_go_on_is_told() -> None:
     loop.engine._phase.count[REASON] = EVENTS_WITHOUT_END  # type: ignore[attr-defined]
     _, message = loop._ending(DIVERGED)
     assert "events followed each other" in message
+
+
+def test_a_robot_sunk_in_the_ground_is_refused_whatever_swing_feet_may_do() -> None:
+    robot = hs.load_robot("compass_gait")
+    sunk = robot.state({"root_z": robot.model.reference[1] - 0.05})
+    with pytest.raises(hs.SimulationError, match="deep in the ground"):
+        hs.simulate(robot, state=sunk, duration=0.1, method=hs.EventDriven(swing_feet_pass=True))

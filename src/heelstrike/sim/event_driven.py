@@ -775,7 +775,8 @@ def _check_start(setting: Setting, swing_feet_pass: bool) -> None:
     observe(robot.model, setting.ground, memory)
     gap, normal = memory.contacts.gap, memory.contacts.normal
     inside = np.flatnonzero(gap < -ON_THE_GROUND)
-    if len(inside) and not swing_feet_pass:
+    stands = bool(np.any(np.abs(gap) <= ON_THE_GROUND))
+    if len(inside) and not (swing_feet_pass and stands):
         deepest = int(inside[np.argmin(gap[inside])])
         others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
         needed = float(np.max(-gap[inside] / normal[inside, 1]))
