@@ -622,7 +622,8 @@ def _advance(
     weight = total_weight(model.mass, model.gravity)
     rows, events = record.row_count, record.event_count
     row_room = record.time.shape[0] - 4
-    event_room = record.event_time.shape[0] - 8 * phase.closed.shape[0] - 8
+    # In one instant: what each look of `decide` finds, and what else may happen to a contact.
+    event_room = record.event_time.shape[0] - (LOOKS + 6) * phase.closed.shape[0] - 8
     period = clock[OUTPUT_PERIOD] * count[ROW_EVERY]
     while True:
         if rows[0] > row_room or events[0] > event_room:
