@@ -323,7 +323,7 @@ def are_usual(memory: Memory, count: int) -> bool:
 
 
 @kernel
-def gather_delassus(model: Model, memory: Memory, count: int) -> None:
+def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
     """Delassus matrix of the candidates out of that of all usual points."""
     contacts = memory.contacts
     play(
@@ -333,6 +333,8 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> None:
             memory.factor, memory.point_rows, memory.point_delassus,
         ),
     )  # fmt: skip
+    if count == memory.usual_points.shape[0]:
+        return memory.point_delassus
     for place in range(count):
         row = 2 * memory.usual_place[memory.candidate[place]]
         for other in range(count):
@@ -341,6 +343,7 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> None:
                 for j in range(2):
                     entry = memory.point_delassus[row + i, column + j]
                     memory.delassus[2 * place + i, 2 * other + j] = entry
+    return memory.delassus
 
 
 @kernel
@@ -387,14 +390,15 @@ def solve_contacts(
         return True
     straight = are_usual(memory, count)
     if straight:
-        gather_delassus(model, memory, count)
+        delassus = gather_delassus(model, memory, count)
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
         press_dry_joints(model, step, count, memory)
+        delassus = memory.delassus
     status = solve_contact_kernel(
         count,
-        memory.delassus,
+        delassus,
         memory.free,
         memory.problem_friction,
         order,

@@ -47,6 +47,26 @@ print(json.dumps({"before_MiB": before, "after_MiB": peak(), "status": run.statu
                   "steps": run.steps, "rows": len(run.time)}))
 """
 
+ALLOCATIONS = """
+import json
+import heelstrike as hs
+from numba.core.runtime import rtsys
+robot = hs.load_robot("bravo7")
+gait = hs.load_gait(GAIT, robot)
+control = hs.ComputedTorque(robot, gait)
+def allocated(method, duration):
+    before = rtsys.get_allocation_stats().alloc
+    run = hs.simulate(robot, control, state=gait.initial_state, duration=duration, method=method,
+                      record_every=2**62)
+    return rtsys.get_allocation_stats().alloc - before, run.steps
+result = {}
+for method in (hs.TimeStepping(), hs.EventDriven(output_period=None)):
+    allocated(method, 0.3)
+    (less, few), (more, many) = allocated(method, 0.3), allocated(method, 1.2)
+    result[type(method).__name__] = (more - less) / (many - few)
+print(json.dumps(result))
+"""
+
 
 def measure_footprint(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: ARG001
     """Seconds to import and to the first step, with and without compiled code; memory in MiB."""
@@ -64,6 +84,7 @@ def measure_footprint(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  
         memory = _run(MEMORY, names | {"SHORT": repr(short), "LONG": repr(long)})
         memory |= {"short_s": short, "long_s": long}
         result["memory"] = memory
+        result["allocations_a_step"] = _run(ALLOCATIONS, names, NUMBA_NRT_STATS="1")
         if not quick:
             cache = str(Path(folder) / "cache")
             cold = _run(FIRST_STEP, names, NUMBA_CACHE_DIR=cache)

@@ -137,6 +137,8 @@ def _footprint(part: dict[str, Any]) -> Iterator[Table]:
         table.add_row(
             "import to first step, nothing compiled", f"{part['cold_first_step_s']:.1f} s"
         )
+    for method, number in part["allocations_a_step"].items():
+        table.add_row(f"allocations a step, {method}", f"{number:g}")
     memory = part["memory"]
     table.add_row(
         f"peak memory after {memory['short_s']:g} s of walking", f"{memory['before_MiB']:.0f} MiB"
