@@ -328,3 +328,22 @@ def test_the_events_of_an_instant_have_room() -> None:
     contacts = len(allocate_phase(robot).closed)
     assert contacts == robot.nc + 3 * robot.nv
     assert len(loop.records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
+
+
+@pytest.mark.parametrize("turn", [0.0, -3.0])
+def test_a_run_may_begin_while_a_swing_foot_passes_below_the_ground(turn: float) -> None:
+    """The left foot is 15 mm deep and moves down, or slowly up: neither lands it."""
+    robot = hs.load_robot("compass_gait")
+    start = robot.state(
+        {"root_x": np.sin(0.2), "root_z": np.cos(0.2), "right_leg": 0.2, "left_leg": -0.1},
+        {
+            "root_x": np.cos(0.2), "root_z": -np.sin(0.2), "right_leg": 1.0, "left_leg": turn,
+        },
+    )  # fmt: skip
+    run = hs.simulate(
+        robot, state=start, duration=0.02, method=hs.EventDriven(swing_feet_pass=True)
+    )
+    assert run.status is RunStatus.COMPLETED
+    assert not run.events
+    np.testing.assert_array_equal(run.position[0], start.q)
+    assert np.all(run.gap[:, 1] < -0.01)

@@ -481,7 +481,9 @@ def find_what_happened(
             )
             if starting:
                 phase.group[contact] = contact
-                first = gap <= ON_THE_GROUND and normal <= rest
+                if contact < points and gap < -ON_THE_GROUND:
+                    phase.passing[contact] = phase.count[LET_PASS]
+                first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
             if phase.passing[contact] == 1:
                 phase.passing[contact] = 0 if first else 1
             elif (
