@@ -175,6 +175,17 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     return result
 
 
+def loop_for(signature: Any, function: Function) -> Function:
+    """Compile a kernel like :func:`compiled_for`, to be called without a look at its arguments.
+
+    Numba compares the types of a hundred arrays with those it compiled for, at every call. Only for
+    loops whose arguments this package makes: anything but the right types crashes.
+    """
+    compiled: Any = compiled_for(signature, function)
+    entry: Function = compiled.overloads[tuple(signature.args)].entry_point
+    return entry
+
+
 class _KnownResult:
     """A compiled function that remembers where its machine code is.
 

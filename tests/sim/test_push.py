@@ -20,7 +20,7 @@ NAMES = [type(method).__name__ for method in METHODS]
 
 def in_the_air(**options: Any) -> hs.Run:
     """A block of 2 kg and 0.3 kg m², at rest 5 m above the ground, no gravity, for 0.5 s."""
-    robot = block(mass=2.0, inertia=0.3, gravity=0.0)
+    robot = block(width=1.0, height=0.2, mass=2.0, inertia=0.3, gravity=0.0)
     q = robot.reference_state().q
     q[1] += 5.0
     return hs.simulate(robot, state=hs.State(q, np.zeros(3)), duration=0.5, **options)

@@ -7,6 +7,7 @@ import os
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,7 @@ def can_fuse() -> bool:
     )
 
 
+@lru_cache(maxsize=1)
 def _processor() -> tuple[str, str]:
     """Name and features of the processor to compile for, as Numba has them."""
     settings: Any = config

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import compiled_for, kernel, type_of
+from heelstrike.compilation import kernel, loop_for, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -524,7 +524,7 @@ def compiled_advance() -> tuple[Any, float]:
         vector,
         types.int64[::1],
     )
-    compiled = compiled_for(signature, _advance)
+    compiled = loop_for(signature, _advance)
     return compiled, perf_counter() - begin
 
 

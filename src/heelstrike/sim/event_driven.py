@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import compiled_for, kernel, type_of
+from heelstrike.compilation import kernel, loop_for, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
@@ -769,7 +769,7 @@ def compiled_advance() -> tuple[Any, float]:
         type_of(allocate_phase(robot)),
         types.int64[::1],
     )
-    return compiled_for(signature, _advance), perf_counter() - begin
+    return loop_for(signature, _advance), perf_counter() - begin
 
 
 def _check_start(setting: Setting, swing_feet_pass: bool) -> None:

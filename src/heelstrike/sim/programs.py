@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from llvmlite import ir
@@ -45,11 +46,22 @@ def usual_points(robot: Robot) -> NDArray[np.int64]:
     return np.array(points if len(points) <= MOST_POINTS else [], dtype=np.int64)
 
 
+_known: WeakKeyDictionary[Model, dict[bytes, NDArray[np.int64]]] = WeakKeyDictionary()
+
+
 def straight_line_programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the addresses of the straight-line programs of a robot, one for each kernel.
 
     `points` are the contact points that the last three kernels are for.
     """
+    known = _known.setdefault(model, {})
+    key = points.tobytes()
+    if key not in known:
+        known[key] = _programs(model, points)
+    return known[key].copy()
+
+
+def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     nv, nc, size = len(model.parent), len(model.contact_link), len(points)
     count = len(KERNELS) if size > 0 else DELASSUS
     programs = np.zeros(len(KERNELS), dtype=np.int64)

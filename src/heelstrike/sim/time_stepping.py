@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import compiled_for, kernel, type_of
+from heelstrike.compilation import kernel, loop_for, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
@@ -535,7 +535,7 @@ def compiled_advance() -> tuple[Any, float]:
         integers,
         integers,
     )
-    compiled = compiled_for(signature, _advance)
+    compiled = loop_for(signature, _advance)
     return compiled, perf_counter() - begin
 
 

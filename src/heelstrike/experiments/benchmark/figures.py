@@ -82,9 +82,7 @@ def _precision(part: dict[str, Any]) -> Figure:
     names = list(dict.fromkeys(point["series"] for point in part["points"]))
     own, others = 0, 0
     for name in names:
-        points = sorted(
-            (p for p in part["points"] if p["series"] == name), key=lambda p: p["seconds"]
-        )
+        points = [p for p in part["points"] if p["series"] == name]
         seconds, error = zip(*((p["seconds"], p["error_rad"]) for p in points), strict=True)
         if name.startswith("MuJoCo"):
             color, mark, line = THEIRS, _PEER_MARKS[others % 6], "--"
@@ -137,7 +135,7 @@ def _scaling(part: dict[str, Any]) -> Figure:
     left, right = figure.subplots(1, 2)
     for axes, name, label in (
         (left, "joints", "hinges of a chain without contact"),
-        (right, "contacts", "contact points under a sled"),
+        (right, "contacts", "contact points under a plank at rest"),
     ):
         size = np.array([row["size"] for row in part[name]])
         for key, engine, color, mark in (

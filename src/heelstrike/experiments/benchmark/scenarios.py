@@ -188,7 +188,7 @@ def chain(joints: int) -> str:
     return f'<mujoco model="chain"><compiler angle="radian"/><worldbody>{body}</worldbody></mujoco>'
 
 
-def sled(contacts: int) -> str:
+def plank(contacts: int) -> str:
     """Return a plank on that many points along its sole, as MJCF."""
     places = np.linspace(-0.5, 0.5, contacts) if contacts > 1 else np.zeros(contacts)
     points = "".join(
@@ -196,13 +196,14 @@ def sled(contacts: int) -> str:
         ' conaffinity="0"/>'
         for i, x in enumerate(places)
     )
-    height = 0.05 if contacts else 1000.0
+    height = 0.05 + 1e-6 if contacts else 1000.0
     return (
-        '<mujoco model="sled"><compiler angle="radian"/>'
+        '<mujoco model="plank"><compiler angle="radian"/>'
         '<worldbody><geom name="floor" type="plane" size="9 9 1" contype="0" conaffinity="1"/>'
         f'<body name="plank" pos="0 0 {height}">'
         '<joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>'
         '<joint name="pitch" type="hinge" axis="0 1 0"/>'
         '<inertial pos="0 0 0" mass="5" diaginertia="0.4 0.4 0.4"/>'
+        '<geom type="box" size="0.5 0.1 0.05" contype="0" conaffinity="0"/>'
         f"{points}</body></worldbody></mujoco>"
     )

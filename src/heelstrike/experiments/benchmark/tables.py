@@ -87,7 +87,7 @@ def _precision(part: dict[str, Any]) -> Iterator[Table]:
 
 def _threads(part: dict[str, Any]) -> Iterator[Table]:
     table = _table(
-        f"{part['runs']} walks, {part['steps']} steps, "
+        f"{part['runs']} walks of {part['duration_s']:g} s, {part['steps']} steps, "
         f"{'identical' if part['same_for_all_threads'] else 'NOT THE SAME'} on all threads",
         "threads",
         "million steps a second",
@@ -111,7 +111,7 @@ def _threads(part: dict[str, Any]) -> Iterator[Table]:
 def _scaling(part: dict[str, Any]) -> Iterator[Table]:
     for name, title in (
         ("joints", "µs a step of a chain of hinges"),
-        ("contacts", "µs a step of a sled on many points"),
+        ("contacts", "µs a step of a plank on many points"),
     ):
         table = _table(title, name, "heelstrike", "MuJoCo Euler")
         for row in part[name]:
