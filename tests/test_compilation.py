@@ -109,3 +109,49 @@ def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:
         other.join(0.1)
     other.join()
     assert BaseFunction.get_call_type is before
+
+
+HELPER = """
+from heelstrike.compilation import kernel
+
+SLOPE = 1.0
+
+@kernel
+def scaled(x):
+    return 3.0 * x
+"""
+
+CALLER = """
+import helper
+from helper import SLOPE, scaled
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def both(x):
+    return SLOPE * scaled(x) + helper.SLOPE + helper.scaled(x)
+
+compiled = compiled_for(types.float64(types.float64), both)
+print(compiled(1.0), sum(compiled.stats.cache_hits.values()))
+"""
+
+
+def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path) -> None:
+    def answer(helper: str) -> tuple[float, int]:
+        (tmp_path / "helper.py").write_text(helper)
+        (tmp_path / "caller.py").write_text(CALLER)
+        os.utime(tmp_path / "caller.py", (0, 0))
+        told = subprocess.run(
+            [sys.executable, "-B", "caller.py"],
+            cwd=tmp_path,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        value, hits = told.stdout.split()
+        return float(value), int(hits)
+
+    assert answer(HELPER) == (7.0, 0)
+    assert answer(HELPER) == (7.0, 1)
+    assert answer(HELPER.replace("3.0 * x", "5.0 * x")) == (11.0, 0)
+    assert answer(HELPER.replace("SLOPE = 1.0", "SLOPE = 2.0")) == (11.0, 0)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 
@@ -64,7 +65,37 @@ class _PackageCache(FunctionCache):
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
         index = self._cache_file
-        index._source_stamp = (source_fingerprint(), index._source_stamp)
+        index._source_stamp = (source_fingerprint(), _what_it_names(function), index._source_stamp)
+
+
+def _what_it_names(function: Callable[..., Any]) -> str:
+    """Fingerprint of the kernels and constants that a function of a user takes in by name.
+
+    They may be in other files than the function.
+    """
+    digest = hashlib.sha256()
+    found: list[Any] = [function]
+    for one in found:  # grows as it goes
+        if (one.__module__ or "").split(".")[0] == __name__.split(".")[0]:
+            continue  # a function of this package
+        names = one.__code__.co_names
+        modules = [one.__globals__.get(name) for name in names]
+        scopes = [one.__globals__, *(vars(m) for m in modules if isinstance(m, types.ModuleType))]
+        for name, scope in ((name, scope) for name in names for scope in scopes):
+            value = scope.get(name)
+            inner = getattr(value, "py_func", None)
+            if inner is not None and inner not in found:
+                found.append(inner)
+                code = inner.__code__
+                digest.update(repr((name, code.co_code, code.co_names)).encode())
+                digest.update(
+                    repr([c for c in code.co_consts if not isinstance(c, types.CodeType)]).encode()
+                )
+            elif isinstance(value, bool | int | float | complex | str | tuple):
+                digest.update(repr((name, value)).encode())
+            elif isinstance(value, np.ndarray):
+                digest.update(repr((name, value.dtype, value.shape)).encode() + value.tobytes())
+    return digest.hexdigest()
 
 
 def _kept_on_disk(compiled: Any) -> Any:

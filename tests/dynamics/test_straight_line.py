@@ -228,3 +228,8 @@ def test_spoilt_files_and_no_place_for_files_cost_time_only(
 
     monkeypatch.setattr(machine_code, "cache_directory", nowhere)
     assert loaded(4.0) == 4.0
+
+
+def test_arrays_with_gaps_are_refused() -> None:
+    with pytest.raises(TypeError, match="C-contiguous"):
+        called(0, np.zeros((3, 2))[:, 0])

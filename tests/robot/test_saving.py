@@ -272,3 +272,14 @@ def test_names_that_xml_cannot_hold(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="XML cannot hold"):
         builder.build().save(tmp_path / "bell.xml")
     assert not any(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("ending", ["xml", "urdf"])
+def test_a_link_of_inertia_without_mass(ending: str, tmp_path: Path) -> None:
+    """A rotor: no mass is told of it, what it resists is its inertia."""
+    builder = RobotBuilder("rotor")
+    trunk = builder.floating_base("trunk", (0.0, 1.0), mass=5.0, inertia=1.0)
+    rotor = builder.hinge("rotor", trunk, at=(0.0, -0.5), inertia=0.1, torque=10.0)
+    builder.hinge("end", rotor, at=(0.0, -0.5), inertia=0.2, torque=10.0)
+    robot = builder.build()
+    assert_same_dynamics(robot, again(robot, tmp_path / f"rotor.{ending}"))

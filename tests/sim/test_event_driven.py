@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import mechanisms
@@ -21,8 +22,8 @@ from heelstrike.sim import (
     controller_kernel,
 )
 from heelstrike.sim.engine import DIVERGED
-from heelstrike.sim.event_driven import EVENTS_WITHOUT_END
-from heelstrike.sim.event_phase import REASON
+from heelstrike.sim.event_driven import EVENTS_WITHOUT_END, LOOKS
+from heelstrike.sim.event_phase import REASON, allocate_phase
 from heelstrike.sim.simulation import prepared
 
 Floats = NDArray[np.float64]
@@ -303,3 +304,46 @@ def test_why_it_could_not_go_on_is_told() -> None:
     loop.engine._phase.count[REASON] = EVENTS_WITHOUT_END  # type: ignore[attr-defined]
     _, message = loop._ending(DIVERGED)
     assert "events followed each other" in message
+
+
+def test_a_robot_sunk_in_the_ground_is_refused_whatever_swing_feet_may_do() -> None:
+    robot = hs.load_robot("compass_gait")
+    sunk = robot.state({"root_z": robot.model.reference[1] - 0.05})
+    with pytest.raises(hs.SimulationError, match="deep in the ground"):
+        hs.simulate(robot, state=sunk, duration=0.1, method=hs.EventDriven(swing_feet_pass=True))
+
+
+def test_the_events_of_an_instant_have_room() -> None:
+    """Compiled code checks once an instant, not at every event."""
+    robot = walking.bravo7()
+    model: Model = dataclasses.replace(  # type: ignore[type-var]
+        robot.model, lower=np.full(9, -9.0), upper=np.full(9, 9.0), dry_friction=np.ones(9)
+    )
+    robot = dataclasses.replace(robot, model=model)
+    loop = prepared(
+        robot=robot, state=walking.gait().initial_state, duration=1.0, method=hs.EventDriven(),
+        ground=None, control_period=None, record_every=1, stop_when_fallen=None, pushes=(),
+    )  # fmt: skip
+    loop.begin()
+    contacts = len(allocate_phase(robot).closed)
+    assert contacts == robot.nc + 3 * robot.nv
+    assert len(loop.records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
+
+
+@pytest.mark.parametrize("turn", [0.0, -3.0])
+def test_a_run_may_begin_while_a_swing_foot_passes_below_the_ground(turn: float) -> None:
+    """The left foot is 15 mm deep and moves down, or slowly up: neither lands it."""
+    robot = hs.load_robot("compass_gait")
+    start = robot.state(
+        {"root_x": np.sin(0.2), "root_z": np.cos(0.2), "right_leg": 0.2, "left_leg": -0.1},
+        {
+            "root_x": np.cos(0.2), "root_z": -np.sin(0.2), "right_leg": 1.0, "left_leg": turn,
+        },
+    )  # fmt: skip
+    run = hs.simulate(
+        robot, state=start, duration=0.02, method=hs.EventDriven(swing_feet_pass=True)
+    )
+    assert run.status is RunStatus.COMPLETED
+    assert not run.events
+    np.testing.assert_array_equal(run.position[0], start.q)
+    assert np.all(run.gap[:, 1] < -0.01)

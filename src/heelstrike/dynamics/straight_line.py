@@ -241,6 +241,8 @@ def _lane(lane: int) -> ir.Constant:
 
 def _play(context: Any, address: Any, arguments: Any) -> Any:
     del context
+    if any(isinstance(kind, types.Array) and kind.layout != "C" for kind in arguments):
+        raise TypeError("straight-line code reads C-contiguous arrays only")
     signature = types.void(address, arguments)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:

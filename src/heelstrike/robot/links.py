@@ -153,7 +153,7 @@ def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> tuple[Float
     about_y = ((pose.ximat[moving, 3:6] ** 2) * model.body_inertia[moving]).sum(axis=1)
     nothing = body_mass < MASSLESS
     body_mass[nothing] = 0.0
-    about_y[nothing] = 0.0
+    about_y[nothing & (about_y < MASSLESS)] = 0.0
 
     def total(values: Floats) -> Floats:
         return np.bincount(link, values, minlength=len(origin)).astype(np.float64)

@@ -481,7 +481,9 @@ def find_what_happened(
             )
             if starting:
                 phase.group[contact] = contact
-                first = gap <= ON_THE_GROUND and normal <= rest
+                if contact < points and gap < -ON_THE_GROUND:
+                    phase.passing[contact] = phase.count[LET_PASS]
+                first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
             if phase.passing[contact] == 1:
                 phase.passing[contact] = 0 if first else 1
             elif (
@@ -622,7 +624,8 @@ def _advance(
     weight = total_weight(model.mass, model.gravity)
     rows, events = record.row_count, record.event_count
     row_room = record.time.shape[0] - 4
-    event_room = record.event_time.shape[0] - 8 * phase.closed.shape[0] - 8
+    # In one instant: what each look of `decide` finds, and what else may happen to a contact.
+    event_room = record.event_time.shape[0] - (LOOKS + 6) * phase.closed.shape[0] - 8
     period = clock[OUTPUT_PERIOD] * count[ROW_EVERY]
     while True:
         if rows[0] > row_room or events[0] > event_room:
@@ -775,7 +778,8 @@ def _check_start(setting: Setting, swing_feet_pass: bool) -> None:
     observe(robot.model, setting.ground, memory)
     gap, normal = memory.contacts.gap, memory.contacts.normal
     inside = np.flatnonzero(gap < -ON_THE_GROUND)
-    if len(inside) and not swing_feet_pass:
+    stands = bool(np.any(np.abs(gap) <= ON_THE_GROUND))
+    if len(inside) and not (swing_feet_pass and stands):
         deepest = int(inside[np.argmin(gap[inside])])
         others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
         needed = float(np.max(-gap[inside] / normal[inside, 1]))

@@ -337,7 +337,7 @@ class Loop:
             return
         rows = min(CHUNK, self.engine.rows_left + 2)
         self.records.append(
-            allocate_record(self.robot, rows, max(256, 16 * (self.robot.nc + 2 * self.robot.nv)))
+            allocate_record(self.robot, rows, max(256, 64 * (self.robot.nc + 3 * self.robot.nv)))
         )
 
     def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
