@@ -64,7 +64,10 @@ def test_points_above_the_sole_do_not_count(bravo7: hs.Robot) -> None:
 
 @pytest.mark.parametrize(
     ("position", "message"),
-    [([[0.0, -0.07]], "needs a heel and a toe"), ([[0.0, -0.07], [0.0, -0.07]], "cannot rest flat")],
+    [
+        ([[0.0, -0.07]], "needs a heel and a toe"),
+        ([[0.0, -0.07], [0.0, -0.07]], "cannot rest flat"),
+    ],
 )
 def test_a_foot_without_extent_is_refused(
     bravo7: hs.Robot, position: list[list[float]], message: str

@@ -32,7 +32,7 @@ SAME_ROW = 1e-14
 GOOD_PIVOT = 1e-7
 """Pivots that keep more than this of their diagonal are good."""
 
-NO_PIVOT = 1e-13
+NO_PIVOT = 1e-11
 """Rows that keep less depend on those before; what lies between is left to the general way."""
 
 

@@ -33,7 +33,7 @@ KERNELS: tuple[Callable[..., None], ...] = (
     push_points,
 )
 
-MOST_COORDINATES = 16
+MOST_COORDINATES = 12
 """Robots with more are left to the loops: straight-line code grows with the cube of the depth."""
 
 MOST_POINTS = 8

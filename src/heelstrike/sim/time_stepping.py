@@ -84,7 +84,7 @@ LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
 
 # A contact point enters the problem when it could close within a step at this speed (m/s) or at
 # twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
-# costs time but never changes the answer.
+# costs time but not the answer. Gaps that would take 100 m/s to close are not looked at.
 CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
 # The same for joint stops (rad/s or m/s).
