@@ -115,11 +115,12 @@ class Kernel:
     makes machine code of its own, which is kept on disk.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, dissolved: bool = False) -> None:
         update_wrapper(self, function)
         self.py_func = function
         self._called = False
         options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+        options["forceinline"] = dissolved
         self._part = njit(**options, pipeline_class=InnerKernelCompiler)(function)
 
     @property
@@ -147,6 +148,17 @@ def kernel(function: Function) -> Function:
     Division by zero follows IEEE 754 instead of raising, and the GIL is released.
     """
     compiled: Any = Kernel(function)
+    result: Function = compiled
+    return result
+
+
+def dissolved_kernel(function: Function) -> Function:
+    """Turn a function into a :class:`Kernel` that dissolves in those that call it.
+
+    For kernels of the innermost loop with one caller: arrays passed by value cost as much as a
+    small kernel does.
+    """
+    compiled: Any = Kernel(function, dissolved=True)
     result: Function = compiled
     return result
 

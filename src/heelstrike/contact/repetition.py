@@ -9,7 +9,7 @@ certificate decides as always.
 
 from __future__ import annotations
 
-from heelstrike.compilation import kernel
+from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
@@ -36,7 +36,7 @@ NO_PIVOT = 1e-11
 """Rows that keep less depend on those before; what lies between is left to the general way."""
 
 
-@kernel
+@dissolved_kernel
 def list_equations(
     count: int, delassus: Floats, friction: Floats, mode: Integers, work: ContactWorkspace
 ) -> int:
@@ -79,7 +79,7 @@ def list_equations(
     return size
 
 
-@kernel
+@dissolved_kernel
 def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
     """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
 
@@ -160,7 +160,7 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
         vector[i] -= part / length * direction[i]
 
 
-@kernel
+@dissolved_kernel
 def share_impulses(count: int, friction: Floats, impulse: Floats, work: ContactWorkspace) -> bool:
     """Write the solution out to all rows in equal shares; return whether it is in the cones."""
     equation, sharers, x = work.labels[PIVOT_ROW], work.vectors[SHARERS], work.vectors[POINT]
@@ -174,7 +174,7 @@ def share_impulses(count: int, friction: Floats, impulse: Floats, work: ContactW
     return True
 
 
-@kernel
+@dissolved_kernel
 def moves_as_named(
     count: int, friction: Floats, mode: Integers, velocity: Floats, work: ContactWorkspace
 ) -> bool:
@@ -198,7 +198,7 @@ def moves_as_named(
     return True
 
 
-@kernel
+@dissolved_kernel
 def repeat(
     count: int,
     delassus: Floats,

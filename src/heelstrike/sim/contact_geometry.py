@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.compilation import kernel
+from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.kernels import (
     forward_kinematics,
@@ -131,7 +131,7 @@ def add_impulse(model: Model, memory: Memory, count: int, v: Floats) -> None:
         v[j] += change[j]
 
 
-@kernel
+@dissolved_kernel
 def evaluate_equations(model: Model, q: Floats, v: Floats, memory: Memory) -> None:
     """Kinematics, factor of the mass matrix and bias force of a state."""
     program = memory.programs[EQUATIONS]
@@ -142,7 +142,7 @@ def evaluate_equations(model: Model, q: Floats, v: Floats, memory: Memory) -> No
         state_equations(model, q, v, tree, matrix, factor, bias)
 
 
-@kernel
+@dissolved_kernel
 def solve_mass_matrix(model: Model, memory: Memory, x: Floats) -> None:
     """Replace x by A⁻¹ x."""
     if memory.programs[SOLVE] != 0:

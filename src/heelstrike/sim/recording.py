@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heelstrike.compilation import kernel
+from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.robot.model import Model
 from heelstrike.sim.contact_geometry import contact_velocity
@@ -35,7 +35,7 @@ STANDING_SPEED = 1e-6
 INFINITY = float("inf")
 
 
-@kernel
+@dissolved_kernel
 def limit_torque(model: Model, memory: Memory) -> bool:
     """Clip the torques to their limits; return whether all were finite."""
     for i in range(model.actuator_joint.shape[0]):
@@ -52,7 +52,7 @@ def limit_torque(model: Model, memory: Memory) -> bool:
     return True
 
 
-@kernel
+@dissolved_kernel
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
     extreme = memory.extreme
@@ -75,7 +75,7 @@ def note_event(record: Record, time: float, kind: int, contact: int, memory: Mem
     record.event_count[0] = place + 1
 
 
-@kernel
+@dissolved_kernel
 def note_events(model: Model, record: Record, time: float, step: float, memory: Memory) -> None:
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
@@ -121,6 +121,8 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             record.event_impulse[place, 1] *= step
     for joint in range(model.parent.shape[0]):
         pushed = memory.stop_torque[joint] != 0.0
+        if not pushed and memory.stopped[joint] == 0:
+            continue
         way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
         stood = (
             memory.tally[STEPS] == 0
@@ -154,7 +156,7 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             memory.resting[dry] = 1 if rests else 0
 
 
-@kernel
+@dissolved_kernel
 def note_row(record: Record, time: float, memory: Memory) -> None:
     """Append the state now and what acts on it to the record."""
     row = record.row_count[0]
@@ -179,7 +181,7 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
     record.row_count[0] = row + 1
 
 
-@kernel
+@dissolved_kernel
 def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
     """Height of the centre of mass above the ground below it."""
     tree = memory.tree
@@ -194,7 +196,7 @@ def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
     return tree.pivot[1] + z / mass - below
 
 
-@kernel
+@dissolved_kernel
 def sound(memory: Memory) -> bool:
     """Whether the state is finite and not absurd."""
     for i in range(memory.v.shape[0]):

@@ -280,6 +280,9 @@ class Loop:
         self.records: list[Record] = [] if record is None else [record]
         if record is None:
             self._new_record()
+        # Bundles look up where their arrays are when first asked; the loop shall not wait for it.
+        for bundle in (self.robot.model, self.ground_model, self.memory, self.records[-1]):
+            _ = bundle.address
 
     def new_engine(self, memory: Memory) -> Engine:
         """Put the initial state into a memory and make an engine, which checks what it needs."""

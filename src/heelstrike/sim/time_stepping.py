@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compilation import kernel, loop_for, type_of
+from heelstrike.compilation import dissolved_kernel, kernel, loop_for, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
@@ -150,14 +150,14 @@ class TimeStepping:
         return _TimeSteppingEngine(self, setting)
 
 
-@kernel
+@dissolved_kernel
 def evaluate_state(model: Model, ground: GroundModel, memory: Memory) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
     evaluate_equations(model, memory.q, memory.v, memory)
     locate_contacts(model, ground, memory)
 
 
-@kernel
+@dissolved_kernel
 def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
@@ -182,7 +182,7 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
         memory.next_v[i] = memory.v[i] + memory.rate[i]
 
 
-@kernel
+@dissolved_kernel
 def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
     """Add to the free velocity what pushes do in this step."""
     if not share_over_step(memory.pushes, time, step):
@@ -196,7 +196,7 @@ def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
         memory.next_v[i] += step * memory.rate[i]
 
 
-@kernel
+@dissolved_kernel
 def select_candidates(
     model: Model, step: float, scheme: int, activation: float, memory: Memory
 ) -> int:
@@ -258,7 +258,7 @@ def select_candidates(
     return count
 
 
-@kernel
+@dissolved_kernel
 def select_stops(
     model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
 ) -> int:
@@ -310,7 +310,7 @@ def write_rows(model: Model, memory: Memory, count: int) -> None:
         memory.jacobian[2 * place, stop // 2] = 1.0 - 2.0 * (stop % 2)
 
 
-@kernel
+@dissolved_kernel
 def are_usual(memory: Memory, count: int) -> bool:
     """Whether there are programs for all candidates."""
     if memory.programs[DELASSUS] == 0:
@@ -322,7 +322,7 @@ def are_usual(memory: Memory, count: int) -> bool:
     return True
 
 
-@kernel
+@dissolved_kernel
 def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
     """Delassus matrix of the candidates out of that of all usual points."""
     contacts = memory.contacts
@@ -346,7 +346,7 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
     return memory.delassus
 
 
-@kernel
+@dissolved_kernel
 def push_candidates(model: Model, memory: Memory, count: int) -> None:
     """Add what the impulses of the candidates, usual points all, do to the velocity."""
     contacts = memory.contacts
@@ -365,7 +365,7 @@ def push_candidates(model: Model, memory: Memory, count: int) -> None:
     )  # fmt: skip
 
 
-@kernel
+@dissolved_kernel
 def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:
