@@ -6,7 +6,6 @@ import enum
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import nnls
 
 from heelstrike.contact.workspace import Floats
 
@@ -93,6 +92,8 @@ def _edges(friction: Floats) -> Floats:
 
 def _least_distance(shortest: Floats, free: Floats, edges: Floats) -> Floats | None:
     """Point of least norm of ``shortest + free @ z`` with all edges ≥ 0, or None."""
+    from scipy.optimize import nnls  # takes half a second to import
+
     slack = edges @ shortest
     if np.all(slack >= -1e-14 * np.abs(shortest).max(initial=0.0)):
         return shortest

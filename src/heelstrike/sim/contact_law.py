@@ -11,12 +11,12 @@ gap, positive when leaving; forces act on the robot.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import acos, acosh, exp, log1p, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from heelstrike.compilation import kernel
 from heelstrike.errors import SimulationError
@@ -135,7 +135,7 @@ class HuntCrossley:
                 return approach - log1p(approach) + leave + log1p(-leave)
 
             highest = (1.0 - 1e-15) / restitution
-            scaled = float(brentq(defect, 1e-6 * highest, highest, xtol=1e-15, rtol=1e-14))
+            scaled = _root(defect, 1e-6 * highest, highest)
         return cls(
             stiffness=weight / sink**exponent,
             dissipation=scaled / (1.5 * speed),
@@ -153,10 +153,8 @@ class HuntCrossley:
         if approach < 1e-7:
             return 1.0 - self.dissipation * speed
         level = approach - log1p(approach)
-        leave = brentq(
-            lambda x: -x - log1p(-x) - level, 0.0, -np.expm1(-level - 1.0), xtol=1e-15, rtol=1e-14
-        )
-        return float(leave / approach)
+        leave = _root(lambda x: -x - log1p(-x) - level, 0.0, -np.expm1(-level - 1.0))
+        return leave / approach
 
     def sink(self, weight: float) -> float:
         """Penetration in metres of a contact point at rest under a load in newtons."""
@@ -228,7 +226,7 @@ class KelvinVoigt:
         stiffness = weight / sink
         ratio = 0.0
         if restitution < 1.0:
-            ratio = float(brentq(lambda z: _linear_restitution(z) - restitution, 0.0, 1e9))
+            ratio = _root(lambda z: _linear_restitution(z) - restitution, 0.0, 1e9)
         return cls(stiffness=stiffness, damping=2.0 * ratio * sqrt(stiffness * weight / GRAVITY))
 
     def damping_ratio(self, mass: float) -> float:
@@ -354,6 +352,13 @@ class BristleFriction:
 
 NormalLaw = HuntCrossley | KelvinVoigt
 FrictionLaw = RegularisedFriction | BristleFriction
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function between two numbers, to the last digits."""
+    from scipy.optimize import brentq  # takes half a second to import
+
+    return float(brentq(function, low, high, xtol=1e-15, rtol=1e-14))
 
 
 def _positive(name: str, value: float, unit: str) -> None:

@@ -125,7 +125,7 @@ def _threads(part: dict[str, Any]) -> Figure:
     axes.set_xticks([row["threads"] for row in part["rows"]])
     axes.set_ylim(0.0)
     axes.set_xlabel("threads (dotted: in proportion)")
-    axes.set_ylabel("walking steps of 1 ms computed a second (10⁶/s)")
+    axes.set_ylabel("million steps of 1 ms a second")
     axes.legend()
     return figure
 
