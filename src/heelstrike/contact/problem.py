@@ -89,6 +89,36 @@ def keep(
 
 
 @kernel
+def stick_or_open(
+    count: int,
+    delassus: Floats,
+    free: Floats,
+    friction: Floats,
+    tolerance: float,
+    work: ContactWorkspace,
+) -> bool:
+    """Try the modes under trial the quick way, if no contact is prescribed to slide."""
+    vectors, labels = work.vectors, work.labels
+    if vectors[SETTINGS, SKEWED] != 0.0:
+        return False
+    for contact in range(count):
+        if labels[PRESCRIBED, contact] != OPEN:
+            return False
+    return repeat(
+        count,
+        delassus,
+        free,
+        friction,
+        labels[TRIAL_MODE],
+        vectors[IMPULSE],
+        vectors[VELOCITY],
+        vectors[RESIDUAL],
+        tolerance,
+        work,
+    )
+
+
+@kernel
 def solve_contact_kernel(
     count: int,
     delassus: Floats,
@@ -138,6 +168,8 @@ def solve_contact_kernel(
     counters[LAST_FALLBACKS] = 0
     counters[SUCCEEDED] = WARM_START
     clean = min(tolerance, CLEAN)
+    for contact in range(count):
+        vectors[SLOPE, contact] = 0.0
     if vectors[SETTINGS, SKEWED] == 0.0 and repeat(
         count, delassus, free, friction, mode, impulse, velocity, residual, clean, work
     ):
@@ -179,6 +211,10 @@ def solve_contact_kernel(
                 outcome = gauss_seidel(count, unknowns, call, work)
                 proposing = outcome == SOLVED
             call += 1
+            if attempt >= 0 and stick_or_open(count, delassus, free, friction, clean, work):
+                keep(count, mode, impulse, velocity, residual, work)
+                counters[SUCCEEDED] = order[attempt]
+                return SOLVED
             worst = evaluate(count, delassus, free, friction, work)
             latest = worst < best
             if latest:

@@ -14,13 +14,13 @@ from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
     BASIS,
+    EQUATION,
     PIVOT_ROW,
     POINT,
     REST_TOLERANCE,
     SHARERS,
     SIZE,
     SLOPE,
-    SOURCE,
     ContactWorkspace,
     Floats,
     Integers,
@@ -42,10 +42,10 @@ def list_equations(
 ) -> int:
     """List the rows that shall have no velocity; return how many differ, or -1 to give up.
 
-    ``SOURCE`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for none,
-    and ``SHARERS`` how many rows share an equation.
+    ``EQUATION`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for
+    none, and ``SHARERS`` how many rows share an equation.
     """
-    source, equation, sharers = work.labels[SOURCE], work.labels[PIVOT_ROW], work.vectors[SHARERS]
+    source, equation, sharers = work.labels[EQUATION], work.labels[PIVOT_ROW], work.vectors[SHARERS]
     size = 0
     for contact in range(count):
         row = 2 * contact
@@ -86,7 +86,7 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
     Elimination in the order of the rows, A = L D Lᵀ, with 1/D on the diagonal, zero for rows that
     depend on others.
     """
-    source, matrix, x = work.labels[SOURCE], work.tableau, work.vectors[POINT]
+    source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
     dependent = 0
     for i in range(size):
         total = -free[source[i]]
@@ -216,8 +216,6 @@ def repeat(
     Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`. After a
     success they hold the one solution of least norm, certified to ``tolerance``.
     """
-    for contact in range(count):
-        work.vectors[SLOPE, contact] = 0.0
     size = list_equations(count, delassus, friction, mode, work)
     if size < 0 or not solve_equations(size, delassus, free, work):
         return False
