@@ -445,7 +445,7 @@ class ComputedTorque:
 
     def _initial_memory(self) -> NDArray[np.float64]:
         nv, nu = self.robot.nv, self.robot.nu
-        size = MEMORY_HEADER + SAMPLES_KEPT * nu + 8 * nv
+        size = MEMORY_HEADER + SAMPLES_KEPT * nu + 5 * nv
         if isinstance(self.gait, PiecewiseGait):
             from heelstrike.control.point_feet import memory_size
 
