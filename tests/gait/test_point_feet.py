@@ -248,3 +248,19 @@ def test_an_impossible_gait_is_told(rabbit: hs.Robot, monkeypatch: pytest.Monkey
     monkeypatch.setitem(SETTINGS["ipopt"], "max_iter", 30)  # more would only take longer
     with pytest.raises(InfeasibleGaitError, match="friction = 0 was found from 1 starting"):
         hs.optimize_gait(rabbit, **{**STEP, "friction": 0.0})
+
+
+def test_a_robot_s_own_speed_limits_hold(rabbit: hs.Robot, rabbit_gait: hs.PiecewiseGait) -> None:
+    """Where the free gait is fastest, nine tenths of that speed are allowed."""
+
+    def fastest(robot: hs.Robot, gait: hs.PiecewiseGait) -> float:
+        speeds = [motion(robot, gait, t)[1][3:] for t in gauss_times(gait)]
+        return float(np.abs(speeds).max())
+
+    limit = 0.9 * fastest(rabbit, rabbit_gait)
+    model = dataclasses.replace(rabbit.model, speed_limit=np.full(rabbit.nv, limit))
+    slow_robot = dataclasses.replace(rabbit, model=model)
+    gait = hs.optimize_gait(slow_robot, **STEP)
+    # The optimiser holds limits at the Gauss points, to its own 1e-8 and what scaling adds.
+    assert fastest(slow_robot, gait) <= limit * (1.0 + 1e-6)
+    assert gait.cost > rabbit_gait.cost

@@ -15,7 +15,7 @@ import numpy as np
 from heelstrike.dynamics.symbolic import expression, symbols
 from heelstrike.gait.point_support import PointImpact, PointSupport
 from heelstrike.gait.request import Request
-from heelstrike.gait.transcription import LIFT_TOLERANCE, Constraints, Group
+from heelstrike.gait.transcription import LIFT_TOLERANCE, Constraints, Group, add_joint_limits
 
 
 class PointTranscription:
@@ -88,7 +88,7 @@ class PointTranscription:
             constraints.add(Group.FRICTION, inside, subject=name, unit=weight)
         height = support.lowest(self.swing)[1]
         constraints.add(Group.CLEARANCE, height, subject=robot.contact_names[self.swing])
-        self._add_limits(constraints, symbols(q)[1:], symbols(v)[1:], support.torque)
+        add_joint_limits(constraints, request, symbols(q)[1:], symbols(v)[1:], support.torque)
         self.path_rows = constraints.rows
         torque = expression(support.torque)
         stacked = casadi.cse(casadi.vertcat(casadi.sumsqr(torque), *constraints.expressions))
@@ -102,35 +102,6 @@ class PointTranscription:
             "state", [q, v], [expression(support.q), expression(support.v)]
         )
         self.roll = casadi.Function("roll", [q], [casadi.SX(support.rolled)])
-
-    def _add_limits(
-        self, constraints: Constraints, position: Any, velocity: Any, torque: Any
-    ) -> None:
-        robot, model, request = self.robot, self.robot.model, self.request
-        actuator = np.argsort(model.actuator_joint)
-        for k in range(robot.nv - 3):
-            name, j = robot.joint_names[k + 3], k + 3
-            low, high = float(model.lower[j]), float(model.upper[j])
-            if np.isfinite([low, high]).any():
-                constraints.add(Group.JOINT_RANGE, position[k], subject=name, lower=low, upper=high)
-            low = float(model.torque_lower[actuator[k]])
-            high = float(model.torque_upper[actuator[k]])
-            finite = [abs(limit) for limit in (low, high) if np.isfinite(limit)]
-            if finite:
-                unit = max(finite) or 1.0
-                constraints.add(
-                    Group.TORQUE, torque[k], subject=name, lower=low, upper=high, unit=unit
-                )
-            limit = request.joint_speed_limit
-            if np.isfinite(limit):
-                constraints.add(
-                    Group.JOINT_SPEED,
-                    velocity[k],
-                    subject=name,
-                    lower=-limit,
-                    upper=limit,
-                    unit=limit,
-                )
 
     def _build_touchdown(self) -> None:
         request, robot = self.request, self.robot

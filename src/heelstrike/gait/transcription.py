@@ -212,7 +212,7 @@ class Transcription:
         self._add_forces(constraints, support)
         for i, height in zip(request.swing.contacts, heights, strict=True):
             constraints.add(Group.CLEARANCE, height, subject=robot.contact_names[i])
-        self._add_limits(constraints, motion[0], motion[1], support.torque)
+        add_joint_limits(constraints, self.request, motion[0], motion[1], support.torque)
 
         effort = self._duration * casadi.sumsqr(expression(support.torque))
         if request.free_step:
@@ -273,42 +273,6 @@ class Transcription:
                 unit=half * unit,
                 scale=1.0 / unit,
             )
-
-    def _add_limits(
-        self, constraints: Constraints, position: Symbols, velocity: Symbols, torque: Symbols
-    ) -> None:
-        """Ranges, speeds and torques of the joints, where the robot has limits."""
-        robot, model = self.robot, self.robot.model
-        actuator = np.argsort(model.actuator_joint)
-        for k in range(self.joints):
-            name, j = robot.joint_names[k + 3], k + 3
-            if np.isfinite([model.lower[j], model.upper[j]]).any():
-                constraints.add(
-                    Group.JOINT_RANGE,
-                    position[k],
-                    subject=name,
-                    lower=model.lower[j],
-                    upper=model.upper[j],
-                )
-            lower, upper = (
-                limit[actuator[k]] for limit in (model.torque_lower, model.torque_upper)
-            )
-            finite = np.abs([limit for limit in (lower, upper) if np.isfinite(limit)])
-            if finite.size:
-                unit = float(finite.max()) or 1.0
-                constraints.add(
-                    Group.TORQUE, torque[k], subject=name, lower=lower, upper=upper, unit=unit
-                )
-            limit = min(self.request.joint_speed_limit, float(model.speed_limit[j]))
-            if np.isfinite(limit):
-                constraints.add(
-                    Group.JOINT_SPEED,
-                    velocity[k],
-                    subject=name,
-                    lower=-limit,
-                    upper=limit,
-                    unit=limit,
-                )
 
     def _build_touchdown(self) -> None:
         request, robot, model = self.request, self.robot, self.robot.model
@@ -384,3 +348,33 @@ def _differentiated(
         casadi.Function("jacobian", arguments, [values, casadi.jacobian(values, x)]),
         casadi.Function("hessian", [*arguments, multipliers], [casadi.triu(hessian)]),
     )
+
+
+def add_joint_limits(
+    constraints: Constraints, request: Request, position: Any, velocity: Any, torque: Any
+) -> None:
+    """Add ranges, speeds and torques of the joints, where robot or request have limits.
+
+    Positions, velocities and torques are those of the joints from the first leg on, without the
+    floating base.
+    """
+    robot, model = request.robot, request.robot.model
+    actuator = np.argsort(model.actuator_joint)
+    for k in range(robot.nv - 3):
+        name, j = robot.joint_names[k + 3], k + 3
+        lower, upper = float(model.lower[j]), float(model.upper[j])
+        if np.isfinite([lower, upper]).any():
+            constraints.add(Group.JOINT_RANGE, position[k], subject=name, lower=lower, upper=upper)
+        lower = float(model.torque_lower[actuator[k]])
+        upper = float(model.torque_upper[actuator[k]])
+        finite = [abs(limit) for limit in (lower, upper) if np.isfinite(limit)]
+        if finite:
+            unit = max(finite) or 1.0
+            constraints.add(
+                Group.TORQUE, torque[k], subject=name, lower=lower, upper=upper, unit=unit
+            )
+        limit = min(request.joint_speed_limit, float(model.speed_limit[j]))
+        if np.isfinite(limit):
+            constraints.add(
+                Group.JOINT_SPEED, velocity[k], subject=name, lower=-limit, upper=limit, unit=limit
+            )
