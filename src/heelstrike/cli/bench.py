@@ -44,7 +44,7 @@ def bench(
     """
     with stage("loading", when_slow="(compiling, once)") as current:
         from heelstrike.experiments.benchmark import run_benchmark
-        from heelstrike.experiments.benchmark.machine import NOT_INSTALLED, peers
+        from heelstrike.experiments.benchmark.engines import NOT_INSTALLED, peers
 
         missing = [name for name, state in peers().items() if state == NOT_INSTALLED]
         if missing and not as_json:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 OURS, THEIRS = BLUE, VERMILION
+COLORS = {"mujoco": VERMILION, "drake": ORANGE, "bullet": GREY, "dart": PURPLE}
+ENGINE_MARKS = {"mujoco": "s", "drake": "D", "bullet": "v", "dart": "^"}
 
 
 def draw(parts: dict[str, Any]) -> dict[str, Figure]:
@@ -38,32 +40,40 @@ def draw(parts: dict[str, Any]) -> dict[str, Figure]:
 
 def _steps(part: dict[str, Any]) -> Figure:
     rows = [row for row in part["rows"] if "heelstrike_us" in row]
-    figure = new_figure(7.0, 0.9 + 0.62 * len(rows))
+    sides = {"heelstrike": "heelstrike", **part["engines"]}
+    figure = new_figure(7.0, 1.1 + (0.26 + 0.18 * len(sides)) * len(rows))
     axes = figure.add_subplot()
     place = np.arange(len(rows))[::-1]
-    axes.barh(
-        place + 0.19, [r["heelstrike_us"] for r in rows], 0.36, color=OURS, label="heelstrike"
-    )
-    if any("mujoco_us" in row for row in rows):
-        theirs = [row.get("mujoco_us", 0.0) for row in rows]
-        axes.barh(
-            place - 0.19, theirs, 0.36, color=THEIRS, hatch="///", edgecolor="white", label="MuJoCo"
-        )
-    for y, row in zip(place, rows, strict=True):
-        if "times_faster" in row:
+    height = 0.8 / len(sides)
+    for i, (name, label) in enumerate(sides.items()):
+        y = place + 0.4 - (i + 0.5) * height
+        theirs = [row.get(f"{name}_us", np.nan) for row in rows]
+        axes.barh(y, theirs, 0.9 * height, label=label, **_bar(name))
+        for at, row in zip(y, rows, strict=True):
+            if name in row.get("times_faster", {}):
+                text = f"{row['times_faster'][name]:.3g} ×"
+                where = (row[f"{name}_us"], at)
+            elif name != "heelstrike":
+                text, where = "–", (row["heelstrike_us"], at)
+            else:
+                continue
             axes.annotate(
-                f"{row['times_faster']:.1f} ×",
-                (row["heelstrike_us"], y + 0.19),
-                xytext=(4, 0),
-                textcoords="offset points",
-                va="center",
-                color=INK,
+                text, where, xytext=(4, 0), textcoords="offset points", va="center", color=INK
             )
+    axes.set_xscale("log")
+    axes.set_xlim(0.5)
+    axes.margins(x=0.15)
     axes.set_yticks(place, [row["scenario"] for row in rows])
     axes.grid(False, axis="y")
     axes.set_xlabel("time to compute a step of 1 ms (µs)")
-    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=min(3, len(sides)))
     return figure
+
+
+def _bar(name: str) -> dict[str, Any]:
+    if name == "heelstrike":
+        return {"color": OURS}
+    return {"color": COLORS[name], "hatch": "///", "edgecolor": "white"}
 
 
 _MARKS = (
@@ -84,10 +94,8 @@ def _precision(part: dict[str, Any]) -> Figure:
     for name in names:
         points = [p for p in part["points"] if p["series"] == name]
         seconds, error = zip(*((p["seconds"], p["error_rad"]) for p in points), strict=True)
-        if name.startswith("MuJoCo"):
-            color, mark, line = THEIRS, _PEER_MARKS[others % 6], "--"
-            if "default" in name:
-                color = GREY
+        if points[0]["side"] != "heelstrike":
+            color, mark, line = COLORS[points[0]["side"]], _PEER_MARKS[others % 6], "--"
             others += 1
         else:
             color, mark, line = _MARKS[own % 5]
@@ -138,14 +146,10 @@ def _scaling(part: dict[str, Any]) -> Figure:
         (right, "contacts", "contact points under a plank at rest"),
     ):
         size = np.array([row["size"] for row in part[name]])
-        for key, engine, color, mark in (
-            ("heelstrike_us", "heelstrike", OURS, "o"),
-            ("mujoco_us", "MuJoCo Euler", THEIRS, "s"),
-        ):
-            if key in part[name][0]:
-                axes.plot(
-                    size, [r[key] for r in part[name]], color=color, marker=mark, label=engine
-                )
+        for side, engine in {"heelstrike": "heelstrike", **part["engines"]}.items():
+            cost = [row.get(f"{side}_us", np.nan) for row in part[name]]
+            color, mark = COLORS.get(side, OURS), ENGINE_MARKS.get(side, "o")
+            axes.plot(size, cost, color=color, marker=mark, label=engine)
         if name == "joints":
             axes.set_xscale("log")
         else:

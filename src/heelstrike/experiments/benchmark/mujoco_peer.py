@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -14,15 +14,14 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from heelstrike.experiments.benchmark.own import InvalidRunError
+from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
 from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
 from heelstrike.experiments.benchmark.stopwatch import Work
 from heelstrike.robot import State
 
 Floats = NDArray[np.float64]
 
-SINKING = 0.01
-"""How far a standing robot may sink into MuJoCo's soft ground, in m."""
+KIND = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,63 +54,69 @@ class Options:
         return f"MuJoCo {self.integrator}, contacts stiff to {self.stiff:g} steps"
 
 
-class MuJoCoPeer:
-    """A scenario in MuJoCo."""
+class MuJoCoPeer(Peer):
+    """A scenario in MuJoCo, which reads the robot from its file and runs in its own `rollout`."""
+
+    settling = 3.0
 
     def __init__(self, scenario: Scenario, options: Options) -> None:
-        self._scenario = scenario
-        self._options = options
+        super().__init__(scenario, options.step)
         self.model = _model(scenario, options)
         self.data = mujoco.MjData(self.model)
-        self.steps = round(scenario.duration / options.step)
-        self._start = self._packed(scenario.state)
-        self._control = self._controls()
-        self._states = np.zeros((1, self.steps, self._start.shape[1]))
+        self._step = 0
+        self._states = np.zeros((1, self.steps, mujoco.mj_stateSize(self.model, KIND)))
         self._none = np.zeros((1, self.steps, self.model.nsensordata))
 
     def _packed(self, state: State) -> Floats:
-        kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:] = state.q
         self.data.qvel[:] = state.v
-        packed = np.zeros((1, mujoco.mj_stateSize(self.model, kind)))
-        mujoco.mj_getState(self.model, self.data, packed[0], kind)
+        packed = np.zeros((1, mujoco.mj_stateSize(self.model, KIND)))
+        mujoco.mj_getState(self.model, self.data, packed[0], KIND)
         return packed
 
-    def _controls(self) -> Floats:
-        feedback = self._scenario.feedback
-        if feedback is None:
-            return np.zeros((1, 1, self.model.nu))
-        if feedback.coefficients.shape[2] == 1:
-            return feedback.command([0.0])[None]  # it never changes
-        return feedback.command(self._options.step * np.arange(self.steps))[None]
+    def restart(self) -> None:
+        """Go back to `start`, at time 0."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = self.start.q
+        self.data.qvel[:] = self.start.v
+        self._step = 0
 
-    def settle(self, seconds: float) -> None:
-        """Let it sink in first: start from where it is after a while."""
-        steps = round(seconds / self._options.step)
-        states, _ = rollout.rollout(
-            self.model, self.data, self._start, self._control[:, :1], nstep=steps
-        )
-        self._start = np.ascontiguousarray(states[:, -1])
+    def advance(self, steps: int) -> None:
+        """Simulate some steps: several in one `rollout`."""
+        if steps == 1:
+            self.data.ctrl[:] = self.command(self._step)
+            mujoco.mj_step(self.model, self.data)
+        else:
+            now = np.zeros((1, self._states.shape[2]))
+            mujoco.mj_getState(self.model, self.data, now[0], KIND)
+            varying = len(self.commands) > 1
+            control = self.commands[self._step : self._step + steps] if varying else self.commands
+            kept = steps == self.steps  # room for all states is there already
+            states, _ = rollout.rollout(
+                self.model,
+                self.data,
+                now,
+                control[None],
+                nstep=steps,
+                state=self._states if kept else None,
+                sensordata=self._none if kept else None,
+            )
+            mujoco.mj_setState(self.model, self.data, states.reshape(steps, -1)[-1], KIND)
+        self._step += steps
 
-    def run(self) -> float:
-        """Simulate; return the seconds it took."""
-        begin = perf_counter()
-        rollout.rollout(
-            self.model,
-            self.data,
-            self._start,
-            self._control,
-            nstep=self.steps,
-            state=self._states,
-            sensordata=self._none,
-        )
-        return perf_counter() - begin
+    def state(self) -> State:
+        """Where it is now."""
+        return State(self.data.qpos.copy(), self.data.qvel.copy())
 
-    @property
-    def work(self) -> Work:
-        """The same, to be timed."""
-        return self.run
+    def touching(self) -> Touching:
+        """How it touched the ground in the last step."""
+        force, total = np.zeros(6), 0.0
+        for i in range(self.data.ncon):
+            mujoco.mj_contactForce(self.model, self.data, i, force)
+            total += force[0]
+        depth = max((-contact.dist for contact in self.data.contact), default=0.0)
+        return Touching(self.data.ncon, total, depth)
 
     def batch_work(self, starts: Sequence[State], threads: int) -> Work:
         """Work that simulates from several states on several threads."""
@@ -126,7 +131,7 @@ class MuJoCoPeer:
                 self.model,
                 data,
                 states,
-                self._control,
+                self.commands[None],
                 nstep=self.steps,
                 state=out,
                 sensordata=none,
@@ -135,55 +140,6 @@ class MuJoCoPeer:
             return perf_counter() - begin
 
         return work
-
-    def final_position(self) -> Floats:
-        """Generalised positions at the end of the last run, (nq,)."""
-        position: Floats = self._states[0, -1, 1 : 1 + self.model.nq].copy()
-        return position
-
-    def check(self) -> dict[str, float]:
-        """Step through once, looking at contacts and forces.
-
-        Raises
-        ------
-        InvalidRunError
-            If something that stands does not stand as it should.
-        """
-        kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        model, data = self.model, self.data
-        mujoco.mj_setState(model, data, self._start[0], kind)
-        active, deepest, carried = [], 0.0, 0.0
-        force = np.zeros(6)
-        for k in range(self.steps):
-            data.ctrl[:] = self._control[0, min(k, self._control.shape[1] - 1)]
-            mujoco.mj_step(model, data)
-            active.append(data.ncon)
-            deepest = max([deepest, *(-contact.dist for contact in data.contact)])
-        carried = 0.0
-        for i in range(data.ncon):
-            mujoco.mj_contactForce(model, data, i, force)
-            carried += force[0]
-        scenario = self._scenario
-        carried /= scenario.robot.weight
-        found = {
-            "penetration_m": float(deepest),
-            "active_contacts": float(np.mean(active)),
-            "steps": float(self.steps),
-        }
-        if not np.all(np.isfinite(data.qpos)):
-            raise InvalidRunError("MuJoCo's state is not finite")
-        if scenario.contacts is not None:
-            found["weight_carried"] = float(carried)
-            if set(active) != {scenario.contacts}:
-                raise InvalidRunError(
-                    f"{min(active)} to {max(active)} contacts are active in MuJoCo"
-                )
-            if abs(carried - 1.0) > 1e-2 or deepest > SINKING:
-                raise InvalidRunError(
-                    f"in MuJoCo the ground carries {carried:.3f} of the weight and the robot sinks "
-                    f"{1e3 * deepest:.1f} mm"
-                )
-        return found
 
 
 def _model(scenario: Scenario, options: Options) -> Any:
@@ -199,13 +155,11 @@ def _model(scenario: Scenario, options: Options) -> Any:
         actuator.forcelimited = int(np.isfinite(limits.torque_upper[i]))
         if actuator.forcelimited:
             actuator.forcerange = limits.torque_lower[i], limits.torque_upper[i]
-    for geom in spec.geoms:
-        geom.friction = FRICTION, 0.0, 0.0
-    return configured(spec, options)
-
-
-def configured(spec: Any, options: Options) -> Any:
-    """Compile a specification with the given options."""
+    for geom in list(spec.geoms):
+        if not geom.contype and not geom.conaffinity:
+            spec.delete(geom)  # bones, which are only looked at
+        else:
+            geom.friction = FRICTION, 0.0, 0.0
     spec.option.timestep = options.step
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{options.integrator.upper()}")
     if options.tolerance is not None:
@@ -218,3 +172,29 @@ def configured(spec: Any, options: Options) -> Any:
             geom.solref = options.stiff * options.step, 1.0
             geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
     return spec.compile()
+
+
+def _settings(quick: bool) -> Iterator[Setting]:
+    small = (1e-3, 1e-4) if quick else (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
+    # The settings that came nearest in a search over time constants from 2 to 10 steps, friction
+    # impedance ratios from 1 to 1000, both cones, and direct stiffness of the contacts.
+    ways: list[tuple[str, float | None]] = [("euler", None), ("euler", 5.0), ("rk4", 2.0)]
+    if not quick:
+        ways += [("euler", 2.0), ("euler", 10.0), ("implicitfast", 5.0), ("rk4", None)]
+    for integrator, stiff in ways:
+        for step in small:
+            tolerance = None if stiff is None else 1e-10
+            options = Options(step=step, integrator=integrator, stiff=stiff, tolerance=tolerance)
+            yield Setting(
+                options.label,
+                f"h {step:.0e} s",
+                lambda scenario, options=options: MuJoCoPeer(scenario, options),  # type: ignore[misc]
+            )
+
+
+ENGINE = Engine(
+    label="MuJoCo Euler",
+    note="in its own loop, rollout, with its controls handed over",
+    peer=lambda scenario, step: MuJoCoPeer(scenario, Options(step=step)),
+    settings=_settings,
+)

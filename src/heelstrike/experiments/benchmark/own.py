@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,8 @@ NEVER = 2**62
 """Steps between two rows of a run of which only the end is wanted."""
 
 
-@dataclass(frozen=True)
 class InvalidRunError(Exception):
     """A run that does not count, and why."""
-
-    reason: str
-
-    def __str__(self) -> str:
-        return self.reason
 
 
 def controller(scenario: Scenario, *, own: bool) -> CompiledController | None:

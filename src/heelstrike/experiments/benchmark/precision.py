@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.experiments.benchmark import own, scenarios
+from heelstrike.experiments.benchmark.engines import PACKAGES, simulators
+from heelstrike.experiments.benchmark.peer import Peer, Setting, reason
 from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import Work, best_of
 from heelstrike.sim import Compliant, EventDriven, EventKind, HuntCrossley, Scheme, TimeStepping
@@ -24,14 +26,12 @@ Floats = NDArray[np.float64]
 GOAL = 1e-4
 """Error in a joint's last position that is asked for, in rad."""
 
-LONGEST = 20.0
-"""Settings that would take longer than this (s) are left out."""
-
 
 @dataclass(frozen=True)
 class _Setting:
     """One point of a curve."""
 
+    side: str
     series: str
     knob: str
     work: Work
@@ -45,33 +45,37 @@ def measure_precision(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     truth = reference.position[-1]
     impacts = sorted({round(e.time, 6) for e in reference.events if e.kind is EventKind.TOUCHDOWN})
     joints = scenario.robot.model.actuator_joint
-    points = []
+    points: list[dict[str, Any]] = []
+    failures = []
     for setting in _settings(scenario, quick=quick, peers=peers):
-        first = setting.work()
-        if first > LONGEST:
+        about = {"side": setting.side, "series": setting.series, "knob": setting.knob}
+        try:
+            seconds, final = _run(setting, quick=quick)
+        except Exception as error:  # of one engine must not lose what the others found
+            failures.append({**about, "reason": reason(error)})
             continue
-        seconds = first
-        if first < 1.0:
-            seconds = best_of({"": setting.work}, seconds=0.02 if quick else 0.5, least=3)[""]
-        final = setting.final()
-        error = float(np.max(np.abs(final - truth)[joints]))
-        if np.isfinite(error):
-            points.append(
-                {
-                    "series": setting.series,
-                    "knob": setting.knob,
-                    "seconds": seconds,
-                    "error_rad": error,
-                }
-            )
+        error_rad = float(np.max(np.abs(final - truth)[joints]))
+        if np.isfinite(error_rad):
+            points.append({**about, "seconds": seconds, "error_rad": error_rad})
+        else:
+            failures.append({**about, "reason": "it does not get through the walk"})
     return {
         "scenario": scenario.name,
         "duration_s": scenario.duration,
         "goal_rad": GOAL,
         "touchdowns_s": impacts,
         "points": points,
+        "failures": failures,
         "to_goal": _to_goal(points),
     }
+
+
+def _run(setting: _Setting, *, quick: bool) -> tuple[float, Floats]:
+    """Least seconds that a setting takes, and where it ends."""
+    seconds = setting.work()
+    if seconds < 1.0:
+        seconds = best_of({"": setting.work}, seconds=0.02 if quick else 0.5, least=3)[""]
+    return seconds, setting.final()
 
 
 def _settings(scenario: Scenario, *, quick: bool, peers: Sequence[str]) -> Iterable[_Setting]:
@@ -91,22 +95,20 @@ def _settings(scenario: Scenario, *, quick: bool, peers: Sequence[str]) -> Itera
         law = HuntCrossley()
         law = HuntCrossley(stiffness=factor * law.stiffness, exponent=law.exponent)
         yield _own(scenario, "Compliant", f"stiffness × {factor:g}", Compliant(law=law))
-    if "mujoco" not in peers:
-        return
-    from heelstrike.experiments.benchmark.mujoco_peer import MuJoCoPeer, Options
+    for name, engine in simulators(peers).items():
+        for setting in engine.settings(quick):
+            yield _theirs(name, scenario, setting)
 
-    small = (1e-3, 1e-4) if quick else (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
-    # The settings that came nearest in a search over time constants from 2 to 10 steps, friction
-    # impedance ratios from 1 to 1000, both cones, and direct stiffness of the contacts.
-    ways: list[tuple[str, float | None]] = [("euler", None), ("euler", 5.0), ("rk4", 2.0)]
-    if not quick:
-        ways += [("euler", 2.0), ("euler", 10.0), ("implicitfast", 5.0), ("rk4", None)]
-    for integrator, stiff in ways:
-        for step in small:
-            tolerance = None if stiff is None else 1e-10
-            options = Options(step=step, integrator=integrator, stiff=stiff, tolerance=tolerance)
-            peer = MuJoCoPeer(scenario, options)
-            yield _Setting(options.label, f"h {step:.0e} s", peer.work, peer.final_position)
+
+def _theirs(side: str, scenario: Scenario, setting: Setting) -> _Setting:
+    made: list[Peer] = []
+
+    def work() -> float:
+        if not made:
+            made.append(setting.make(scenario))
+        return made[0].run()
+
+    return _Setting(side, setting.series, setting.knob, work, lambda: made[0].state().q)
 
 
 def _own(scenario: Scenario, series: str, knob: str, method: Method) -> _Setting:
@@ -117,25 +119,24 @@ def _own(scenario: Scenario, series: str, knob: str, method: Method) -> _Setting
         last[:] = [run.position[-1]] if run.completed else [np.full(scenario.robot.nq, np.nan)]
         return run.timing.wall_s
 
-    return _Setting(series, knob, work, lambda: last[0])
+    return _Setting("heelstrike", series, knob, work, lambda: last[0])
 
 
 def _to_goal(points: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Least time in which each side reaches the goal; the best error of those that do not."""
-    sides = {
-        "heelstrike": [p for p in points if not p["series"].startswith("MuJoCo")],
-        "mujoco": [p for p in points if p["series"].startswith("MuJoCo")],
-    }
     found: dict[str, Any] = {}
-    for side, its in sides.items():
-        if not its:
-            continue
-        good = [p for p in its if p["error_rad"] <= GOAL]
+    for side in dict.fromkeys(point["side"] for point in points):
+        its = [point for point in points if point["side"] == side]
+        good = [point for point in its if point["error_rad"] <= GOAL]
         if good:
-            found[side] = min(good, key=lambda p: p["seconds"])
+            found[side] = min(good, key=lambda point: point["seconds"])
         else:
-            found[f"{side}_best"] = min(its, key=lambda p: p["error_rad"])
-    if "heelstrike" in found and ("mujoco" in found or "mujoco_best" in found):
-        other = found.get("mujoco") or found["mujoco_best"]
-        found["times_less"] = other["seconds"] / found["heelstrike"]["seconds"]
+            found[f"{side}_best"] = min(its, key=lambda point: point["error_rad"])
+    if "heelstrike" in found:
+        ours = found["heelstrike"]["seconds"]
+        found["times_less"] = {
+            side: (found.get(side) or found[f"{side}_best"])["seconds"] / ours
+            for side in PACKAGES
+            if side in found or f"{side}_best" in found
+        }
     return found

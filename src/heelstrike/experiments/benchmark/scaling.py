@@ -8,15 +8,18 @@ from typing import Any
 import numpy as np
 
 from heelstrike.contact.ground import Ground
+from heelstrike.experiments.benchmark.engines import PARTS_OF_STEPS, simulators
 from heelstrike.experiments.benchmark.own import NEVER, InvalidRunError
-from heelstrike.experiments.benchmark.scenarios import FRICTION, chain, plank
-from heelstrike.experiments.benchmark.stopwatch import best_of, timed
-from heelstrike.robot import Robot, State, read_mjcf
+from heelstrike.experiments.benchmark.peer import Engine, reason
+from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario, chain, plank
+from heelstrike.experiments.benchmark.stopwatch import Work, best_of
+from heelstrike.robot import State, read_mjcf
 from heelstrike.sim import Run, TimeStepping, simulate
 
 STEP = 1e-3
 STEPS = 500
-SETTLING = 3000
+TOO_LONG = 1.0
+"""A run that takes longer than this (s) is not repeated."""
 JOINTS = (2, 3, 5, 8, 12, 20, 30, 45, 60)
 CONTACTS = (0, 2, 4, 8, 16, 32, 64)
 
@@ -25,23 +28,32 @@ def measure_scaling(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     """Time a swinging chain by its joints, and a plank at rest by its contact points."""
     joints = (2, 8, 30) if quick else JOINTS
     contacts = (0, 4, 16) if quick else CONTACTS
+    engines = simulators(peers)
+    names = list(engines)
     result: dict[str, Any] = {
-        "joints": [_measure(chain(n), n, quick=quick, peers=peers) for n in joints],
-        "contacts": [_measure(plank(n), n, quick=quick, peers=peers) for n in contacts],
+        "engines": {name: engine.label for name, engine in engines.items()},
+        "joints": [_measure(chain(n), n, engines, quick=quick, peers=peers) for n in joints],
+        "contacts": [_measure(plank(n), n, engines, quick=quick, peers=()) for n in contacts],
     }
     for name in ("joints", "contacts"):
+        rows = result[name]
+        sides = ["heelstrike", *names]
         result[f"{name}_slope"] = {
-            side: _slope(result[name], f"{side}_us")
-            for side in ("heelstrike", "mujoco")
-            if f"{side}_us" in result[name][-1]
+            side: slope for side in sides if (slope := _slope(rows, f"{side}_us")) is not None
         }
-        result[f"{name}_crossover"] = _crossover(result[name])
+        result[f"{name}_crossover"] = {side: _crossover(rows, side) for side in names}
     return result
 
 
-def _measure(xml: str, size: int, *, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
+def _measure(
+    xml: str, size: int, engines: dict[str, Engine], *, quick: bool, peers: Sequence[str]
+) -> dict[str, Any]:
     robot = read_mjcf(xml, name="test body")
-    state = _start(robot)
+    q = robot.model.reference.copy()
+    if not robot.floating:
+        q += 0.3
+    state = State(q, np.zeros(robot.nv))
+    scenario = Scenario(robot.name, robot, state, STEPS * STEP, None, contacts=robot.nc or None)
     method, ground = TimeStepping(step=STEP), Ground(friction=FRICTION)
 
     def run(record_every: int = NEVER) -> Run:
@@ -59,18 +71,33 @@ def _measure(xml: str, size: int, *, quick: bool, peers: Sequence[str]) -> dict[
         return done
 
     _check_contacts(run(record_every=1))
-    works = {"heelstrike": lambda: run().timing.wall_s}
-    if "mujoco" in peers:
-        works["mujoco"] = _mujoco(xml, state)
-    best = best_of(works, seconds=0.1 if quick else 1.0, least=3)
-    return {"size": size, **{f"{name}_us": 1e6 * t / STEPS for name, t in best.items()}}
+    row: dict[str, Any] = {"size": size}
+    works: dict[str, Work] = {"heelstrike": lambda: run().timing.wall_s}
+    steps = {"heelstrike": STEPS}
+    slow = {}
+    for name, engine in engines.items():
+        try:
+            peer = engine.peer(scenario, STEP)
+            if robot.nc:
+                peer.settle(peer.settling)
+                peer.check()
+            steps[name] = peer.steps
+            first = peer.run()
+        except Exception as error:  # of one engine must not lose what the others found
+            row[f"{name}_invalid"] = reason(error)
+            continue
+        if first > TOO_LONG:
+            slow[name] = first
+        else:
+            works[name] = peer.run
+    for name in peers:
+        if name in PARTS_OF_STEPS:
+            from heelstrike.experiments.benchmark.pinocchio_peer import ForwardDynamics
 
-
-def _start(robot: Robot) -> State:
-    q = robot.model.reference.copy()
-    if not robot.floating:
-        q += 0.3
-    return State(q, np.zeros(robot.nv))
+            part = ForwardDynamics(scenario)
+            works[f"{name}_part"], steps[f"{name}_part"] = part.run, 1
+    best = best_of(works, seconds=0.1 if quick else 1.5, least=3) | slow
+    return row | {f"{name}_us": 1e6 * t / steps[name] for name, t in best.items()}
 
 
 def _check_contacts(run: Run) -> None:
@@ -85,49 +112,18 @@ def _check_contacts(run: Run) -> None:
         raise InvalidRunError(f"contact problems are solved to {run.certificates} only")
 
 
-def _mujoco(xml: str, state: State) -> Any:
-    import mujoco
-    from mujoco import rollout
-
-    from heelstrike.experiments.benchmark.mujoco_peer import Options, configured
-
-    spec = mujoco.MjSpec.from_string(xml)
-    for geom in spec.geoms:
-        geom.friction = FRICTION, 0.0, 0.0
-    model = configured(spec, Options(step=STEP))
-    data = mujoco.MjData(model)
-    kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-    data.qpos[:], data.qvel[:] = state.q, state.v
-    packed = np.zeros((1, mujoco.mj_stateSize(model, kind)))
-    mujoco.mj_getState(model, data, packed[0], kind)
-    points = int(np.count_nonzero(model.geom_contype))
-    if points:
-        for _ in range(SETTLING):
-            mujoco.mj_step(model, data)
-        if data.ncon != points:
-            raise InvalidRunError(f"{data.ncon} of {points} points touch in MuJoCo")
-        mujoco.mj_getState(model, data, packed[0], kind)
-    states = np.zeros((1, STEPS, packed.shape[1]))
-    none = np.zeros((1, STEPS, model.nsensordata))
-    control = np.zeros((1, 1, model.nu))
-    return timed(
-        lambda: rollout.rollout(
-            model, data, packed, control, nstep=STEPS, state=states, sensordata=none
-        )
-    )
-
-
-def _slope(rows: Sequence[dict[str, Any]], name: str) -> float:
+def _slope(rows: Sequence[dict[str, Any]], name: str) -> float | None:
     """Exponent of size to which the cost grows, over the upper half of the sizes."""
     upper = [row for row in rows if row["size"] > 0][-max(2, len(rows) // 2) :]
+    if any(name not in row for row in upper):
+        return None
     size = np.log([row["size"] for row in upper])
     cost = np.log([row[name] for row in upper])
     return float(np.polyfit(size, cost, 1)[0])
 
 
-def _crossover(rows: Sequence[dict[str, Any]]) -> int | None:
-    """Smallest size from which on the peer is faster; None if there is none."""
-    if "mujoco_us" not in rows[0]:
-        return None
-    slower = [row["size"] for row in rows if row["heelstrike_us"] > row["mujoco_us"]]
+def _crossover(rows: Sequence[dict[str, Any]], side: str) -> int | None:
+    """Smallest size from which on a peer is faster; None if there is none."""
+    key = f"{side}_us"
+    slower = [row["size"] for row in rows if key in row and row["heelstrike_us"] > row[key]]
     return min(slower) if slower else None

@@ -6,39 +6,42 @@ from collections.abc import Sequence
 from typing import Any
 
 from heelstrike.experiments.benchmark import own, scenarios
+from heelstrike.experiments.benchmark.engines import PARTS_OF_STEPS, simulators
 from heelstrike.experiments.benchmark.own import InvalidRunError
+from heelstrike.experiments.benchmark.peer import Engine, Peer, check_flight, reason
 from heelstrike.experiments.benchmark.scenarios import Scenario
-from heelstrike.experiments.benchmark.stopwatch import best_of
+from heelstrike.experiments.benchmark.stopwatch import Work, best_of
 from heelstrike.sim import TimeStepping
 
 STEP = 1e-3
-SETTLING = 3.0
-"""How long a robot sinks into soft ground before it is timed, in s."""
 
 
 def measure_steps(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     """Time steps of 1 ms; returns one row a scenario."""
+    engines = simulators(peers)
     return {
         "step_s": STEP,
-        "rows": [_measure(each, quick=quick, peers=peers) for each in _scenarios(quick=quick)],
+        "engines": {name: engine.label for name, engine in engines.items()},
+        "notes": {name: engine.note for name, engine in engines.items()},
+        "rows": [_measure(each, engines, quick=quick, peers=peers) for each in _scenarios()],
     }
 
 
-def _scenarios(*, quick: bool) -> list[Scenario]:
-    duration = 2.0 if quick else 5.0
+def _scenarios() -> list[Scenario]:
     return [
-        scenarios.standing("bravo7", bent=False, duration=duration),
-        scenarios.standing("bravo7", duration=duration),
-        scenarios.standing("walker2d", duration=duration),
+        scenarios.standing("bravo7", bent=False, duration=2.0),
+        scenarios.standing("bravo7", duration=2.0),
+        scenarios.standing("walker2d", duration=2.0),
         scenarios.walking(),
         scenarios.falling("bravo7"),
     ]
 
 
-def _measure(scenario: Scenario, *, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
+def _measure(
+    scenario: Scenario, engines: dict[str, Engine], *, quick: bool, peers: Sequence[str]
+) -> dict[str, Any]:
     row: dict[str, Any] = {"scenario": scenario.name, "controller": "none"}
     method = TimeStepping(step=STEP)
-    works = {}
     has_own = scenario.own is not None
     if has_own:
         row["controller"] = "computed torque (heelstrike), precomputed (peers)"
@@ -46,26 +49,52 @@ def _measure(scenario: Scenario, *, quick: bool, peers: Sequence[str]) -> dict[s
         row["controller"] = "springs and dampers on the joints"
     try:
         row["heelstrike_check"] = own.check(scenario, step=STEP, own=has_own)
-        works["heelstrike"] = own.work(scenario, method, own=has_own)
-        steps = {"heelstrike": row["heelstrike_check"]["steps"]}
     except InvalidRunError as error:
-        row["invalid"] = f"heelstrike: {error}"
+        row["invalid"] = str(error)
         return row
-    if "mujoco" in peers:
-        from heelstrike.experiments.benchmark.mujoco_peer import MuJoCoPeer, Options
-
-        peer = MuJoCoPeer(scenario, Options(step=STEP))
-        if scenario.contacts is not None:
-            peer.settle(SETTLING)
-        try:
-            row["mujoco_check"] = peer.check()
-            works["mujoco"] = peer.work
-            steps["mujoco"] = peer.steps
-        except InvalidRunError as error:
-            row["mujoco_invalid"] = str(error)
-    best = best_of(works, seconds=0.5 if quick else 5.0)
+    works: dict[str, Work] = {"heelstrike": own.work(scenario, method, own=has_own)}
+    steps = {"heelstrike": row["heelstrike_check"]["steps"]}
+    for name, engine in engines.items():
+        peer = _checked(name, engine, scenario, row)
+        if peer is not None:
+            works[name], steps[name] = peer.run, peer.steps
+    for name in peers:
+        if name in PARTS_OF_STEPS:
+            part = _part(name, scenario, row)
+            if part is not None:
+                works[f"{name}_part"], steps[f"{name}_part"] = part, 1
+    best = best_of(works, seconds=0.5 if quick else 4.0 + len(works))
     for name, seconds in best.items():
         row[f"{name}_us"] = 1e6 * seconds / steps[name]
-    if "mujoco_us" in row:
-        row["times_faster"] = row["mujoco_us"] / row["heelstrike_us"]
+    row["times_faster"] = {
+        name: row[f"{name}_us"] / row["heelstrike_us"] for name in engines if f"{name}_us" in row
+    }
     return row
+
+
+def _checked(name: str, engine: Engine, scenario: Scenario, row: dict[str, Any]) -> Peer | None:
+    """Peer of a scenario if its steps count; the row says why if they do not."""
+    try:
+        peer = engine.peer(scenario, STEP)
+        flight = check_flight(engine, scenario.robot)
+        if scenario.contacts is not None:
+            peer.settle(peer.settling)
+        row[f"{name}_check"] = {**peer.check(), "flight_error": flight}
+        if peer.lacks:
+            row[f"{name}_check"]["lacks"] = ", ".join(peer.lacks)
+    except Exception as error:  # of one engine must not lose what the others found
+        row[f"{name}_invalid"] = reason(error)
+        return None
+    return peer
+
+
+def _part(name: str, scenario: Scenario, row: dict[str, Any]) -> Work | None:
+    from heelstrike.experiments.benchmark.pinocchio_peer import ForwardDynamics
+
+    try:
+        part = ForwardDynamics(scenario)
+        row[f"{name}_part_check"] = part.check()
+    except Exception as error:
+        row[f"{name}_part_invalid"] = reason(error)
+        return None
+    return part.run

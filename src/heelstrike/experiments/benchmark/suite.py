@@ -14,8 +14,9 @@ from rich.console import Group
 
 from heelstrike.errors import SimulationError
 from heelstrike.experiments.benchmark.endurance import measure_endurance
+from heelstrike.experiments.benchmark.engines import compared, peers
 from heelstrike.experiments.benchmark.footprint import measure_footprint
-from heelstrike.experiments.benchmark.machine import compared, machine, peers
+from heelstrike.experiments.benchmark.machine import machine
 from heelstrike.experiments.benchmark.precision import measure_precision
 from heelstrike.experiments.benchmark.scaling import measure_scaling
 from heelstrike.experiments.benchmark.steps import measure_steps

@@ -7,6 +7,10 @@ from typing import Any
 
 from rich.table import Table
 
+from heelstrike.experiments.benchmark.engines import PACKAGES
+
+TITLES = {name: package.title for name, package in PACKAGES.items()}
+
 
 def tables(parts: dict[str, Any]) -> Iterator[Table]:
     """Yield the tables of the parts that were measured."""
@@ -27,31 +31,61 @@ def _number(value: Any, digits: int = 3) -> str:
 
 
 def _steps(part: dict[str, Any]) -> Iterator[Table]:
+    engines: dict[str, str] = part["engines"]
+    rows = part["rows"]
     table = _table(
-        f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn",
+        f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn (times as long as ours)",
         "scenario",
         "heelstrike",
-        "MuJoCo Euler",
-        "times faster",
-        "active contacts",
+        *engines.values(),
         "controller",
     )
-    for row in part["rows"]:
-        refused = row.get("invalid") or row.get("mujoco_invalid")
-        active = [
-            _number(row[check]["active_contacts"])
-            for check in ("heelstrike_check", "mujoco_check")
-            if check in row
-        ]
-        table.add_row(
-            row["scenario"],
-            _number(row.get("heelstrike_us")),
-            f"does not count: {refused}" if refused else _number(row.get("mujoco_us")),
-            _number(row.get("times_faster")),
-            " / ".join(active),
-            row["controller"],
-        )
+    for row in rows:
+        cells = [_number(row.get("heelstrike_us"))]
+        for name in engines:
+            times = row.get("times_faster", {}).get(name)
+            beside = "" if times is None else f" ({_number(times)} ×)"
+            cells.append(_number(row.get(f"{name}_us")) + beside)
+        table.add_row(row["scenario"], *cells, row["controller"])
     yield table
+    yield _validity(part)
+    if any("pinocchio_part_us" in row or "pinocchio_part_invalid" in row for row in rows):
+        yield _parts(rows)
+
+
+def _validity(part: dict[str, Any]) -> Table:
+    """What makes the runs valid, or why they do not count."""
+    engines: dict[str, str] = {"heelstrike": "heelstrike", **part["engines"]}
+    table = _table("active contacts, and the share of the weight that they carry", "scenario")
+    for label in engines.values():
+        table.add_column(label, justify="right")
+    for row in part["rows"]:
+        cells = []
+        for name in engines:
+            refused = row.get("invalid") if name == "heelstrike" else row.get(f"{name}_invalid")
+            check = row.get(f"{name}_check")
+            if refused or check is None:
+                cells.append(f"does not count: {refused}" if refused else "–")
+            else:
+                carried = check.get("weight_carried")
+                weight = "" if carried is None else f", {carried:.4f}"
+                cells.append(_number(check["active_contacts"]) + weight)
+        table.add_row(row["scenario"], *cells)
+    return table
+
+
+def _parts(rows: list[dict[str, Any]]) -> Table:
+    """What does not make a step, beside whole steps."""
+    table = _table(
+        "forward dynamics alone (no contacts, control, integration): a part of a step, in µs",
+        "scenario",
+        "Pinocchio, articulated bodies",
+        "a whole step of heelstrike",
+    )
+    for row in rows:
+        theirs = row.get("pinocchio_part_invalid") or _number(row.get("pinocchio_part_us"))
+        table.add_row(row["scenario"], theirs, _number(row.get("heelstrike_us")))
+    return table
 
 
 def _precision(part: dict[str, Any]) -> Iterator[Table]:
@@ -69,19 +103,28 @@ def _precision(part: dict[str, Any]) -> Iterator[Table]:
             _number(point["error_rad"], 2),
             _number(point["seconds"]),
         )
+    for failure in part["failures"]:
+        table.add_row(failure["series"], failure["knob"], failure["reason"], "–")
     yield table
     goal = part["to_goal"]
-    table = _table(f"least computing to {part['goal_rad']:g} rad", "side", "how", "computing (s)")
-    for side in ("heelstrike", "mujoco"):
-        if side in goal:
-            point = goal[side]
-            table.add_row(side, f"{point['series']}, {point['knob']}", _number(point["seconds"]))
-        elif f"{side}_best" in goal:
-            point = goal[f"{side}_best"]
-            how = f"not reached; nearest is {point['error_rad']:.1e} rad: {point['series']}"
-            table.add_row(side, f"{how}, {point['knob']}", _number(point["seconds"]))
-    if "times_less" in goal:
-        table.add_row("times less", "", _number(goal["times_less"]))
+    table = _table(
+        f"least computing to {part['goal_rad']:g} rad",
+        "side",
+        "how",
+        "computing (s)",
+        "times as long as ours",
+    )
+    for side, title in {"heelstrike": "heelstrike", **TITLES}.items():
+        point = goal.get(side) or goal.get(f"{side}_best")
+        if point is None:
+            continue
+        how = f"{point['series']}, {point['knob']}"
+        if side not in goal:
+            how = f"not reached; nearest is {point['error_rad']:.1e} rad: {how}"
+        times = goal.get("times_less", {}).get(side)
+        table.add_row(
+            title, how, _number(point["seconds"]), "" if times is None else _number(times)
+        )
     yield table
 
 
@@ -109,23 +152,25 @@ def _threads(part: dict[str, Any]) -> Iterator[Table]:
 
 
 def _scaling(part: dict[str, Any]) -> Iterator[Table]:
+    engines: dict[str, str] = part["engines"]
     for name, title in (
         ("joints", "µs a step of a chain of hinges"),
         ("contacts", "µs a step of a plank on many points"),
     ):
-        table = _table(title, name, "heelstrike", "MuJoCo Euler")
+        sides = {"heelstrike": "heelstrike", **engines}
+        if any("pinocchio_part_us" in row for row in part[name]):
+            sides["pinocchio_part"] = "part of a step: Pinocchio ABA"
+        table = _table(title, name, *sides.values())
         for row in part[name]:
-            table.add_row(
-                str(row["size"]), _number(row["heelstrike_us"]), _number(row.get("mujoco_us"))
-            )
-        slopes = part[f"{name}_slope"]
-        table.add_row(
-            "grows with the power",
-            _number(slopes.get("heelstrike")),
-            _number(slopes.get("mujoco")),
-        )
-        crossing = part[f"{name}_crossover"]
-        table.add_row("peer is faster from", "nowhere" if crossing is None else str(crossing), "")
+            cells = [
+                "does not count" if f"{side}_invalid" in row else _number(row.get(f"{side}_us"))
+                for side in sides
+            ]
+            table.add_row(str(row["size"]), *cells)
+        slopes, crossing = part[f"{name}_slope"], part[f"{name}_crossover"]
+        table.add_row("grows with the power", *(_number(slopes.get(side)) for side in sides))
+        found = ["" if side not in engines else str(crossing[side] or "nowhere") for side in sides]
+        table.add_row("faster than heelstrike from", *found)
         yield table
 
 

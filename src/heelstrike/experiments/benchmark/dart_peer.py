@@ -1,0 +1,145 @@
+"""DART's side of a comparison: boxed linear complementarity, a World stepped from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import dartpy
+import numpy as np
+
+from heelstrike.experiments.benchmark.links import links, space
+from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
+from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
+from heelstrike.robot import State
+
+RADIUS = 1e-4
+"""Least radius of a contact point, in m: its collision detectors want spheres of some size."""
+MASSLESS = 1e-12
+"""Mass (kg) and inertia (kg m²) that stand for none."""
+
+
+class DartPeer(Peer):
+    """A scenario in DART. Springs and dampers are those of its joints."""
+
+    settling = 0.2
+    lacks = ("armature",)
+
+    def __init__(self, scenario: Scenario, step: float) -> None:
+        super().__init__(scenario, step)
+        self._world, self._robot = _world(scenario, step)
+        model = scenario.robot.model
+        self._forces = np.zeros((len(self.commands), scenario.robot.nv))
+        self._forces[:, model.actuator_joint] = self.commands
+        self._step = 0
+
+    def restart(self) -> None:
+        """Go back to `start`, at time 0."""
+        self._world.reset()
+        self._robot.setPositions(self.start.q - self.scenario.robot.model.reference)
+        self._robot.setVelocities(self.start.v)
+        self._robot.setCommands(self._forces[0])
+        self._step = 0
+
+    def advance(self, steps: int) -> None:
+        """Simulate some steps, each with a call from Python: it has no loop of its own."""
+        step = self._world.step
+        if len(self._forces) == 1:
+            for _ in range(steps):
+                step(False)  # and keep the commands
+        else:
+            command = self._robot.setCommands
+            for forces in self._forces[self._step : self._step + steps]:
+                command(forces)
+                step(False)
+        self._step += steps
+
+    def state(self) -> State:
+        """Where it is now."""
+        position = self._robot.getPositions() + self.scenario.robot.model.reference
+        return State(position, np.array(self._robot.getVelocities()))
+
+    def touching(self) -> Touching:
+        """How it touched the ground in the last step."""
+        contacts = self._world.getLastCollisionResult().getContacts()
+        force = sum(abs(float(contact.force[2])) for contact in contacts)
+        depth = max((float(contact.penetrationDepth) for contact in contacts), default=0.0)
+        return Touching(len(contacts), force, depth)
+
+
+def _world(scenario: Scenario, step: float) -> tuple[Any, Any]:
+    robot, feedback = scenario.robot, scenario.feedback
+    model = robot.model
+    dynamics = dartpy.dynamics
+    skeleton = dynamics.Skeleton("robot")
+    bodies: list[Any] = []
+    for link in links(robot, least_radius=RADIUS):
+        parent = bodies[link.parent] if link.parent >= 0 else None
+        if link.hinge:
+            hinge = dynamics.RevoluteJointProperties()
+            hinge.mAxis = link.axis
+            joint, body = skeleton.createRevoluteJointAndBodyNodePair(parent, hinge)
+        else:
+            slide = dynamics.PrismaticJointProperties()
+            slide.mAxis = link.axis
+            joint, body = skeleton.createPrismaticJointAndBodyNodePair(parent, slide)
+        place = dartpy.math.Isometry3()
+        place.set_translation(link.place)
+        joint.setTransformFromParentBodyNode(place)
+        inertia = np.diag([max(link.inertia, MASSLESS)] * 3)
+        body.setInertia(dynamics.Inertia(max(link.mass, MASSLESS), link.center, inertia))
+        joint.setDampingCoefficient(0, link.damping)
+        if np.isfinite(link.lower) or np.isfinite(link.upper):
+            joint.setPositionLowerLimit(0, link.lower)
+            joint.setPositionUpperLimit(0, link.upper)
+            joint.setLimitEnforcement(True)
+        for center, radius in link.points:
+            shape = body.createShapeNode(dynamics.SphereShape(radius))
+            shape.setRelativeTranslation(center)
+            _touch(shape)
+        bodies.append(body)
+    if feedback is not None:
+        for i, driven in enumerate(model.actuator_joint):
+            joint = skeleton.getJoint(int(driven))
+            joint.setSpringStiffness(0, float(feedback.kp[i]))
+            joint.setRestPosition(0, float(-model.reference[driven]))
+            joint.setDampingCoefficient(0, float(feedback.kd[i] + model.damping[driven]))
+    skeleton.disableSelfCollisionCheck()
+    ground = dynamics.Skeleton("ground")
+    _, floor = ground.createWeldJointAndBodyNodePair()
+    block = floor.createShapeNode(dynamics.BoxShape([100.0, 10.0, 1.0]))
+    block.setRelativeTranslation([0.0, 0.0, -0.5])
+    _touch(block)
+    ground.setMobile(False)
+    world = dartpy.simulation.World()
+    world.setGravity(space(model.gravity))
+    world.setTimeStep(step)
+    awake = dartpy.simulation.DeactivationOptions()
+    awake.mEnabled = False  # what rests would be skipped
+    world.setDeactivationOptions(awake)
+    world.setCollisionDetector(dartpy.simulation.CollisionDetectorType.FCL)
+    world.addSkeleton(ground)
+    world.addSkeleton(skeleton)
+    return world, skeleton
+
+
+def _touch(shape: Any) -> None:
+    shape.createCollisionAspect()
+    shape.createDynamicsAspect().setFrictionCoeff(FRICTION)
+
+
+def _settings(quick: bool) -> Iterator[Setting]:
+    for step in (1e-3,) if quick else (1e-3, 1e-4, 1e-5, 3e-6):
+        yield Setting(
+            "DART",
+            f"h {step:.0e} s",
+            lambda scenario, step=step: DartPeer(scenario, step),  # type: ignore[misc]
+        )
+
+
+ENGINE = Engine(
+    label="DART",
+    note="one call from Python a step, which it has no other way to do, is in its times",
+    peer=DartPeer,
+    settings=_settings,
+)

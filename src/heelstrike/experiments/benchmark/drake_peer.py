@@ -1,0 +1,230 @@
+"""Drake's side of a comparison: a MultibodyPlant with point contact, run by its Simulator."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake import geometry, math, multibody, polynomial, trajectories
+from pydrake.multibody import plant as plants
+from pydrake.multibody import tree
+from pydrake.systems import analysis, framework, primitives
+
+from heelstrike.experiments.benchmark.links import links
+from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
+from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
+from heelstrike.robot import State
+
+FASTEST = "tamsi" if hasattr(plants.DiscreteContactApproximation, "kTamsi") else "lagged"
+"""Drake calls TAMSI deprecated; it is several times as fast as what is to take its place."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """How Drake is asked to simulate.
+
+    Attributes
+    ----------
+    step : float
+        Seconds.
+    approximation : str
+        Of contact in discrete steps: ``"tamsi"``, ``"sap"``, ``"similar"``, ``"lagged"``.
+    stiffness, dissipation : float or None
+        Of the contact points, in N/m and s/m; None for Drake's estimates.
+    stiction : float or None
+        Speed up to which friction sticks, in m/s; None for the default of 1e-4.
+    near_rigid : float or None
+        Where SAP takes a contact for rigid and softens it, in units of what the step resolves;
+        None for the default of 1.
+    """
+
+    step: float
+    approximation: str = FASTEST
+    stiffness: float | None = None
+    dissipation: float | None = None
+    stiction: float | None = None
+    near_rigid: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Name in tables and figures."""
+        contacts = "default contacts"
+        if self.stiffness is not None:
+            contacts = f"contacts of {self.stiffness:.0e} N/m"
+        return f"Drake {self.approximation}, {contacts}"
+
+
+class DrakePeer(Peer):
+    """A scenario in Drake. Springs and dampers are elements of its plant, within its solver."""
+
+    settling = 1.0
+
+    def __init__(self, scenario: Scenario, options: Options) -> None:
+        super().__init__(scenario, options.step)
+        logging.getLogger("drake").setLevel(logging.ERROR)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the deprecated approximation
+            self._simulator, self._plant = _simulator(scenario, options)
+        self._context: Any = None
+        self._step = 0
+
+    def restart(self) -> None:
+        """Go back to `start`, at time 0."""
+        root = self._simulator.get_mutable_context()
+        root.SetTime(0.0)
+        self._context = self._plant.GetMyMutableContextFromRoot(root)
+        reference = self.scenario.robot.model.reference
+        self._plant.SetPositions(self._context, self.start.q - reference)
+        self._plant.SetVelocities(self._context, self.start.v)
+        self._simulator.Initialize()
+        self._step = 0
+
+    def advance(self, steps: int) -> None:
+        """Simulate some steps in one call."""
+        self._step += steps
+        self._simulator.AdvanceTo(self._step * self.step)
+
+    def state(self) -> State:
+        """Where it is now."""
+        position = self._plant.GetPositions(self._context)
+        velocity = self._plant.GetVelocities(self._context)
+        return State(position + self.scenario.robot.model.reference, np.array(velocity))
+
+    def touching(self) -> Touching:
+        """How it touches the ground now."""
+        found = self._plant.get_contact_results_output_port().Eval(self._context)
+        number = found.num_point_pair_contacts()
+        contacts = [found.point_pair_contact_info(i) for i in range(number)]
+        force = sum(abs(float(contact.contact_force()[2])) for contact in contacts)
+        depth = max((float(contact.point_pair().depth) for contact in contacts), default=0.0)
+        return Touching(number, force, depth)
+
+
+def _simulator(scenario: Scenario, options: Options) -> tuple[Any, Any]:
+    robot, feedback = scenario.robot, scenario.feedback
+    model = robot.model
+    builder = framework.DiagramBuilder()
+    config = plants.MultibodyPlantConfig(
+        time_step=options.step,
+        contact_model="point",
+        discrete_contact_approximation=options.approximation,
+        use_sampled_output_ports=False,  # they cost time and nobody reads them
+    )
+    if options.stiction is not None:
+        config.stiction_tolerance = options.stiction
+    if options.near_rigid is not None:
+        config.sap_near_rigid_threshold = options.near_rigid
+    plant, scene = plants.AddMultibodyPlant(config, builder)
+    plant.mutable_gravity_field().set_gravity_vector([model.gravity[0], 0.0, model.gravity[1]])
+    material = geometry.ProximityProperties()
+    geometry.AddContactMaterial(
+        properties=material,
+        friction=plants.CoulombFriction(FRICTION, FRICTION),
+        point_stiffness=options.stiffness,
+        dissipation=options.dissipation,
+    )
+    pose = math.RigidTransform
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), pose(), geometry.HalfSpace(), "ground", material
+    )
+    damping = model.damping.copy()
+    if feedback is not None:
+        np.add.at(damping, model.actuator_joint, feedback.kd)
+    bodies: list[Any] = []
+    joints: list[Any] = []
+    for i, link in enumerate(links(robot)):
+        inertia = tree.SpatialInertia.Zero()
+        if link.mass or link.inertia:
+            about = tree.RotationalInertia(link.inertia, link.inertia, link.inertia)
+            inertia = tree.SpatialInertia.MakeFromCentralInertia(link.mass, link.center, about)
+        body = plant.AddRigidBody(link.name, inertia)
+        parent = bodies[link.parent] if link.parent >= 0 else plant.world_body()
+        frame = plant.AddFrame(
+            tree.FixedOffsetFrame(f"{link.name}_joint", parent.body_frame(), pose(link.place))
+        )
+        kind = tree.RevoluteJoint if link.hinge else tree.PrismaticJoint
+        joint = kind(
+            robot.joint_names[i],
+            frame,
+            body.body_frame(),
+            link.axis,
+            link.lower,
+            link.upper,
+            float(damping[i]),
+        )
+        bodies.append(body)
+        joints.append(plant.AddJoint(joint))
+        for number, (center, radius) in enumerate(link.points):
+            plant.RegisterCollisionGeometry(
+                body, pose(center), geometry.Sphere(radius), f"{link.name}_{number}", material
+            )
+    for i, joint in enumerate(model.actuator_joint):
+        actuator = plant.AddJointActuator(robot.actuator_names[i], joints[joint])
+        actuator.set_default_rotor_inertia(float(model.armature[joint]))
+        actuator.set_default_gear_ratio(1.0)
+        if feedback is not None:
+            hinge = isinstance(joints[joint], tree.RevoluteJoint)
+            spring = multibody.tree.RevoluteSpring if hinge else multibody.tree.PrismaticSpring
+            rest = float(-model.reference[joint])
+            plant.AddForceElement(spring(joints[joint], rest, float(feedback.kp[i])))
+    plant.Finalize()
+    # The points of two feet may be in the same place: they meet the ground only.
+    own = geometry.GeometrySet(
+        [shape for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)]
+    )
+    scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
+    if robot.nu:
+        source = builder.AddSystem(_commands(scenario))
+        port = plant.get_actuation_input_port(tree.default_model_instance())
+        builder.Connect(source.get_output_port(), port)
+    return analysis.Simulator(builder.Build()), plant
+
+
+def _commands(scenario: Scenario) -> Any:
+    """Source of the commands of the actuators, as polynomials of time."""
+    feedback = scenario.feedback
+    if feedback is None:
+        return primitives.ConstantVectorSource(np.zeros(scenario.robot.nu))
+    if len(feedback.begins) == 1 and feedback.coefficients.shape[2] == 1:
+        return primitives.ConstantVectorSource(feedback.command([0.0])[0])
+    pieces = [
+        np.array([[polynomial.Polynomial(row)] for row in piece]) for piece in feedback.coefficients
+    ]
+    breaks = [*feedback.begins, max(2.0 * scenario.duration, 2.0 * feedback.begins[-1])]
+    return primitives.TrajectorySource(trajectories.PiecewisePolynomial(pieces, breaks))
+
+
+def _settings(quick: bool) -> Iterator[Setting]:
+    # Contacts as rigid as SAP makes them come nearest: in a search over the approximations,
+    # stiffness from 1e5 to 1e12 N/m, dissipation from 1 to 1000 s/m, stiction speed, SAP's
+    # relaxation time and threshold of near rigidity.
+    rigid = {"approximation": "sap", "stiffness": 1e12, "near_rigid": 0.1}
+    ways: list[tuple[dict[str, Any], Sequence[float]]] = [(rigid, (1e-3,))]
+    if not quick:
+        stiff = {"approximation": "lagged", "stiffness": 1e10, "dissipation": 30.0}
+        ways = [
+            ({"approximation": FASTEST}, (1e-3, 1e-4)),
+            ({"approximation": "lagged"}, (1e-3, 1e-4)),
+            ({**stiff, "stiction": 1e-5}, (1e-3, 1e-4)),
+            (rigid, (1e-3, 1e-4, 2e-5, 5e-6)),
+        ]
+    for way, steps in ways:
+        for step in steps:
+            options = Options(step=step, **way)
+            yield Setting(
+                options.label,
+                f"h {step:.0e} s",
+                lambda scenario, options=options: DrakePeer(scenario, options),  # type: ignore[misc]
+            )
+
+
+ENGINE = Engine(
+    label=f"Drake {FASTEST.upper() if FASTEST == 'tamsi' else FASTEST}",
+    note="in its own loop, AdvanceTo; springs and dampers in its plant, torques without limits",
+    peer=lambda scenario, step: DrakePeer(scenario, Options(step=step)),
+    settings=_settings,
+)
