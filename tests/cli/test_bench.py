@@ -45,7 +45,8 @@ def test_every_engine_that_is_timed_stands_as_it_should(tmp_path: Path) -> None:
     assert "mujoco" in written["steps"]["engines"]
     for row in rows[:3]:
         for engine in ("heelstrike", *written["steps"]["engines"]):
-            assert row[f"{engine}_check"]["active_contacts"] == 4.0
+            active = row[f"{engine}_check"]["active_contacts"]
+            assert active == 4.0 if engine == "heelstrike" else active == pytest.approx(4, abs=0.04)
             assert row[f"{engine}_check"]["weight_carried"] == pytest.approx(1.0, abs=1e-2)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -42,10 +43,11 @@ def bench(
     Every engine simulates the same robots with the same contacts and law of control in the same
     run, in turn; a run counts only if it is physically valid.
     """
-    with stage("loading", when_slow="(compiling, once)") as current:
+    with stage("loading", when_slow="(compiling, once)") as current, ExitStack() as stack:
         from heelstrike.experiments.benchmark import run_benchmark
-        from heelstrike.experiments.benchmark.engines import NOT_INSTALLED, peers
+        from heelstrike.experiments.benchmark.engines import NOT_INSTALLED, output_diverted, peers
 
+        stack.enter_context(output_diverted())
         missing = [name for name, state in peers().items() if state == NOT_INSTALLED]
         if missing and not as_json:
             tell(f"{NOT_INSTALLED}, so not compared with: {', '.join(missing)}")

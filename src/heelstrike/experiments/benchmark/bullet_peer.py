@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import pybullet
 
 from heelstrike.experiments.benchmark.links import links
 from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
 from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
 from heelstrike.robot import State
-
-with contextlib.redirect_stdout(None):
-    import pybullet
 
 RADIUS = 1e-4
 """Least radius of a contact point, in m: Bullet's own margins are larger than nothing."""

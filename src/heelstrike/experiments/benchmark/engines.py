@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
 import importlib.util
-from collections.abc import Sequence
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
@@ -86,3 +90,18 @@ def simulators(names: Sequence[str]) -> dict[str, Engine]:
 
 def _adapter(package: Package) -> ModuleType:
     return importlib.import_module(f"heelstrike.experiments.benchmark.{package.adapter}")
+
+
+@contextmanager
+def output_diverted() -> Iterator[None]:
+    """Send what engines print by themselves to standard error: standard output is for results."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        with suppress(OSError, TypeError):  # C keeps a buffer of its own; not so on all systems
+            ctypes.CDLL(None).fflush(None)
+        os.dup2(kept, 1)
+        os.close(kept)

@@ -44,9 +44,9 @@ def _measure(
     method = TimeStepping(step=STEP)
     has_own = scenario.own is not None
     if has_own:
-        row["controller"] = "computed torque (heelstrike), precomputed (peers)"
+        row["controller"] = "computed torque; precomputed for the others"
     elif scenario.feedback is not None:
-        row["controller"] = "springs and dampers on the joints"
+        row["controller"] = "springs, dampers"
     try:
         row["heelstrike_check"] = own.check(scenario, step=STEP, own=has_own)
     except InvalidRunError as error:

@@ -38,7 +38,7 @@ def _steps(part: dict[str, Any]) -> Iterator[Table]:
         "scenario",
         "heelstrike",
         *engines.values(),
-        "controller",
+        "control",
     )
     for row in rows:
         cells = [_number(row.get("heelstrike_us"))]
@@ -162,10 +162,7 @@ def _scaling(part: dict[str, Any]) -> Iterator[Table]:
             sides["pinocchio_part"] = "part of a step: Pinocchio ABA"
         table = _table(title, name, *sides.values())
         for row in part[name]:
-            cells = [
-                "does not count" if f"{side}_invalid" in row else _number(row.get(f"{side}_us"))
-                for side in sides
-            ]
+            cells = [row.get(f"{side}_invalid") or _number(row.get(f"{side}_us")) for side in sides]
             table.add_row(str(row["size"]), *cells)
         slopes, crossing = part[f"{name}_slope"], part[f"{name}_crossover"]
         table.add_row("grows with the power", *(_number(slopes.get(side)) for side in sides))
