@@ -22,7 +22,7 @@ PAGE = ROOT / "docs" / "performance.md"
 IMAGES = ROOT / "docs" / "images"
 
 CAPTIONS = {
-    "steps": "Microseconds a step of heelstrike and of MuJoCo",
+    "steps": "Microseconds a step of heelstrike and of other engines",
     "precision": "Error in joint positions after 1 s of walking over computing time",
     "threads": "Steps a second by number of threads",
     "scaling": "Microseconds a step by number of joints and of contact points",

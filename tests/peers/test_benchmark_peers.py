@@ -7,17 +7,21 @@ springs, explicitly or implicitly, which are differences of first order in the s
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from heelstrike.control.joint_feedback import JointFeedback
-from heelstrike.experiments.benchmark import engines, own, peer, scenarios, steps
+from heelstrike.experiments.benchmark import engines, own, peer, precision, scenarios, steps
 from heelstrike.experiments.benchmark.engines import PACKAGES, PARTS_OF_STEPS, simulators
+from heelstrike.experiments.benchmark.figures import draw
 from heelstrike.experiments.benchmark.own import InvalidRunError
-from heelstrike.experiments.benchmark.peer import Engine, check_flight, flight
+from heelstrike.experiments.benchmark.peer import Engine, Setting, check_flight, flight
+from heelstrike.experiments.benchmark.tables import tables
 from heelstrike.robot import State, load_robot
 from heelstrike.sim import TimeStepping
 
@@ -125,10 +129,31 @@ def test_an_engine_that_breaks_does_not_lose_the_others(monkeypatch: pytest.Monk
     both = {"broken": replace(working, peer=breaks), "mujoco": working}
     monkeypatch.setattr(steps, "simulators", lambda names: both)
     monkeypatch.setattr(steps, "_scenarios", lambda: [scenarios.falling("bravo7", duration=0.05)])
-    (row,) = steps.measure_steps(quick=True, peers=("broken", "mujoco"))["rows"]
+    part = steps.measure_steps(quick=True, peers=("broken", "mujoco"))
+    (row,) = part["rows"]
     assert row["broken_invalid"] == "OSError: no such world"
     assert "broken_us" not in row
     assert row["times_faster"].keys() == {"mujoco"}
+    console = Console(file=io.StringIO(), width=200)
+    console.print(*tables({"steps": part}))
+    assert "does not count: OSError: no such world" in console.file.getvalue()  # type: ignore[attr-defined]
+    (figure,) = draw({"steps": part}).values()
+    assert {text.get_text() for text in figure.axes[0].texts} >= {"–"}
+
+
+def test_a_setting_that_breaks_is_told_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    def breaks(scenario: Any) -> Any:
+        raise OSError("no such world")
+
+    working = simulators(["mujoco"])["mujoco"]
+    bad = replace(working, settings=lambda quick: iter([Setting("broken", "h 1e-03 s", breaks)]))
+    monkeypatch.setattr(precision, "simulators", lambda names: {"mujoco": bad})
+    monkeypatch.setattr(scenarios, "walking", lambda: scenarios.falling("bravo7", duration=0.02))
+    part = precision.measure_precision(quick=True, peers=("mujoco",))
+    (failure,) = part["failures"]
+    assert failure["reason"] == "OSError: no such world"
+    assert {point["side"] for point in part["points"]} == {"heelstrike"}
+    assert part["to_goal"]["times_less"] == {}
 
 
 def test_an_engine_that_cannot_be_loaded_is_named_and_left_out(

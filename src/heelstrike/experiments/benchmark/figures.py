@@ -76,12 +76,13 @@ def _bar(name: str) -> dict[str, Any]:
     return {"color": COLORS[name], "hatch": "///", "edgecolor": "white"}
 
 
+# Ours are the cold colours.
 _MARKS = (
     (BLUE, "o", "-"),
     (GREEN, "s", "-"),
     (SKY, "D", "-"),
-    (PURPLE, "v", "-"),
-    (ORANGE, "^", "-"),
+    (SKY, "v", "-"),
+    (BLUE, "^", "-"),
 )
 _PEER_MARKS = ("o", "s", "D", "v", "^", "P")
 

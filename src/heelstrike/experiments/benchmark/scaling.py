@@ -101,7 +101,7 @@ def _measure(
                 row[f"{name}_part_invalid"] = reason(error)
                 continue
             works[f"{name}_part"], steps[f"{name}_part"] = part.run, 1
-    best = best_of(works, seconds=0.1 if quick else 2.0, least=3) | slow
+    best = best_of(works, seconds=0.1 if quick else 2.0, least=3, in_a_row=2) | slow
     return row | {f"{name}_us": 1e6 * t / steps[name] for name, t in best.items()}
 
 

@@ -63,7 +63,7 @@ def _measure(
             part = _part(name, scenario, row)
             if part is not None:
                 works[f"{name}_part"], steps[f"{name}_part"] = part, 1
-    best = best_of(works, seconds=0.5 if quick else 4.0 + len(works))
+    best = best_of(works, seconds=0.5 if quick else 4.0 + len(works), in_a_row=2)
     for name, seconds in best.items():
         row[f"{name}_us"] = 1e6 * seconds / steps[name]
     row["times_faster"] = {

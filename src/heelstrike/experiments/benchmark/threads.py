@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.experiments.benchmark import scenarios
+from heelstrike.experiments.benchmark.peer import reason
 from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import best_of
 from heelstrike.robot import State
@@ -67,7 +68,10 @@ def measure_threads(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
         ],
     }
     if "mujoco" in peers:
-        result["mujoco"] = _mujoco(scenario, state, numbers, quick=quick)
+        try:
+            result["mujoco"] = _mujoco(scenario, state, numbers, quick=quick)
+        except Exception as error:  # of the peer must not lose what was measured
+            result["mujoco_invalid"] = reason(error)
     return result
 
 
