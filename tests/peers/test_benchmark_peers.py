@@ -126,13 +126,13 @@ def test_an_engine_that_breaks_does_not_lose_the_others(monkeypatch: pytest.Monk
         raise OSError("no such world")
 
     working = simulators(["mujoco"])["mujoco"]
-    both = {"broken": replace(working, peer=breaks), "mujoco": working}
+    both = {"drake": replace(working, peer=breaks), "mujoco": working}
     monkeypatch.setattr(steps, "simulators", lambda names: both)
     monkeypatch.setattr(steps, "_scenarios", lambda: [scenarios.falling("bravo7", duration=0.05)])
-    part = steps.measure_steps(quick=True, peers=("broken", "mujoco"))
+    part = steps.measure_steps(quick=True, peers=("drake", "mujoco"))
     (row,) = part["rows"]
-    assert row["broken_invalid"] == "OSError: no such world"
-    assert "broken_us" not in row
+    assert row["drake_invalid"] == "OSError: no such world"
+    assert "drake_us" not in row
     assert row["times_faster"].keys() == {"mujoco"}
     console = Console(file=io.StringIO(), width=200)
     console.print(*tables({"steps": part}))
