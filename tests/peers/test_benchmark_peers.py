@@ -111,6 +111,36 @@ def test_what_should_stand_and_does_not_is_refused(engine: Engine) -> None:
         there.check()
 
 
+def test_it_falls_as_ours_onto_the_stops_of_its_knees(engine: Engine) -> None:
+    """bravo7 folds up within 0.5 s; its knees stop at 130°.
+
+    Hard contacts come to 5e-3 rad of ours in steps of 1 ms, soft ones to 7e-2.
+    """
+    scenario = scenarios.falling("bravo7")
+    there = engine.peer(scenario, STEP)
+    there.run()
+    ours = own.run(scenario, TimeStepping(step=STEP)).position[-1]
+    assert ours[4] == pytest.approx(np.deg2rad(130.0), abs=1e-6)
+    np.testing.assert_allclose(there.state().q, ours, rtol=0.0, atol=0.1)
+
+
+def test_who_ends_elsewhere_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = simulators(["mujoco"])["mujoco"]
+    held = replace(engine, peer=lambda scenario, step: engine.peer(_held(scenario), step))
+    monkeypatch.setattr(steps, "simulators", lambda names: {"mujoco": held})
+    monkeypatch.setattr(steps, "check_flight", lambda engine, robot: 0.0)
+    monkeypatch.setattr(steps, "_scenarios", lambda: [scenarios.falling("bravo7")])
+    (row,) = steps.measure_steps(quick=True, peers=("mujoco",))["rows"]
+    assert "from where it should" in row["mujoco_invalid"]
+    assert "mujoco_us" not in row
+
+
+def _held(scenario: scenarios.Scenario) -> scenarios.Scenario:
+    """Return the scenario with joints that are held."""
+    standing = scenarios.standing("bravo7", duration=scenario.duration)
+    return replace(scenario, feedback=standing.feedback)
+
+
 def test_pinocchio_has_our_dynamics() -> None:
     pytest.importorskip("pinocchio")
     from heelstrike.experiments.benchmark.pinocchio_peer import ForwardDynamics

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pybullet
 
-from heelstrike.experiments.benchmark.links import links
+from heelstrike.experiments.benchmark.links import Link, links
 from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
 from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
 from heelstrike.robot import State
@@ -98,33 +98,41 @@ class BulletPeer(Peer):
             basePosition=none,
             physicsClientId=client,
         )
-        surface = {"spinningFriction": 0.0, "rollingFriction": 0.0, "restitution": 0.0}
         # The friction of two bodies is the product of theirs.
-        pybullet.changeDynamics(ground, -1, lateralFriction=1.0, **surface, physicsClientId=client)
+        pybullet.changeDynamics(
+            ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=client
+        )
         for i, link in enumerate(chain):
-            limits = {}
-            if np.isfinite(link.lower) and np.isfinite(link.upper):
-                limits = {"jointLowerLimit": link.lower, "jointUpperLimit": link.upper}
-            pybullet.changeDynamics(
-                body,
-                i,
-                localInertiaDiagonal=[link.inertia] * 3,
-                lateralFriction=FRICTION,
-                linearDamping=0.0,
-                angularDamping=0.0,
-                jointDamping=link.damping,
-                **surface,
-                **limits,
-                physicsClientId=client,
-            )
-            pybullet.setJointMotorControl2(
-                body, i, pybullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
-            )
-            # In one call with others, this takes their effect from them.
-            pybullet.changeDynamics(body, i, maxJointVelocity=NO_LIMIT, physicsClientId=client)
+            self._set_dynamics(body, i, link)
             for other in range(i):  # points meet the ground only
                 pybullet.setCollisionFilterPair(body, body, i, other, 0, physicsClientId=client)
         return int(body)
+
+    def _set_dynamics(self, body: int, i: int, link: Link) -> None:
+        """Tell it what it cannot be told when a link is made, and undo its defaults."""
+        limits = {}
+        if np.isfinite(link.lower) and np.isfinite(link.upper):
+            limits = {"jointLowerLimit": link.lower, "jointUpperLimit": link.upper}
+        client = self._client
+        pybullet.changeDynamics(
+            body,
+            i,
+            localInertiaDiagonal=[link.inertia] * 3,
+            lateralFriction=FRICTION,
+            spinningFriction=0.0,
+            rollingFriction=0.0,
+            restitution=0.0,
+            linearDamping=0.0,
+            angularDamping=0.0,
+            jointDamping=link.damping,
+            **limits,
+            physicsClientId=client,
+        )
+        # In one call with others, this takes their effect from them.
+        pybullet.changeDynamics(body, i, maxJointVelocity=NO_LIMIT, physicsClientId=client)
+        pybullet.setJointMotorControl2(
+            body, i, pybullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
+        )
 
     def _shape(self, points: Any) -> int:
         if not points:

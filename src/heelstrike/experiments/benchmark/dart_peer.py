@@ -85,6 +85,32 @@ class DartPeer(Peer):
 
 
 def _world(scenario: Scenario, options: Options) -> tuple[Any, Any]:
+    world = dartpy.simulation.World()
+    world.setGravity(space(scenario.robot.model.gravity))
+    world.setTimeStep(options.step)
+    awake = dartpy.simulation.DeactivationOptions()
+    awake.mEnabled = False  # what rests would be skipped
+    world.setDeactivationOptions(awake)
+    detectors = dartpy.simulation.CollisionDetectorType
+    world.setCollisionDetector(getattr(detectors, options.detector))
+    skeleton = _skeleton(scenario)
+    world.addSkeleton(_ground())
+    world.addSkeleton(skeleton)
+    return world, skeleton
+
+
+def _ground() -> Any:
+    ground = dartpy.dynamics.Skeleton("ground")
+    _, floor = ground.createWeldJointAndBodyNodePair()
+    block = floor.createShapeNode(dartpy.dynamics.BoxShape([100.0, 10.0, 1.0]))
+    block.setRelativeTranslation([0.0, 0.0, -0.5])
+    _touch(block)
+    ground.setMobile(False)
+    return ground
+
+
+def _skeleton(scenario: Scenario) -> Any:
+    """Links, joints, contact points, springs and dampers."""
     robot, feedback = scenario.robot, scenario.feedback
     model = robot.model
     dynamics = dartpy.dynamics
@@ -122,23 +148,7 @@ def _world(scenario: Scenario, options: Options) -> tuple[Any, Any]:
             joint.setRestPosition(0, float(-model.reference[driven]))
             joint.setDampingCoefficient(0, float(feedback.kd[i] + model.damping[driven]))
     skeleton.disableSelfCollisionCheck()
-    ground = dynamics.Skeleton("ground")
-    _, floor = ground.createWeldJointAndBodyNodePair()
-    block = floor.createShapeNode(dynamics.BoxShape([100.0, 10.0, 1.0]))
-    block.setRelativeTranslation([0.0, 0.0, -0.5])
-    _touch(block)
-    ground.setMobile(False)
-    world = dartpy.simulation.World()
-    world.setGravity(space(model.gravity))
-    world.setTimeStep(options.step)
-    awake = dartpy.simulation.DeactivationOptions()
-    awake.mEnabled = False  # what rests would be skipped
-    world.setDeactivationOptions(awake)
-    detectors = dartpy.simulation.CollisionDetectorType
-    world.setCollisionDetector(getattr(detectors, options.detector))
-    world.addSkeleton(ground)
-    world.addSkeleton(skeleton)
-    return world, skeleton
+    return skeleton
 
 
 def _touch(shape: Any) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pydrake import geometry, math, multibody, polynomial, trajectories
+from pydrake import geometry, math, polynomial, trajectories
 from pydrake.multibody import plant as plants
 from pydrake.multibody import tree
 from pydrake.systems import analysis, framework, primitives
@@ -105,8 +105,7 @@ class DrakePeer(Peer):
 
 
 def _simulator(scenario: Scenario, options: Options) -> tuple[Any, Any]:
-    robot, feedback = scenario.robot, scenario.feedback
-    model = robot.model
+    model = scenario.robot.model
     builder = framework.DiagramBuilder()
     config = plants.MultibodyPlantConfig(
         time_step=options.step,
@@ -127,13 +126,31 @@ def _simulator(scenario: Scenario, options: Options) -> tuple[Any, Any]:
         point_stiffness=options.stiffness,
         dissipation=options.dissipation,
     )
-    pose = math.RigidTransform
+    bodies = _add_robot(plant, scenario, material)
     plant.RegisterCollisionGeometry(
-        plant.world_body(), pose(), geometry.HalfSpace(), "ground", material
+        plant.world_body(), math.RigidTransform(), geometry.HalfSpace(), "ground", material
     )
+    plant.Finalize()
+    # The points of two feet may be in the same place: they meet the ground only.
+    own = geometry.GeometrySet(
+        [shape for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)]
+    )
+    scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
+    if scenario.robot.nu:
+        source = builder.AddSystem(_commands(scenario))
+        port = plant.get_actuation_input_port(tree.default_model_instance())
+        builder.Connect(source.get_output_port(), port)
+    return analysis.Simulator(builder.Build()), plant
+
+
+def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
+    """Add links, joints, contact points, actuators, springs and dampers; return the bodies."""
+    robot, feedback = scenario.robot, scenario.feedback
+    model = robot.model
+    pose = math.RigidTransform
     damping = model.damping.copy()
     if feedback is not None:
-        np.add.at(damping, model.actuator_joint, feedback.kd)
+        damping[model.actuator_joint] += feedback.kd
     bodies: list[Any] = []
     joints: list[Any] = []
     for i, link in enumerate(links(robot)):
@@ -162,26 +179,15 @@ def _simulator(scenario: Scenario, options: Options) -> tuple[Any, Any]:
             plant.RegisterCollisionGeometry(
                 body, pose(center), geometry.Sphere(radius), f"{link.name}_{number}", material
             )
-    for i, joint in enumerate(model.actuator_joint):
-        actuator = plant.AddJointActuator(robot.actuator_names[i], joints[joint])
-        actuator.set_default_rotor_inertia(float(model.armature[joint]))
+    for i, driven in enumerate(model.actuator_joint):
+        actuator = plant.AddJointActuator(robot.actuator_names[i], joints[driven])
+        actuator.set_default_rotor_inertia(float(model.armature[driven]))
         actuator.set_default_gear_ratio(1.0)
         if feedback is not None:
-            hinge = isinstance(joints[joint], tree.RevoluteJoint)
-            spring = multibody.tree.RevoluteSpring if hinge else multibody.tree.PrismaticSpring
-            rest = float(-model.reference[joint])
-            plant.AddForceElement(spring(joints[joint], rest, float(feedback.kp[i])))
-    plant.Finalize()
-    # The points of two feet may be in the same place: they meet the ground only.
-    own = geometry.GeometrySet(
-        [shape for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)]
-    )
-    scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
-    if robot.nu:
-        source = builder.AddSystem(_commands(scenario))
-        port = plant.get_actuation_input_port(tree.default_model_instance())
-        builder.Connect(source.get_output_port(), port)
-    return analysis.Simulator(builder.Build()), plant
+            spring = tree.RevoluteSpring if model.axis[driven, 0] else tree.PrismaticSpring
+            rest = float(-model.reference[driven])
+            plant.AddForceElement(spring(joints[driven], rest, float(feedback.kp[i])))
+    return bodies
 
 
 def _commands(scenario: Scenario) -> Any:
