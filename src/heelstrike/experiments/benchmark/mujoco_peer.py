@@ -64,8 +64,12 @@ class MuJoCoPeer(Peer):
         self.model = _model(scenario, options)
         self.data = mujoco.MjData(self.model)
         self._step = 0
-        self._states = np.zeros((1, self.steps, mujoco.mj_stateSize(self.model, KIND)))
-        self._none = np.zeros((1, self.steps, self.model.nsensordata))
+        self._make_room(self.steps)
+
+    def _make_room(self, steps: int) -> None:
+        """Make room for the states of so many steps, which `rollout` returns."""
+        self._states = np.zeros((1, steps, mujoco.mj_stateSize(self.model, KIND)))
+        self._none = np.zeros((1, steps, self.model.nsensordata))
 
     def _packed(self, state: State) -> Floats:
         mujoco.mj_resetData(self.model, self.data)
@@ -92,17 +96,19 @@ class MuJoCoPeer(Peer):
             mujoco.mj_getState(self.model, self.data, now[0], KIND)
             varying = len(self.commands) > 1
             control = self.commands[self._step : self._step + steps] if varying else self.commands
-            kept = steps == self.steps  # room for all states is there already
-            states, _ = rollout.rollout(
+            if steps > self._states.shape[1]:
+                self._make_room(steps)
+            states = self._states[:, :steps]
+            rollout.rollout(
                 self.model,
                 self.data,
                 now,
                 control[None],
                 nstep=steps,
-                state=self._states if kept else None,
-                sensordata=self._none if kept else None,
+                state=states,
+                sensordata=self._none[:, :steps],
             )
-            mujoco.mj_setState(self.model, self.data, states.reshape(steps, -1)[-1], KIND)
+            mujoco.mj_setState(self.model, self.data, states[0, -1], KIND)
         self._step += steps
 
     def state(self) -> State:

@@ -107,11 +107,11 @@ class Peer(ABC):
         self.advance(round(seconds / self.step))
         self.start = State(self.state().q, self.state().v)
 
-    def run(self) -> float:
-        """Simulate from start to end; return the seconds it took."""
+    def run(self, steps: int | None = None) -> float:
+        """Simulate from the start, to the end or some steps; return the seconds it took."""
         self.restart()
         begin = perf_counter()
-        self.advance(self.steps)
+        self.advance(self.steps if steps is None else steps)
         return perf_counter() - begin
 
     def check(self) -> dict[str, float]:

@@ -10,15 +10,18 @@ Work = Callable[[], float]
 """Something to be timed; returns its own seconds, or what should count as such."""
 
 
-def timed(work: Callable[[], object]) -> Work:
-    """Return work that times itself."""
+SLOT = 3e-3
+"""How long (s) a run lasts of which any part is as good as the whole."""
+FEWEST = 100
+"""Steps of such a run, at least."""
 
-    def timing() -> float:
-        begin = perf_counter()
-        work()
-        return perf_counter() - begin
 
-    return timing
+def steps_in_slot(seconds_a_step: float, *, most: int) -> int:
+    """Steps of a run that is about as long as that of any other engine.
+
+    The shorter a run, the likelier that nothing disturbs it: all shall have the same chance.
+    """
+    return min(most, max(FEWEST, round(SLOT / seconds_a_step)))
 
 
 def best_of(
