@@ -86,6 +86,8 @@ class ContactWorkspace(Bundle):
         general complementarity problem.
     tableau : float64
         The dictionary that is pivoted.
+    solvers : (1,) int64
+        Address of the machine code that tries the solvers in turn, shared by all workspaces.
     """
 
     counters: Integers
@@ -93,10 +95,11 @@ class ContactWorkspace(Bundle):
     vectors: Floats
     squares: Floats
     tableau: Floats
+    solvers: Integers
 
 
-def contact_workspace(capacity: int) -> ContactWorkspace:
-    """Allocate the buffers for contact problems of up to ``capacity`` contacts."""
+def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:
+    """Allocate the buffers; see :func:`~heelstrike.contact.search.contact_workspace`."""
     contacts = max(int(capacity), 1)
     unknowns = 2 * contacts
     pairs = 4 * contacts
@@ -108,4 +111,5 @@ def contact_workspace(capacity: int) -> ContactWorkspace:
         vectors=vectors,
         squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
         tableau=np.zeros((pairs, pairs + 2)),
+        solvers=solvers,
     )
