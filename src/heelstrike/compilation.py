@@ -119,9 +119,14 @@ class Kernel:
         update_wrapper(self, function)
         self.py_func = function
         self._called = False
+        self._dissolved = dissolved
+
+    @cached_property
+    def _part(self) -> Any:
+        """The kernel as part of others; it allocates nothing and so counts no references."""
         options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-        options["forceinline"] = dissolved
-        self._part = njit(**options, pipeline_class=InnerKernelCompiler)(function)
+        options["forceinline"] = self._dissolved
+        return njit(**options, pipeline_class=InnerKernelCompiler)(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
