@@ -18,9 +18,11 @@ from heelstrike.contact.workspace import (
     PIVOT_ROW,
     POINT,
     REST_TOLERANCE,
+    ROW_LABEL,
     SHARERS,
     SIZE,
     SLOPE,
+    STEP,
     ContactWorkspace,
     Floats,
     Integers,
@@ -83,81 +85,107 @@ def list_equations(
 def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
     """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
 
-    Elimination in the order of the rows, A = L D Lᵀ, with 1/D on the diagonal, zero for rows that
-    depend on others.
+    Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
+    end of the list and bring no column to L: their number costs little.
     """
     source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
-    dependent = 0
-    for i in range(size):
-        total = -free[source[i]]
-        for j in range(i):
-            entry = delassus[source[i], source[j]]
+    rank = 0
+    rest = size
+    while rank < rest:
+        row = source[rank]
+        total = -free[row]
+        for j in range(rank):
+            entry = delassus[row, source[j]]
             for k in range(j):
-                entry -= matrix[i, k] * matrix[j, k]
-            # Until row i is finished, its entries still carry their D.
-            matrix[i, j] = entry
-        pivot = delassus[source[i], source[i]]
+                entry -= matrix[rank, k] * matrix[j, k]
+            # Until the row is finished, its entries still carry their D.
+            matrix[rank, j] = entry
+        pivot = delassus[row, row]
         diagonal = pivot
-        for j in range(i):
-            ratio = matrix[i, j] * matrix[j, j]
-            pivot -= ratio * matrix[i, j]
+        for j in range(rank):
+            ratio = matrix[rank, j] * matrix[j, j]
+            pivot -= ratio * matrix[rank, j]
             total -= ratio * x[j]
-            matrix[i, j] = ratio
-        x[i] = total
+            matrix[rank, j] = ratio
+        x[rank] = total
         if pivot > GOOD_PIVOT * diagonal:
-            matrix[i, i] = 1.0 / pivot
+            matrix[rank, rank] = 1.0 / pivot
+            rank += 1
         elif abs(pivot) <= NO_PIVOT * diagonal:
-            matrix[i, i] = 0.0
-            dependent += 1
+            rest -= 1
+            put_off(rank, rest, size, work)
         else:
             return False
-    for i in range(size):
+    for i in range(rank):
         x[i] *= matrix[i, i]
+    if rank < size:
+        shorten(rank, size, work)
+        return True
     for i in range(size - 1, -1, -1):
         for j in range(i):
             x[j] -= matrix[i, j] * x[i]
-    if dependent > 0:
-        shorten(size, work)
     return True
 
 
 @kernel
-def shorten(size: int, work: ContactWorkspace) -> None:
-    """Take from the solution what lies along directions that change no velocity.
-
-    There is one such direction n for every row that depends on others, Lᵀ n = e. They are made
-    orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
-    counts 1/m.
-    """
-    matrix, x, basis = work.tableau, work.vectors[POINT], work.squares[BASIS]
-    sharers = work.vectors[SHARERS]
-    found = 0
-    for row in range(size):
-        if matrix[row, row] != 0.0:
-            continue
-        direction = basis[found]
+def put_off(rank: int, rest: int, size: int, work: ContactWorkspace) -> None:
+    """Exchange the row in hand, which depends on those before, for the last that is untried."""
+    source, order, matrix = work.labels[EQUATION], work.labels[ROW_LABEL], work.tableau
+    if rest == size - 1:
         for i in range(size):
-            direction[i] = 0.0
-        direction[row] = 1.0
-        for i in range(row, -1, -1):
-            for j in range(i):
-                direction[j] -= matrix[i, j] * direction[i]
-        for earlier in range(found):
-            remove_part(size, basis[earlier], sharers, direction)
-        remove_part(size, direction, sharers, x)
-        found += 1
+            order[i] = i
+    source[rank], source[rest] = source[rest], source[rank]
+    order[rank], order[rest] = order[rest], order[rank]
+    for j in range(rank):
+        matrix[rest, j] = matrix[rank, j]
+    for j in range(rank, rest):
+        matrix[rest, j] = 0.0
 
 
 @kernel
-def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -> None:
-    """Make a vector orthogonal to a direction."""
-    part = 0.0
-    length = 0.0
+def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
+    """Find the x of least norm with ``Lᵀ x = z``, where ``POINT`` holds z.
+
+    In the norm of the impulses, where what m rows share in equal parts counts 1/m, it is
+    x = M L (Lᵀ M L)⁻¹ z with the m on the diagonal of M.
+    """
+    order, matrix, x = work.labels[ROW_LABEL], work.tableau, work.vectors[POINT]
+    sharers, y, normal = work.vectors[SHARERS], work.vectors[STEP], work.squares[BASIS]
+    for i in range(rank):
+        y[i] = x[i]
+        for j in range(i + 1):
+            normal[i, j] = 0.0
     for i in range(size):
-        part += direction[i] * vector[i] / sharers[i]
-        length += direction[i] * direction[i] / sharers[i]
+        # The diagonal of L is one, and that of the matrix holds 1/D.
+        if i < rank:
+            matrix[i, i] = 1.0
+        weight = sharers[order[i]]
+        for j in range(min(i + 1, rank)):
+            weighted = weight * matrix[i, j]
+            for k in range(j + 1):
+                normal[j, k] += weighted * matrix[i, k]
+    for i in range(rank):
+        for j in range(i):
+            entry = normal[i, j]
+            for k in range(j):
+                entry -= normal[i, k] * normal[j, k]
+            normal[i, j] = entry
+        for j in range(i):
+            ratio = normal[i, j] * normal[j, j]
+            normal[i, i] -= ratio * normal[i, j]
+            y[i] -= ratio * y[j]
+            normal[i, j] = ratio
+        normal[i, i] = 1.0 / normal[i, i]
+    for i in range(rank):
+        y[i] *= normal[i, i]
+    for i in range(rank - 1, -1, -1):
+        for j in range(i):
+            y[j] -= normal[i, j] * y[i]
     for i in range(size):
-        vector[i] -= part / length * direction[i]
+        total = 0.0
+        for j in range(min(i + 1, rank)):
+            total += matrix[i, j] * y[j]
+        x[order[i]] = sharers[order[i]] * total
 
 
 @dissolved_kernel
