@@ -22,6 +22,7 @@ from heelstrike.contact.workspace import (
     SHARERS,
     SIZE,
     SLOPE,
+    SPEED,
     STEP,
     ContactWorkspace,
     Floats,
@@ -31,8 +32,11 @@ from heelstrike.contact.workspace import (
 SAME_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 
-GOOD_PIVOT = 1e-7
+GOOD_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
+
+POOR_PIVOT = 1e-7
+"""Pivots that keep more than this are taken where there are no good ones left."""
 
 NO_PIVOT = 1e-11
 """Rows that keep less depend on those before; what lies between is left to the general way."""
@@ -45,9 +49,10 @@ def list_equations(
     """List the rows that shall have no velocity; return how many differ, or -1 to give up.
 
     ``EQUATION`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for
-    none, and ``SHARERS`` how many rows share an equation.
+    none, ``ROW_LABEL`` the equations in their order, and ``SHARERS`` how many rows share one.
     """
     source, equation, sharers = work.labels[EQUATION], work.labels[PIVOT_ROW], work.vectors[SHARERS]
+    order = work.labels[ROW_LABEL]
     size = 0
     for contact in range(count):
         row = 2 * contact
@@ -61,6 +66,7 @@ def list_equations(
             return -1
         equation[row] = size
         source[size] = row
+        order[size] = size
         sharers[size] = 1.0
         size += 1
         if not has_friction:
@@ -76,6 +82,7 @@ def list_equations(
         if equation[tangent] < 0:
             equation[tangent] = size
             source[size] = tangent
+            order[size] = size
             sharers[size] = 1.0
             size += 1
     return size
@@ -86,11 +93,14 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
     """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
 
     Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
-    end of the list and bring no column to L: their number costs little.
+    end of the list and bring no column to L: their number costs little. Neighbours among many
+    points of a sole nearly do, and are tried again after the others.
     """
     source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
     rank = 0
     rest = size
+    least = GOOD_PIVOT
+    poor = False
     while rank < rest:
         row = source[rank]
         total = -free[row]
@@ -108,84 +118,122 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
             total -= ratio * x[j]
             matrix[rank, j] = ratio
         x[rank] = total
-        if pivot > GOOD_PIVOT * diagonal:
+        if pivot > least * diagonal:
             matrix[rank, rank] = 1.0 / pivot
             rank += 1
-        elif abs(pivot) <= NO_PIVOT * diagonal:
+        elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
+            poor = poor or pivot > POOR_PIVOT * diagonal
             rest -= 1
-            put_off(rank, rest, size, work)
+            put_off(rank, rest, work)
         else:
             return False
+        if poor and rank == rest:
+            poor = False
+            least = POOR_PIVOT
+            rest = size
     for i in range(rank):
         x[i] *= matrix[i, i]
-    if rank < size:
-        shorten(rank, size, work)
-        return True
-    for i in range(size - 1, -1, -1):
+    for i in range(rank - 1, -1, -1):
         for j in range(i):
             x[j] -= matrix[i, j] * x[i]
+    if rank < size:
+        shorten(rank, size, work)
     return True
 
 
 @kernel
-def put_off(rank: int, rest: int, size: int, work: ContactWorkspace) -> None:
-    """Exchange the row in hand, which depends on those before, for the last that is untried."""
+def put_off(rank: int, rest: int, work: ContactWorkspace) -> None:
+    """Exchange the row in hand, which depends on those before, for the last that is untried.
+
+    Its row of the matrix becomes the combination of the earlier rows that it is, l L⁻¹.
+    """
     source, order, matrix = work.labels[EQUATION], work.labels[ROW_LABEL], work.tableau
-    if rest == size - 1:
-        for i in range(size):
-            order[i] = i
-    source[rank], source[rest] = source[rest], source[rank]
-    order[rank], order[rest] = order[rest], order[rank]
-    for j in range(rank):
-        matrix[rest, j] = matrix[rank, j]
-    for j in range(rank, rest):
-        matrix[rest, j] = 0.0
+    if rest > rank:
+        source[rank], source[rest] = source[rest], source[rank]
+        order[rank], order[rest] = order[rest], order[rank]
+        for i in range(rank):
+            matrix[rest, i] = matrix[rank, i]
+        for i in range(rank, rest):
+            matrix[rest, i] = 0.0
+    for i in range(rank - 1, 0, -1):
+        for j in range(i):
+            matrix[rest, j] -= matrix[rest, i] * matrix[i, j]
 
 
 @kernel
 def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
-    """Find the x of least norm with ``Lᵀ x = z``, where ``POINT`` holds z.
+    """Spread the solution from the independent rows over all, to the least norm.
 
-    In the norm of the impulses, where what m rows share in equal parts counts 1/m, it is
-    x = M L (Lᵀ M L)⁻¹ z with the m on the diagonal of M.
+    Where the other rows are the combinations C of these, and y solves for these alone, every x
+    with ``x₁ + Cᵀ x₂ = y`` is a solution. In the norm of the impulses, where what m rows share in
+    equal parts counts 1/m (they make the diagonal M), the shortest has::
+
+        x₂ = (M₂⁻¹ + C M₁⁻¹ Cᵀ)⁻¹ C M₁⁻¹ y    =    M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
+
+    of which the smaller system is solved.
     """
     order, matrix, x = work.labels[ROW_LABEL], work.tableau, work.vectors[POINT]
-    sharers, y, normal = work.vectors[SHARERS], work.vectors[STEP], work.squares[BASIS]
-    for i in range(rank):
-        y[i] = x[i]
+    sharers, y, system = work.vectors[SHARERS], work.vectors[STEP], work.squares[BASIS]
+    spread = work.vectors[SPEED]
+    many = size - rank > rank
+    few = min(rank, size - rank)
+    for i in range(few):
+        y[i] = x[i] if many else 0.0
         for j in range(i + 1):
-            normal[i, j] = 0.0
-    for i in range(size):
-        # The diagonal of L is one, and that of the matrix holds 1/D.
-        if i < rank:
-            matrix[i, i] = 1.0
-        weight = sharers[order[i]]
-        for j in range(min(i + 1, rank)):
-            weighted = weight * matrix[i, j]
-            for k in range(j + 1):
-                normal[j, k] += weighted * matrix[i, k]
+            system[i, j] = 0.0
+        if many:
+            system[i, i] = sharers[order[i]]
+            continue
+        other = rank + i
+        system[i, i] = 1.0 / sharers[order[other]]
+        for k in range(rank):
+            weighted = matrix[other, k] / sharers[order[k]]
+            y[i] += weighted * x[k]
+            for j in range(i + 1):
+                system[i, j] += weighted * matrix[rank + j, k]
+    if many:
+        for k in range(rank, size):
+            for i in range(rank):
+                weighted = sharers[order[k]] * matrix[k, i]
+                for j in range(i + 1):
+                    system[i, j] += weighted * matrix[k, j]
+    solve_regular(few, system, y)
     for i in range(rank):
+        spread[i] = x[i]
+    for k in range(rank, size):
+        total = y[k - rank]
+        if many:
+            total = 0.0
+            for i in range(rank):
+                total += matrix[k, i] * y[i]
+            total *= sharers[order[k]]
+        spread[k] = total
+        for i in range(rank):
+            spread[i] -= matrix[k, i] * total
+    for i in range(size):
+        x[order[i]] = spread[i]
+
+
+@kernel
+def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
+    """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
+    for i in range(size):
         for j in range(i):
-            entry = normal[i, j]
+            entry = matrix[i, j]
             for k in range(j):
-                entry -= normal[i, k] * normal[j, k]
-            normal[i, j] = entry
+                entry -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = entry
         for j in range(i):
-            ratio = normal[i, j] * normal[j, j]
-            normal[i, i] -= ratio * normal[i, j]
-            y[i] -= ratio * y[j]
-            normal[i, j] = ratio
-        normal[i, i] = 1.0 / normal[i, i]
-    for i in range(rank):
-        y[i] *= normal[i, i]
-    for i in range(rank - 1, -1, -1):
-        for j in range(i):
-            y[j] -= normal[i, j] * y[i]
+            ratio = matrix[i, j] * matrix[j, j]
+            matrix[i, i] -= ratio * matrix[i, j]
+            x[i] -= ratio * x[j]
+            matrix[i, j] = ratio
+        matrix[i, i] = 1.0 / matrix[i, i]
     for i in range(size):
-        total = 0.0
-        for j in range(min(i + 1, rank)):
-            total += matrix[i, j] * y[j]
-        x[order[i]] = sharers[order[i]] * total
+        x[i] *= matrix[i, i]
+    for i in range(size - 1, 0, -1):
+        for j in range(i):
+            x[j] -= matrix[i, j] * x[i]
 
 
 @dissolved_kernel
