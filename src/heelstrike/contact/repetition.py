@@ -15,13 +15,14 @@ from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_
 from heelstrike.contact.workspace import (
     BASIS,
     EQUATION,
+    ORDER,
     PIVOT_ROW,
     POINT,
     REST_TOLERANCE,
-    ROW_LABEL,
     SHARERS,
     SIZE,
     SLOPE,
+    SPAN,
     SPEED,
     STEP,
     ContactWorkspace,
@@ -49,10 +50,9 @@ def list_equations(
     """List the rows that shall have no velocity; return how many differ, or -1 to give up.
 
     ``EQUATION`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for
-    none, ``ROW_LABEL`` the equations in their order, and ``SHARERS`` how many rows share one.
+    none, and ``SHARERS`` how many rows share an equation.
     """
     source, equation, sharers = work.labels[EQUATION], work.labels[PIVOT_ROW], work.vectors[SHARERS]
-    order = work.labels[ROW_LABEL]
     size = 0
     for contact in range(count):
         row = 2 * contact
@@ -66,7 +66,6 @@ def list_equations(
             return -1
         equation[row] = size
         source[size] = row
-        order[size] = size
         sharers[size] = 1.0
         size += 1
         if not has_friction:
@@ -82,7 +81,6 @@ def list_equations(
         if equation[tangent] < 0:
             equation[tangent] = size
             source[size] = tangent
-            order[size] = size
             sharers[size] = 1.0
             size += 1
     return size
@@ -123,6 +121,8 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
             rank += 1
         elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
             poor = poor or pivot > POOR_PIVOT * diagonal
+            if rest == size and least == GOOD_PIVOT:
+                begin_order(size, work)
             rest -= 1
             put_off(rank, rest, work)
         else:
@@ -142,29 +142,29 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
 
 
 @kernel
-def put_off(rank: int, rest: int, work: ContactWorkspace) -> None:
-    """Exchange the row in hand, which depends on those before, for the last that is untried.
+def begin_order(size: int, work: ContactWorkspace) -> None:
+    """List the equations in their order."""
+    for i in range(size):
+        work.labels[ORDER, i] = i
 
-    Its row of the matrix becomes the combination of the earlier rows that it is, l L⁻¹.
-    """
-    source, order, matrix = work.labels[EQUATION], work.labels[ROW_LABEL], work.tableau
+
+@kernel
+def put_off(rank: int, rest: int, work: ContactWorkspace) -> None:
+    """Exchange the row in hand, which depends on those before, for the last that is untried."""
+    source, order, matrix = work.labels[EQUATION], work.labels[ORDER], work.tableau
+    work.labels[SPAN, rest] = rank
     if rest > rank:
         source[rank], source[rest] = source[rest], source[rank]
         order[rank], order[rest] = order[rest], order[rank]
         for i in range(rank):
             matrix[rest, i] = matrix[rank, i]
-        for i in range(rank, rest):
-            matrix[rest, i] = 0.0
-    for i in range(rank - 1, 0, -1):
-        for j in range(i):
-            matrix[rest, j] -= matrix[rest, i] * matrix[i, j]
 
 
 @kernel
 def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
     """Spread the solution from the independent rows over all, to the least norm.
 
-    Where the other rows are the combinations C of these, and y solves for these alone, every x
+    The other rows are combinations of these, C = L₂ L₁⁻¹. Where y solves for these alone, every x
     with ``x₁ + Cᵀ x₂ = y`` is a solution. In the norm of the impulses, where what m rows share in
     equal parts counts 1/m (they make the diagonal M), the shortest has::
 
@@ -172,49 +172,68 @@ def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
 
     of which the smaller system is solved.
     """
-    order, matrix, x = work.labels[ROW_LABEL], work.tableau, work.vectors[POINT]
+    order, matrix, x = work.labels[ORDER], work.tableau, work.vectors[POINT]
     sharers, y, system = work.vectors[SHARERS], work.vectors[STEP], work.squares[BASIS]
     spread = work.vectors[SPEED]
+    for place in range(rank, size):
+        part = matrix[place]
+        for j in range(work.labels[SPAN, place], rank):
+            part[j] = 0.0
+        for j in range(rank - 2, -1, -1):
+            entry = part[j]
+            for i in range(j + 1, rank):
+                entry -= part[i] * matrix[i, j]
+            part[j] = entry
     many = size - rank > rank
     few = min(rank, size - rank)
-    for i in range(few):
-        y[i] = x[i] if many else 0.0
-        for j in range(i + 1):
-            system[i, j] = 0.0
-        if many:
-            system[i, i] = sharers[order[i]]
-            continue
-        other = rank + i
-        system[i, i] = 1.0 / sharers[order[other]]
-        for k in range(rank):
-            weighted = matrix[other, k] / sharers[order[k]]
-            y[i] += weighted * x[k]
-            for j in range(i + 1):
-                system[i, j] += weighted * matrix[rank + j, k]
     if many:
-        for k in range(rank, size):
-            for i in range(rank):
-                weighted = sharers[order[k]] * matrix[k, i]
-                for j in range(i + 1):
-                    system[i, j] += weighted * matrix[k, j]
-    solve_regular(few, system, y)
-    for i in range(rank):
-        spread[i] = x[i]
-    for k in range(rank, size):
-        total = y[k - rank]
-        if many:
-            total = 0.0
-            for i in range(rank):
-                total += matrix[k, i] * y[i]
-            total *= sharers[order[k]]
-        spread[k] = total
         for i in range(rank):
-            spread[i] -= matrix[k, i] * total
-    for i in range(size):
-        x[order[i]] = spread[i]
+            y[i] = x[i]
+            for j in range(i):
+                system[i, j] = 0.0
+            system[i, i] = sharers[order[i]]
+        for place in range(rank, size):
+            part = matrix[place]
+            for i in range(rank):
+                weighted = sharers[order[place]] * part[i]
+                for j in range(i + 1):
+                    system[i, j] += weighted * part[j]
+    else:
+        for i in range(few):
+            part = matrix[rank + i]
+            along = 0.0
+            length = 1.0 / sharers[order[rank + i]]
+            for k in range(rank):
+                weighted = part[k] / sharers[order[k]]
+                spread[k] = weighted
+                along += weighted * x[k]
+                length += weighted * part[k]
+            y[i] = along
+            system[i, i] = length
+            for j in range(i):
+                entry = 0.0
+                for k in range(rank):
+                    entry += spread[k] * matrix[rank + j, k]
+                system[i, j] = entry
+    solve_regular(few, system, y)
+    for place in range(rank, size):
+        part = matrix[place]
+        entry = y[place - rank]
+        if many:
+            entry = 0.0
+            for i in range(rank):
+                entry += part[i] * y[i]
+            entry *= sharers[order[place]]
+        spread[place] = entry
+        for i in range(rank):
+            x[i] -= part[i] * entry
+    for place in range(rank):
+        spread[place] = x[place]
+    for place in range(size):
+        x[order[place]] = spread[place]
 
 
-@kernel
+@dissolved_kernel
 def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
     """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
     for i in range(size):
@@ -229,11 +248,11 @@ def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
             x[i] -= ratio * x[j]
             matrix[i, j] = ratio
         matrix[i, i] = 1.0 / matrix[i, i]
-    for i in range(size):
-        x[i] *= matrix[i, i]
-    for i in range(size - 1, 0, -1):
-        for j in range(i):
-            x[j] -= matrix[i, j] * x[i]
+    for j in range(size - 1, -1, -1):
+        total = x[j] * matrix[j, j]
+        for i in range(j + 1, size):
+            total -= matrix[i, j] * x[i]
+        x[j] = total
 
 
 @dissolved_kernel
