@@ -36,7 +36,9 @@ PIVOT_ROW = 6  # equation: the tableau row that holds its unknown, -1 for none
 ROW_LABEL = 7  # tableau row: the variable it holds
 COLUMN_LABEL = 8  # tableau column: the variable it holds
 PLACE = 9  # variable: its row, or minus its column
-LABELS = 10
+ORDER = 10  # place in the elimination: the equation that has it
+SPAN = 11  # the same: how many columns its row of the factor has
+LABELS = 12
 
 # Rows of ``ContactWorkspace.vectors``, by what they are indexed with.
 CONE = 0  # contact: friction coefficient of the scaled problem
