@@ -98,9 +98,14 @@ class ContactWorkspace(Bundle):
     squares: Floats
     tableau: Floats
     solvers: Integers
+    eliminations: Integers
+    lower_half: Floats
+    least: Floats
 
 
-def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:
+def allocate_contact_workspace(
+    capacity: int, solvers: Integers, eliminations: Integers
+) -> ContactWorkspace:
     """Allocate the buffers; see :func:`~heelstrike.contact.search.contact_workspace`."""
     contacts = max(int(capacity), 1)
     unknowns = 2 * contacts
@@ -114,4 +119,7 @@ def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorks
         squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
         tableau=np.zeros((pairs, pairs + 2)),
         solvers=solvers,
+        eliminations=eliminations,
+        lower_half=np.zeros(36),
+        least=np.zeros(1),
     )
