@@ -9,12 +9,16 @@ from llvmlite import ir
 from numpy.typing import NDArray
 
 from heelstrike.compilation import kernel
-from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.machine_code import addresses, can_fuse
 from heelstrike.dynamics.straight_line import Recording, add_function
+from heelstrike.robot.model import Floats
 
 LARGEST = 8
-"""Size of the largest system that there is a program for: it grows with the cube of the size."""
+"""Unknowns of the largest system with a program; its length grows with the cube of their number."""
+
+
+POOR_PIVOT = 1e-7
+"""Pivots that keep more than this of their diagonal can be divided by, if need be."""
 
 
 @kernel
@@ -24,16 +28,13 @@ def inverse_above(value: float, least: float) -> float:
 
 
 @kernel
-def eliminate(least: Floats, matrix: Floats, x: Floats, pivot: Floats) -> None:
+def eliminate(matrix: Floats, x: Floats, pivot: Floats) -> None:
     """Replace x by a solution of a symmetric system, A = L D Lᵀ.
 
-    Unknowns whose pivot is not more than `least` of their diagonal stay zero, and their columns
-    of L empty.
+    Where a pivot is less than poor its unknown stays zero, and its column of L empty.
 
     Parameters
     ----------
-    least : (1,) float
-        Share of a diagonal that a pivot must keep.
     matrix : (n (n + 1) / 2,) float
         Lower half of A, then of L with 1/D on the diagonal, row by row.
     x : (n,) float
@@ -55,7 +56,7 @@ def eliminate(least: Floats, matrix: Floats, x: Floats, pivot: Floats) -> None:
             pivot[i] = pivot[i] - ratio * matrix[row + j]
             x[i] = x[i] - ratio * x[j]
             matrix[row + j] = ratio
-        matrix[row + i] = inverse_above(pivot[i], least[0] * matrix[row + i])
+        matrix[row + i] = inverse_above(pivot[i], POOR_PIVOT * matrix[row + i])
     for i in range(size):
         x[i] = x[i] * matrix[i * (i + 1) // 2 + i]
     for i in range(size - 1, -1, -1):
@@ -75,7 +76,6 @@ def elimination_programs() -> NDArray[np.int64]:
         module = ir.Module("elimination")
         for size in sizes:
             arguments = {
-                "least": np.zeros(1),
                 "matrix": np.zeros(size * (size + 1) // 2),
                 "x": np.zeros(size),
                 "pivot": np.zeros(size),

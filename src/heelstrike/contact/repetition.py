@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.certificate import certify
+from heelstrike.contact.elimination import POOR_PIVOT
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
     BASIS,
@@ -36,9 +37,6 @@ SAME_ROW = 1e-14
 
 GOOD_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
-
-POOR_PIVOT = 1e-7
-"""Pivots that keep more than this are taken where there are no good ones left."""
 
 NO_PIVOT = 1e-11
 """Rows that keep less depend on those before; what lies between is left to the general way."""
@@ -101,8 +99,7 @@ def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorksp
         for j in range(i + 1):
             matrix[place] = delassus[row, source[j]]
             place += 1
-    work.least[0] = POOR_PIVOT
-    play(work.eliminations[size], (work.least, matrix, x, pivot))
+    play(work.eliminations[size], (matrix, x, pivot))
     rank = 0
     for i in range(size):
         diagonal = delassus[source[i], source[i]]

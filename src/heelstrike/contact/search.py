@@ -11,7 +11,6 @@ from numba import types
 from heelstrike.compilation import kernel, type_of
 from heelstrike.contact.active_set import evaluate, label
 from heelstrike.contact.certificate import certify
-from heelstrike.contact.elimination import elimination_programs
 from heelstrike.contact.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.gauss_seidel import gauss_seidel
 from heelstrike.contact.lemke import PATHS, lemke
@@ -103,7 +102,7 @@ def stick_or_open(
 
 def _signature() -> Any:
     matrix, vector, integers = types.float64[:, ::1], types.float64[::1], types.int64[::1]
-    work = type_of(allocate_contact_workspace(1, np.zeros(1, np.int64), np.zeros(1, np.int64)))
+    work = type_of(allocate_contact_workspace(1, np.zeros(1, np.int64)))
     return types.int64(
         types.int64,
         matrix,
@@ -242,4 +241,4 @@ def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
     """
     if ready:
         try_solvers.finish()
-    return allocate_contact_workspace(capacity, try_solvers.address, elimination_programs())
+    return allocate_contact_workspace(capacity, try_solvers.address)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.bundle import Bundle
+from heelstrike.contact.elimination import LARGEST, elimination_programs
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -90,6 +91,10 @@ class ContactWorkspace(Bundle):
         The dictionary that is pivoted.
     solvers : (1,) int64
         Address of the machine code that tries the solvers in turn, shared by all workspaces.
+    eliminations : (any,) int64
+        Addresses of the programs that solve small systems, by size; zero where there is none.
+    lower_half : float64
+        The matrix of a small system.
     """
 
     counters: Integers
@@ -100,12 +105,9 @@ class ContactWorkspace(Bundle):
     solvers: Integers
     eliminations: Integers
     lower_half: Floats
-    least: Floats
 
 
-def allocate_contact_workspace(
-    capacity: int, solvers: Integers, eliminations: Integers
-) -> ContactWorkspace:
+def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:
     """Allocate the buffers; see :func:`~heelstrike.contact.search.contact_workspace`."""
     contacts = max(int(capacity), 1)
     unknowns = 2 * contacts
@@ -119,7 +121,6 @@ def allocate_contact_workspace(
         squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
         tableau=np.zeros((pairs, pairs + 2)),
         solvers=solvers,
-        eliminations=eliminations,
-        lower_half=np.zeros(36),
-        least=np.zeros(1),
+        eliminations=elimination_programs(),
+        lower_half=np.zeros(LARGEST * (LARGEST + 1) // 2),
     )
