@@ -24,6 +24,7 @@ from heelstrike.contact.modes import (
     WARM_START,
 )
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.search import contact_workspace
 from heelstrike.contact.workspace import (
     FAILURES,
     FALLBACKS,
@@ -31,7 +32,6 @@ from heelstrike.contact.workspace import (
     SHORTCUTS,
     SOLVES,
     SUCCEEDED,
-    contact_workspace,
 )
 
 ALL = (LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL)

@@ -100,13 +100,29 @@ def certify(
         tangent_velocity = free[row + 1]
         normal_size = speeds + abs(normal_velocity)
         tangent_size = speeds + abs(tangent_velocity)
-        for column in range(2 * count):
+        # Friction is summed apart from the normal impulses: the sums run side by side.
+        normal_friction = 0.0
+        tangent_friction = 0.0
+        normal_part = 0.0
+        tangent_part = 0.0
+        for other in range(count):
+            column = 2 * other
             part = delassus[row, column] * impulse[column]
             normal_velocity += part
             normal_size += abs(part)
+            part = delassus[row, column + 1] * impulse[column + 1]
+            normal_friction += part
+            normal_part += abs(part)
             part = delassus[row + 1, column] * impulse[column]
             tangent_velocity += part
             tangent_size += abs(part)
+            part = delassus[row + 1, column + 1] * impulse[column + 1]
+            tangent_friction += part
+            tangent_part += abs(part)
+        normal_velocity += normal_friction
+        normal_size += normal_part
+        tangent_velocity += tangent_friction
+        tangent_size += tangent_part
         if not (normal_size < math.inf and tangent_size < math.inf):
             penetration = math.inf  # NaN or infinite
         velocity[row] = normal_velocity

@@ -11,25 +11,31 @@ from __future__ import annotations
 
 from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.certificate import certify
+from heelstrike.contact.elimination import POOR_PIVOT
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
     BASIS,
     EQUATION,
+    ORDER,
     PIVOT_ROW,
     POINT,
     REST_TOLERANCE,
     SHARERS,
     SIZE,
     SLOPE,
+    SPAN,
+    SPEED,
+    STEP,
     ContactWorkspace,
     Floats,
     Integers,
 )
+from heelstrike.dynamics.straight_line import play
 
 SAME_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 
-GOOD_PIVOT = 1e-7
+GOOD_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
 
 NO_PIVOT = 1e-11
@@ -80,68 +86,53 @@ def list_equations(
 
 
 @dissolved_kernel
-def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
-    """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
-
-    Elimination in the order of the rows, A = L D Lᵀ, with 1/D on the diagonal, zero for rows that
-    depend on others.
-    """
-    source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
-    dependent = 0
+def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+    """Like :func:`solve_equations` for few equations, by straight-line code."""
+    if size >= work.eliminations.shape[0] or work.eliminations[size] == 0:
+        return False
+    source, matrix = work.labels[EQUATION], work.lower_half
+    x, pivot = work.vectors[POINT], work.vectors[STEP]
+    place = 0
     for i in range(size):
-        total = -free[source[i]]
-        for j in range(i):
-            entry = delassus[source[i], source[j]]
-            for k in range(j):
-                entry -= matrix[i, k] * matrix[j, k]
-            # Until row i is finished, its entries still carry their D.
-            matrix[i, j] = entry
-        pivot = delassus[source[i], source[i]]
-        diagonal = pivot
-        for j in range(i):
-            ratio = matrix[i, j] * matrix[j, j]
-            pivot -= ratio * matrix[i, j]
-            total -= ratio * x[j]
-            matrix[i, j] = ratio
-        x[i] = total
-        if pivot > GOOD_PIVOT * diagonal:
-            matrix[i, i] = 1.0 / pivot
-        elif abs(pivot) <= NO_PIVOT * diagonal:
-            matrix[i, i] = 0.0
-            dependent += 1
-        else:
+        row = source[i]
+        x[i] = -free[row]
+        for j in range(i + 1):
+            matrix[place] = delassus[row, source[j]]
+            place += 1
+    play(work.eliminations[size], (matrix, x, pivot))
+    rank = 0
+    for i in range(size):
+        diagonal = delassus[source[i], source[i]]
+        if pivot[i] > POOR_PIVOT * diagonal:
+            rank += 1
+        elif abs(pivot[i]) > NO_PIVOT * diagonal:
             return False
-    for i in range(size):
-        x[i] *= matrix[i, i]
-    for i in range(size - 1, -1, -1):
-        for j in range(i):
-            x[j] -= matrix[i, j] * x[i]
-    if dependent > 0:
-        shorten(size, work)
+    if rank < size:
+        leave_out_idle(size, work)
     return True
 
 
 @kernel
-def shorten(size: int, work: ContactWorkspace) -> None:
+def leave_out_idle(size: int, work: ContactWorkspace) -> None:
     """Take from the solution what lies along directions that change no velocity.
 
     There is one such direction n for every row that depends on others, Lᵀ n = e. They are made
     orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
     counts 1/m.
     """
-    matrix, x, basis = work.tableau, work.vectors[POINT], work.squares[BASIS]
+    matrix, x, basis = work.lower_half, work.vectors[POINT], work.squares[BASIS]
     sharers = work.vectors[SHARERS]
     found = 0
     for row in range(size):
-        if matrix[row, row] != 0.0:
+        if matrix[row * (row + 1) // 2 + row] != 0.0:
             continue
         direction = basis[found]
         for i in range(size):
             direction[i] = 0.0
         direction[row] = 1.0
-        for i in range(row, -1, -1):
+        for i in range(row, 0, -1):
             for j in range(i):
-                direction[j] -= matrix[i, j] * direction[i]
+                direction[j] -= matrix[i * (i + 1) // 2 + j] * direction[i]
         for earlier in range(found):
             remove_part(size, basis[earlier], sharers, direction)
         remove_part(size, direction, sharers, x)
@@ -154,10 +145,182 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
     part = 0.0
     length = 0.0
     for i in range(size):
-        part += direction[i] * vector[i] / sharers[i]
-        length += direction[i] * direction[i] / sharers[i]
+        weighted = direction[i] / sharers[i]
+        part += weighted * vector[i]
+        length += weighted * direction[i]
     for i in range(size):
         vector[i] -= part / length * direction[i]
+
+
+@dissolved_kernel
+def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+    """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
+
+    Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
+    end of the list and bring no column to L: their number costs little. Neighbours among many
+    points of a sole nearly do, and are tried again after the others.
+    """
+    if solve_at_once(size, delassus, free, work):
+        return True
+    source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
+    rank = 0
+    rest = size
+    least = GOOD_PIVOT
+    poor = False
+    while rank < rest:
+        row = source[rank]
+        total = -free[row]
+        for j in range(rank):
+            entry = delassus[row, source[j]]
+            for k in range(j):
+                entry -= matrix[rank, k] * matrix[j, k]
+            # Until the row is finished, its entries still carry their D.
+            matrix[rank, j] = entry
+        pivot = delassus[row, row]
+        diagonal = pivot
+        for j in range(rank):
+            ratio = matrix[rank, j] * matrix[j, j]
+            pivot -= ratio * matrix[rank, j]
+            total -= ratio * x[j]
+            matrix[rank, j] = ratio
+        x[rank] = total
+        if pivot > least * diagonal:
+            matrix[rank, rank] = 1.0 / pivot
+            rank += 1
+        elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
+            poor = poor or pivot > POOR_PIVOT * diagonal
+            if rest == size and least == GOOD_PIVOT:
+                begin_order(size, work)
+            rest -= 1
+            put_off(rank, rest, work)
+        else:
+            return False
+        if poor and rank == rest:
+            poor = False
+            least = POOR_PIVOT
+            rest = size
+    for i in range(rank):
+        x[i] *= matrix[i, i]
+    for i in range(rank - 1, -1, -1):
+        for j in range(i):
+            x[j] -= matrix[i, j] * x[i]
+    if rank < size:
+        shorten(rank, size, work)
+    return True
+
+
+@kernel
+def begin_order(size: int, work: ContactWorkspace) -> None:
+    """List the equations in their order."""
+    for i in range(size):
+        work.labels[ORDER, i] = i
+
+
+@kernel
+def put_off(rank: int, rest: int, work: ContactWorkspace) -> None:
+    """Exchange the row in hand, which depends on those before, for the last that is untried."""
+    source, order, matrix = work.labels[EQUATION], work.labels[ORDER], work.tableau
+    work.labels[SPAN, rest] = rank
+    if rest > rank:
+        source[rank], source[rest] = source[rest], source[rank]
+        order[rank], order[rest] = order[rest], order[rank]
+        for i in range(rank):
+            matrix[rest, i] = matrix[rank, i]
+
+
+@kernel
+def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
+    """Spread the solution from the independent rows over all, to the least norm.
+
+    The other rows are combinations of these, C = L₂ L₁⁻¹. Where y solves for these alone, every x
+    with ``x₁ + Cᵀ x₂ = y`` is a solution. In the norm of the impulses, where what m rows share in
+    equal parts counts 1/m (they make the diagonal M), the shortest has::
+
+        x₂ = (M₂⁻¹ + C M₁⁻¹ Cᵀ)⁻¹ C M₁⁻¹ y    =    M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
+
+    of which the smaller system is solved.
+    """
+    order, matrix, x = work.labels[ORDER], work.tableau, work.vectors[POINT]
+    sharers, y, system = work.vectors[SHARERS], work.vectors[STEP], work.squares[BASIS]
+    spread = work.vectors[SPEED]
+    for place in range(rank, size):
+        part = matrix[place]
+        for j in range(work.labels[SPAN, place], rank):
+            part[j] = 0.0
+        for j in range(rank - 2, -1, -1):
+            entry = part[j]
+            for i in range(j + 1, rank):
+                entry -= part[i] * matrix[i, j]
+            part[j] = entry
+    many = size - rank > rank
+    few = min(rank, size - rank)
+    if many:
+        for i in range(rank):
+            y[i] = x[i]
+            for j in range(i):
+                system[i, j] = 0.0
+            system[i, i] = sharers[order[i]]
+        for place in range(rank, size):
+            part = matrix[place]
+            for i in range(rank):
+                weighted = sharers[order[place]] * part[i]
+                for j in range(i + 1):
+                    system[i, j] += weighted * part[j]
+    else:
+        for i in range(few):
+            part = matrix[rank + i]
+            along = 0.0
+            length = 1.0 / sharers[order[rank + i]]
+            for k in range(rank):
+                weighted = part[k] / sharers[order[k]]
+                spread[k] = weighted
+                along += weighted * x[k]
+                length += weighted * part[k]
+            y[i] = along
+            system[i, i] = length
+            for j in range(i):
+                entry = 0.0
+                for k in range(rank):
+                    entry += spread[k] * matrix[rank + j, k]
+                system[i, j] = entry
+    solve_regular(few, system, y)
+    for place in range(rank, size):
+        part = matrix[place]
+        entry = y[place - rank]
+        if many:
+            entry = 0.0
+            for i in range(rank):
+                entry += part[i] * y[i]
+            entry *= sharers[order[place]]
+        spread[place] = entry
+        for i in range(rank):
+            x[i] -= part[i] * entry
+    for place in range(rank):
+        spread[place] = x[place]
+    for place in range(size):
+        x[order[place]] = spread[place]
+
+
+@dissolved_kernel
+def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
+    """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
+    for i in range(size):
+        for j in range(i):
+            entry = matrix[i, j]
+            for k in range(j):
+                entry -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = entry
+        for j in range(i):
+            ratio = matrix[i, j] * matrix[j, j]
+            matrix[i, i] -= ratio * matrix[i, j]
+            x[i] -= ratio * x[j]
+            matrix[i, j] = ratio
+        matrix[i, i] = 1.0 / matrix[i, i]
+    for j in range(size - 1, -1, -1):
+        total = x[j] * matrix[j, j]
+        for i in range(j + 1, size):
+            total -= matrix[i, j] * x[i]
+        x[j] = total
 
 
 @dissolved_kernel

@@ -6,13 +6,12 @@ import math
 
 from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_contact
+from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.kernels import (
+    bias_force,
     forward_kinematics,
     link_velocities,
     point_position,
-    solve_factorized,
-    solve_lower,
-    state_equations,
 )
 from heelstrike.dynamics.straight_line import play
 from heelstrike.dynamics.workspace import Workspace
@@ -65,6 +64,7 @@ def contact_rows(model: Model, memory: Memory, contact: int, place: int) -> None
         jacobian[normal_row, j] = 0.0
         jacobian[tangent_row, j] = 0.0
     j = model.contact_link[contact]
+    memory.leaf[place] = j
     while j >= 0:
         jx = tree.motion[j, 1] + tree.motion[j, 0] * z
         jz = tree.motion[j, 2] - tree.motion[j, 0] * x
@@ -83,63 +83,108 @@ def row_product(memory: Memory, row: int, v: Floats) -> float:
 
 
 @kernel
-def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
-    """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates, from the factor of A.
+def write_unit_row(memory: Memory, joint: int, row: int, sign: float) -> None:
+    """Write the Jacobian rows of the candidate of `row`, of which this is the velocity of a joint.
 
-    With A = Lᵀ D L it is the square of ``memory.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are
-    coordinates, so that the inner loops run over the candidates.
+    The other row of the two is zero.
     """
-    nv = model.parent.shape[0]
+    place = row // 2
+    for j in range(memory.v.shape[0]):
+        memory.jacobian[2 * place, j] = 0.0
+        memory.jacobian[2 * place + 1, j] = 0.0
+    memory.jacobian[row, joint] = sign
+    memory.leaf[place] = joint
+
+
+@kernel
+def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
+    """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates, by articulated bodies.
+
+    With A = Lᵀ D L it is the square of ``memory.half`` = D^(-1/2) L⁻ᵀ Jᵀ. A column of L⁻ᵀ Jᵀ
+    is what a force along the row leaves to each joint on its way to the root
+    (:mod:`heelstrike.dynamics.articulated`).
+    """
+    parents, motion, root, half = model.parent, memory.tree.motion, memory.root, memory.half
+    jacobian, delassus, bodies = memory.jacobian, memory.delassus, memory.bodies
+    momentum, inverse = bodies.momentum, bodies.inverse
+    if memory.programs[EQUATIONS] != 0:
+        articulate(model, memory.tree, memory.added, bodies)
+    nv = parents.shape[0]
     rows = 2 * count
-    half, factor, delassus = memory.half, memory.factor, memory.delassus
     for j in range(nv):
+        root[j] = math.sqrt(inverse[j])
         for row in range(rows):
-            half[j, row] = memory.jacobian[row, j]
-    for i in range(nv - 1, -1, -1):
-        j = model.parent[i]
+            half[j, row] = 0.0
+    for place in range(count):
+        row = 2 * place
+        n0 = 0.0
+        n1 = 0.0
+        n2 = 0.0
+        t0 = 0.0
+        t1 = 0.0
+        t2 = 0.0
+        j = memory.leaf[place]
         while j >= 0:
-            entry = factor[i, j]
-            for row in range(rows):
-                half[j, row] -= entry * half[i, row]
-            j = model.parent[j]
-        root = math.sqrt(factor[i, i])
-        memory.root[i] = root
-        # Rows below hang on this one only through the loop above: it is finished.
-        for row in range(rows):
-            half[i, row] *= root
+            m0 = motion[j, 0]
+            m1 = motion[j, 1]
+            m2 = motion[j, 2]
+            normal = root[j] * (jacobian[row, j] + m0 * n0 + m1 * n1 + m2 * n2)
+            tangent = root[j] * (jacobian[row + 1, j] + m0 * t0 + m1 * t1 + m2 * t2)
+            half[j, row] = normal
+            half[j, row + 1] = tangent
+            normal *= root[j]
+            tangent *= root[j]
+            n0 -= momentum[j, 0] * normal
+            n1 -= momentum[j, 1] * normal
+            n2 -= momentum[j, 2] * normal
+            t0 -= momentum[j, 0] * tangent
+            t1 -= momentum[j, 1] * tangent
+            t2 -= momentum[j, 2] * tangent
+            j = parents[j]
     for row in range(rows):
-        for column in range(rows):
-            delassus[row, column] = 0.0
+        empty = True
         for j in range(nv):
             entry = half[j, row]
-            if entry != 0.0:
+            if entry == 0.0:
+                continue
+            if empty:
+                for column in range(rows):
+                    delassus[row, column] = entry * half[j, column]
+            else:
                 for column in range(rows):
                     delassus[row, column] += entry * half[j, column]
+            empty = False
+        if empty:
+            for column in range(rows):
+                delassus[row, column] = 0.0
 
 
 @kernel
 def add_impulse(model: Model, memory: Memory, count: int, v: Floats) -> None:
     """Add A⁻¹ Jᵀ λ to a velocity, after :func:`assemble_delassus`."""
-    change = memory.rate
+    change, half, impulse = memory.force, memory.half, memory.impulse
     for j in range(model.parent.shape[0]):
         total = 0.0
         for row in range(2 * count):
-            total += memory.half[j, row] * memory.impulse[row]
+            total += half[j, row] * impulse[row]
         change[j] = memory.root[j] * total
-    solve_lower(model, memory.factor, change)
+    carry_along(model, memory.tree, memory.bodies, change)
     for j in range(model.parent.shape[0]):
         v[j] += change[j]
 
 
 @dissolved_kernel
 def evaluate_equations(model: Model, q: Floats, v: Floats, memory: Memory) -> None:
-    """Kinematics, factor of the mass matrix and bias force of a state."""
+    """Kinematics, bias force and what the mass matrix is solved with, of a state."""
     program = memory.programs[EQUATIONS]
-    tree, matrix, factor, bias = memory.tree, memory.mass_matrix, memory.factor, memory.bias
+    tree, bias = memory.tree, memory.bias
     if program != 0:
-        play(program, (model, q, v, tree, matrix, factor, bias))
+        play(program, (model, q, v, tree, memory.mass_matrix, memory.factor, bias))
     else:
-        state_equations(model, q, v, tree, matrix, factor, bias)
+        forward_kinematics(model, q, tree)
+        link_velocities(model, v, tree)
+        bias_force(model, tree, bias)
+        articulate(model, tree, memory.added, memory.bodies)
 
 
 @dissolved_kernel
@@ -148,7 +193,7 @@ def solve_mass_matrix(model: Model, memory: Memory, x: Floats) -> None:
     if memory.programs[SOLVE] != 0:
         play(memory.programs[SOLVE], (model, memory.factor, x))
     else:
-        solve_factorized(model, memory.factor, x)
+        solve_articulated(model, memory.tree, memory.bodies, x)
 
 
 @kernel

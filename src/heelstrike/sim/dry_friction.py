@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from heelstrike.compilation import kernel
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contact_geometry import write_unit_row
 from heelstrike.sim.memory import Memory
 
 
@@ -30,10 +31,7 @@ def select_dry_joints(model: Model, count: int, memory: Memory) -> int:
     first = model.contact_link.shape[0] + 2 * nv
     for place in range(memory.dry_joint.shape[0]):
         joint = memory.dry_joint[place]
-        for j in range(nv):
-            memory.jacobian[2 * count, j] = 0.0
-            memory.jacobian[2 * count + 1, j] = 0.0
-        memory.jacobian[2 * count + 1, joint] = 1.0
+        write_unit_row(memory, joint, 2 * count + 1, 1.0)
         memory.free[2 * count + 1] = memory.next_v[joint]
         memory.problem_friction[count] = 1.0
         memory.problem_mode[count] = memory.dry_mode[place]

@@ -11,17 +11,12 @@ from typing import Any
 
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.kernels import (
-    factorize,
-    forward_kinematics,
-    link_velocities,
-    mass_matrix,
-    passive_force,
-    solve_factorized,
-)
+from heelstrike.dynamics.articulated import articulate
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contact_geometry import (
+    add_impulse,
     assemble_delassus,
     contact_velocity,
     evaluate_equations,
@@ -129,28 +124,6 @@ def constraint_matrix(
             if lean[j] != 0.0:
                 entry += friction * lean[j] * delassus[row[i], row[j] + 1]
             system[i, j] = entry
-
-
-@kernel
-def add_contact_force(
-    count: int,
-    model: Model,
-    jacobian: Floats,
-    factor: Floats,
-    impulse: Floats,
-    force: Floats,
-    change: Floats,
-) -> None:
-    """Add A⁻¹ Jᵀ λ to an acceleration or, for impulses, to a velocity; `force` is scratch."""
-    nv = change.shape[0]
-    for j in range(nv):
-        total = 0.0
-        for row in range(2 * count):
-            total += jacobian[row, j] * impulse[row]
-        force[j] = total
-    solve_factorized(model, factor, force)
-    for j in range(nv):
-        change[j] += force[j]
 
 
 @kernel
@@ -356,9 +329,7 @@ def evaluate(
             memory.impulse[phase.row[i]] += phase.unknown[i]
             if phase.lean[i] != 0.0:
                 memory.impulse[phase.row[i] + 1] += phase.lean[i] * phase.unknown[i]
-        add_contact_force(
-            count, model, memory.jacobian, memory.factor, memory.impulse, memory.force, memory.rate
-        )
+        add_impulse(model, memory, count, memory.rate)
     share_forces(
         count, memory.candidate, memory.impulse, memory.friction, phase.group, phase.holder,
         phase.force,
@@ -390,10 +361,8 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
     for attempt in range(5):
         forward_kinematics(model, state[:nv], memory.tree)
         link_velocities(model, state[nv:], memory.tree)
+        articulate(model, memory.tree, memory.added, memory.bodies)
         locate_contacts(model, ground, memory)
-        if attempt == 0:
-            mass_matrix(model, memory.tree, memory.mass_matrix)
-            factorize(model, memory.mass_matrix, memory.factor)
         count = gather_closed(model, memory, phase)
         if count == 0:
             return
@@ -430,8 +399,6 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
         for i in range(size):
             memory.impulse[phase.row[i]] = phase.unknown[i]
         change = state[:nv] if positions else state[nv:]
-        add_contact_force(
-            count, model, memory.jacobian, memory.factor, memory.impulse, memory.force, change
-        )
+        add_impulse(model, memory, count, change)
         if not positions:
             return

@@ -11,7 +11,7 @@ from heelstrike.compilation import kernel
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.contact_geometry import contact_rows, contact_velocity
+from heelstrike.sim.contact_geometry import contact_rows, contact_velocity, write_unit_row
 from heelstrike.sim.controller import Contacts
 from heelstrike.sim.dry_friction import press_dry_joint
 from heelstrike.sim.event_phase import Phase
@@ -47,14 +47,11 @@ def gap_rows(model: Model, memory: Memory, phase: Phase, contact: int, place: in
     if stop < 0:
         contact_rows(model, memory, contact, place)
         return
-    for j in range(model.parent.shape[0]):
-        memory.jacobian[2 * place, j] = 0.0
-        memory.jacobian[2 * place + 1, j] = 0.0
     dry = stop - phase.stop_joint.shape[0]
     if dry < 0:
-        memory.jacobian[2 * place, phase.stop_joint[stop]] = phase.stop_side[stop]
+        write_unit_row(memory, phase.stop_joint[stop], 2 * place, phase.stop_side[stop])
     else:
-        memory.jacobian[2 * place + 1, phase.dry_joint[dry]] = 1.0
+        write_unit_row(memory, phase.dry_joint[dry], 2 * place + 1, 1.0)
 
 
 @kernel

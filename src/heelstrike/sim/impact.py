@@ -7,13 +7,13 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contact_geometry import (
+    add_impulse,
     assemble_delassus,
     evaluate_equations,
     locate_contacts,
 )
 from heelstrike.sim.event_candidates import solve_candidates
 from heelstrike.sim.event_dynamics import (
-    add_contact_force,
     free_acceleration,
     gather_closed,
 )
@@ -62,10 +62,10 @@ def collide(
 ) -> tuple[bool, float]:
     """Let the points on the ground, and those that reach it now, change the velocities of `state`.
 
-    The pose and the factor of the mass matrix must be those of `state`. Normal velocities w and
-    impulses p obey ``w⁺ + e w⁻ ≥ 0 ⟂ p ≥ 0``, tangential ones Coulomb's law. All points are taken
-    to approach the ground faster by `nudge`: where zero impulse is one solution of several, that
-    singles out another. Dry friction of the joints is a finite force, and takes no part.
+    The equations of `state` have been evaluated. Normal velocities w and impulses p obey
+    ``w⁺ + e w⁻ ≥ 0 ⟂ p ≥ 0``, tangential ones Coulomb's law. All points are taken to approach the
+    ground faster by `nudge`: where zero impulse is one solution of several, that singles out
+    another. Dry friction of the joints is a finite force, and takes no part.
 
     Returns whether it was solved, and the energy it made relative to what went through the
     contacts. The impulses go to ``phase.impulse``; ``phase.closed`` and ``phase.slide`` become
@@ -98,9 +98,7 @@ def collide(
         work = memory.impulse[row] * row_velocity(row, memory.jacobian, state)
         made += work
         through += abs(work)
-    add_contact_force(
-        count, model, memory.jacobian, memory.factor, memory.impulse, memory.force, state[nv:]
-    )
+    add_impulse(model, memory, count, state[nv:])
     for place in range(count):
         contact = memory.candidate[place]
         row = 2 * place
@@ -139,9 +137,7 @@ def short_bounces(
         free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
     if count > 0:
         solve_candidates(count, memory, phase.slide, True, order)
-        add_contact_force(
-            count, model, memory.jacobian, memory.factor, memory.impulse, memory.force, memory.rate
-        )
+        add_impulse(model, memory, count, memory.rate)
     found = False
     for contact in range(phase.closed.shape[0]):
         touched = phase.hit[contact] == 1 or memory.closed[contact] == 1
@@ -172,8 +168,8 @@ def strike(
 ) -> bool:
     """Let the points in ``phase.hit`` meet the ground now, and report it; return success.
 
-    The pose and the factor of the mass matrix must be those of now. ``memory.closed`` and
-    ``memory.slipping`` still hold the modes from before.
+    The equations of now have been evaluated. ``memory.closed`` and ``memory.slipping`` still hold
+    the modes from before.
     """
     state, before = phase.begin, phase.end
     contacts = phase.closed.shape[0] - phase.dry_joint.shape[0]

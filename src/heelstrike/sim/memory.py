@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.bundle import Bundle
-from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
+from heelstrike.contact.search import contact_workspace
+from heelstrike.contact.workspace import ContactWorkspace
+from heelstrike.dynamics.articulated import ArticulatedBodies, articulated_bodies
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
@@ -51,7 +53,11 @@ class Memory(Bundle):
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
     mass_matrix, factor : (nv, nv) float
-        Mass matrix and its factor.
+        Mass matrix and its factor, for straight-line programs and compliant contact.
+    added : (nv,) float
+        What an implicit scheme adds to the diagonal of the mass matrix.
+    bodies : ArticulatedBodies
+        What the loops solve with instead of the factor; see :mod:`heelstrike.sim.programs`.
     tree, scratch : Workspace
         Kinematics of the state now; a second one for controllers.
     contacts : Contacts
@@ -82,6 +88,8 @@ class Memory(Bundle):
         has room for all.
     jacobian : (2 capacity, nv) float
         Contact Jacobian of the candidates.
+    leaf : (capacity,) int
+        Link that each candidate acts on: only its joint and those before have a part in its rows.
     root : (nv,) float
     half : (nv, 2 capacity) float
         D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
@@ -123,6 +131,8 @@ class Memory(Bundle):
     damping: Floats
     mass_matrix: Floats
     factor: Floats
+    added: Floats
+    bodies: ArticulatedBodies
     tree: Workspace
     scratch: Workspace
     contacts: Contacts
@@ -140,6 +150,7 @@ class Memory(Bundle):
     resting: Integers
     candidate: Integers
     jacobian: Floats
+    leaf: Integers
     root: Floats
     half: Floats
     delassus: Floats
@@ -184,6 +195,8 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         damping=np.zeros(nv),
         mass_matrix=np.zeros((nv, nv)),
         factor=np.zeros((nv, nv)),
+        added=np.zeros(nv),
+        bodies=articulated_bodies(nv),
         tree=workspace(nv),
         scratch=workspace(nv),
         contacts=Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2))),
@@ -201,6 +214,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         resting=np.full(len(dry), -1, dtype=np.int64),
         candidate=np.zeros(capacity, dtype=np.int64),
         jacobian=np.zeros((2 * capacity, nv)),
+        leaf=np.zeros(capacity, dtype=np.int64),
         root=np.zeros(nv),
         half=np.zeros((nv, 2 * capacity)),
         delassus=np.zeros((2 * capacity, 2 * capacity)),
@@ -218,7 +232,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         point_delassus=np.zeros((2 * len(usual), 2 * len(usual))),
         point_velocity=np.zeros((nc, 2)),
         point_impulse=np.zeros((nc, 2)),
-        solver=contact_workspace(max(capacity, 1)),
+        solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
         pushes=pushes_on(robot, pushes),
         tally=np.zeros(TALLIES, dtype=np.int64),
         extreme=np.zeros(EXTREMES),

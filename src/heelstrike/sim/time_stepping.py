@@ -29,6 +29,7 @@ from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.search import try_solvers
 from heelstrike.dynamics.kernels import (
     factorize,
     mass_matrix,
@@ -46,6 +47,7 @@ from heelstrike.sim.contact_geometry import (
     evaluate_equations,
     locate_contacts,
     solve_mass_matrix,
+    write_unit_row,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
 from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
@@ -64,7 +66,7 @@ from heelstrike.sim.engine import (
 )
 from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
 from heelstrike.sim.point_contacts import point_velocities
-from heelstrike.sim.programs import DELASSUS, PUSH, VELOCITIES
+from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.recording import (
     center_height,
@@ -162,19 +164,20 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
     The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
-    order that adds h D + h² K to the mass matrix and −h K v to the force; both leave the tree's
-    sparsity alone, since K and D are diagonal.
+    order that adds h D + h² K to the mass matrix, as if it were armature, and −h K v to the force.
     """
     nv = model.parent.shape[0]
     passive_force(model, memory.q, memory.v, memory.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.force[model.actuator_joint[i]] += memory.torque[i]
     if scheme == LINEARLY_IMPLICIT:
-        mass_matrix(model, memory.tree, memory.mass_matrix)
         for i in range(nv):
-            memory.mass_matrix[i, i] += step * (memory.damping[i] + step * memory.stiffness[i])
             memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
-        factorize(model, memory.mass_matrix, memory.factor)
+        if memory.programs[SOLVE] != 0:
+            mass_matrix(model, memory.tree, memory.mass_matrix)
+            for i in range(nv):
+                memory.mass_matrix[i, i] += memory.added[i]
+            factorize(model, memory.mass_matrix, memory.factor)
     for i in range(nv):
         memory.rate[i] = step * (memory.force[i] - memory.bias[i])
     solve_mass_matrix(model, memory, memory.rate)
@@ -303,11 +306,8 @@ def write_rows(model: Model, memory: Memory, count: int) -> None:
         if candidate < points:
             contact_rows(model, memory, candidate, place)
             continue
-        for j in range(model.parent.shape[0]):
-            memory.jacobian[2 * place, j] = 0.0
-            memory.jacobian[2 * place + 1, j] = 0.0
         stop = candidate - points
-        memory.jacobian[2 * place, stop // 2] = 1.0 - 2.0 * (stop % 2)
+        write_unit_row(memory, stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2))
 
 
 @dissolved_kernel
@@ -323,8 +323,8 @@ def are_usual(memory: Memory, count: int) -> bool:
 
 
 @dissolved_kernel
-def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
-    """Delassus matrix of the candidates out of that of all usual points."""
+def gather_delassus(model: Model, memory: Memory, count: int) -> None:
+    """Delassus matrix of all usual points; that of the candidates too, if they are fewer."""
     contacts = memory.contacts
     play(
         memory.programs[DELASSUS],
@@ -334,7 +334,7 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
         ),
     )  # fmt: skip
     if count == memory.usual_points.shape[0]:
-        return memory.point_delassus
+        return
     for place in range(count):
         row = 2 * memory.usual_place[memory.candidate[place]]
         for other in range(count):
@@ -343,7 +343,6 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
                 for j in range(2):
                     entry = memory.point_delassus[row + i, column + j]
                     memory.delassus[2 * place + i, 2 * other + j] = entry
-    return memory.delassus
 
 
 @dissolved_kernel
@@ -389,13 +388,15 @@ def solve_contacts(
     if count == 0:
         return True
     straight = are_usual(memory, count)
+    delassus = memory.delassus
     if straight:
-        delassus = gather_delassus(model, memory, count)
+        gather_delassus(model, memory, count)
+        if count == memory.usual_points.shape[0]:
+            delassus = memory.point_delassus
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
         press_dry_joints(model, step, count, memory)
-        delassus = memory.delassus
     status = solve_contact_kernel(
         count,
         delassus,
@@ -462,6 +463,10 @@ def _advance(
     record_every = span[4]
     scheme = span[5]
     nv = model.parent.shape[0]
+    for i in range(nv):
+        memory.added[i] = 0.0
+        if scheme == LINEARLY_IMPLICIT:
+            memory.added[i] = step * (memory.damping[i] + step * memory.stiffness[i])
     while True:
         if (
             record.row_count[0] >= record.time.shape[0]
@@ -535,7 +540,9 @@ def compiled_advance() -> tuple[Any, float]:
         integers,
         integers,
     )
+    try_solvers.begin()
     compiled = loop_for(signature, _advance)
+    try_solvers.finish()
     return compiled, perf_counter() - begin
 
 

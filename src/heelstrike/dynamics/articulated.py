@@ -1,0 +1,147 @@
+"""Forward dynamics by articulated bodies: A⁻¹ x without A, in time proportional to the joints.
+
+Featherstone's algorithm (*Rigid Body Dynamics Algorithms*, 2008, chapter 7) with all spatial
+vectors at one common pivot, where nothing needs to be transformed. The subtree of a link, joints
+free to move, resists an acceleration a of the link with the force I a − p. Through joint i with
+motion s, driven by x_i, that force passes on to the parent without the part that moves the joint::
+
+    U = I s       D = sᵀ U + armature       u = x_i + sᵀ p
+    I_parent += I − U Uᵀ / D                p_parent += p − U u / D
+
+and on the way back ``v̇_i = (u − Uᵀ a_parent) / D``, ``a = a_parent + s v̇_i``. The D are those of
+A = Lᵀ D L (:func:`~heelstrike.dynamics.kernels.factorize`), and u = L⁻ᵀ x.
+
+The inertia of an articulated body is a symmetric matrix, of a rigid one it is::
+
+    | I    hz  −hx |
+    | hz   m    0  |
+    | −hx  0    m  |
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.bundle import Bundle
+from heelstrike.compilation import kernel
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Model
+
+Floats = NDArray[np.float64]
+
+
+class ArticulatedBodies(Bundle):
+    """The subtree of every link with its joints free to move.
+
+    Attributes
+    ----------
+    inertia : (nv, 6) float
+        Their inertia about the pivot: rows of the upper triangle, in the order of spatial vectors.
+    momentum : (nv, 3) float
+        U, the momentum of the articulated body per unit velocity of its joint.
+    inverse : (nv,) float
+        1 / D, what the joint accelerates per unit of force while its parent stays.
+    """
+
+    inertia: Floats
+    momentum: Floats
+    inverse: Floats
+
+
+def articulated_bodies(nv: int) -> ArticulatedBodies:
+    """Allocate the articulated bodies of a robot of `nv` coordinates."""
+    return ArticulatedBodies(np.zeros((nv, 6)), np.zeros((nv, 3)), np.zeros(nv))
+
+
+@kernel
+def articulate(model: Model, work: Workspace, added: Floats, bodies: ArticulatedBodies) -> None:
+    """Find the articulated bodies of a pose, `added` (nv,) being added to the armatures.
+
+    With h D + h² K added, A⁻¹ becomes that of the linearly implicit scheme.
+    """
+    parents, armature, rigid, motion = model.parent, model.armature, work.inertia, work.motion
+    inertia, momentum, inverse = bodies.inertia, bodies.momentum, bodies.inverse
+    count = parents.shape[0]
+    for i in range(count):
+        inertia[i, 0] = rigid[i, 3]
+        inertia[i, 1] = rigid[i, 2]
+        inertia[i, 2] = -rigid[i, 1]
+        inertia[i, 3] = rigid[i, 0]
+        inertia[i, 4] = 0.0
+        inertia[i, 5] = rigid[i, 0]
+    for i in range(count - 1, -1, -1):
+        m0 = motion[i, 0]
+        m1 = motion[i, 1]
+        m2 = motion[i, 2]
+        i00 = inertia[i, 0]
+        i01 = inertia[i, 1]
+        i02 = inertia[i, 2]
+        i11 = inertia[i, 3]
+        i12 = inertia[i, 4]
+        i22 = inertia[i, 5]
+        u0 = i00 * m0 + i01 * m1 + i02 * m2
+        u1 = i01 * m0 + i11 * m1 + i12 * m2
+        u2 = i02 * m0 + i12 * m1 + i22 * m2
+        scale = 1.0 / (m0 * u0 + m1 * u1 + m2 * u2 + armature[i] + added[i])
+        momentum[i, 0] = u0
+        momentum[i, 1] = u1
+        momentum[i, 2] = u2
+        inverse[i] = scale
+        parent = parents[i]
+        if parent >= 0:
+            g0 = scale * u0
+            g1 = scale * u1
+            g2 = scale * u2
+            inertia[parent, 0] += i00 - u0 * g0
+            inertia[parent, 1] += i01 - u0 * g1
+            inertia[parent, 2] += i02 - u0 * g2
+            inertia[parent, 3] += i11 - u1 * g1
+            inertia[parent, 4] += i12 - u1 * g2
+            inertia[parent, 5] += i22 - u2 * g2
+
+
+@kernel
+def solve_articulated(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Floats) -> None:
+    """Replace x by A⁻¹ x, after :func:`articulate`."""
+    parents, motion, force = model.parent, work.motion, work.force
+    momentum, inverse = bodies.momentum, bodies.inverse
+    count = parents.shape[0]
+    for i in range(count):
+        force[i, 0] = 0.0
+        force[i, 1] = 0.0
+        force[i, 2] = 0.0
+    for i in range(count - 1, -1, -1):
+        p0 = force[i, 0]
+        p1 = force[i, 1]
+        p2 = force[i, 2]
+        share = inverse[i] * (x[i] + motion[i, 0] * p0 + motion[i, 1] * p1 + motion[i, 2] * p2)
+        x[i] = share
+        parent = parents[i]
+        if parent >= 0:
+            force[parent, 0] += p0 - momentum[i, 0] * share
+            force[parent, 1] += p1 - momentum[i, 1] * share
+            force[parent, 2] += p2 - momentum[i, 2] * share
+    carry_along(model, work, bodies, x)
+
+
+@kernel
+def carry_along(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Floats) -> None:
+    """Second half of :func:`solve_articulated`: x holds u / D and receives accelerations."""
+    parents, motion, acceleration = model.parent, work.motion, work.acceleration
+    momentum, inverse = bodies.momentum, bodies.inverse
+    for i in range(parents.shape[0]):
+        parent = parents[i]
+        own = x[i]
+        a0 = 0.0
+        a1 = 0.0
+        a2 = 0.0
+        if parent >= 0:
+            a0 = acceleration[parent, 0]
+            a1 = acceleration[parent, 1]
+            a2 = acceleration[parent, 2]
+            own -= inverse[i] * (momentum[i, 0] * a0 + momentum[i, 1] * a1 + momentum[i, 2] * a2)
+            x[i] = own
+        acceleration[i, 0] = a0 + motion[i, 0] * own
+        acceleration[i, 1] = a1 + motion[i, 1] * own
+        acceleration[i, 2] = a2 + motion[i, 2] * own
