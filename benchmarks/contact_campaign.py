@@ -27,8 +27,9 @@ from typing import Any
 import numpy as np
 
 from heelstrike.contact.modes import SOLVED, Solver
-from heelstrike.contact.problem import CLEAN, solve_contact_kernel, solver_order
-from heelstrike.contact.workspace import LAST_FALLBACKS, contact_workspace
+from heelstrike.contact.problem import solve_contact_kernel, solver_order
+from heelstrike.contact.search import CLEAN, contact_workspace
+from heelstrike.contact.workspace import LAST_FALLBACKS
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests" / "contact"))
 

@@ -20,7 +20,8 @@ from heelstrike import load_robot
 from heelstrike.compilation import kernel
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.workspace import SHORTCUTS, contact_workspace
+from heelstrike.contact.search import contact_workspace
+from heelstrike.contact.workspace import SHORTCUTS
 from heelstrike.dynamics import bias_force, mass_matrix, point_jacobian
 
 BATCHES = 20

@@ -119,9 +119,14 @@ class Kernel:
         update_wrapper(self, function)
         self.py_func = function
         self._called = False
-        options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-        options["forceinline"] = dissolved
-        self._part = njit(**options, pipeline_class=InnerKernelCompiler)(function)
+        self._dissolved = dissolved
+
+    @cached_property
+    def _part(self) -> Any:
+        """The kernel as part of others; it allocates nothing and so counts no references."""
+        options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
+        options["forceinline"] = self._dissolved
+        return njit(**options, pipeline_class=InnerKernelCompiler)(self.py_func)
 
     @property
     def _numba_type_(self) -> Any:
@@ -175,8 +180,7 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     address : bool
         Whether its address is needed, to pass it as an argument to other kernels.
     """
-    options = _OPTIONS | {"no_cfunc_wrapper": not address}
-    compiled = _kept_on_disk(njit(**options)(function))
+    compiled = _with_cache(function, address)
     with quick_compiling():
         compiled.compile(signature)
     compiled.disable_compile()
@@ -185,6 +189,20 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
         compiled.get_compile_result = lambda _: known
     result: Function = compiled
     return result
+
+
+def _with_cache(function: Function, address: bool) -> Any:
+    options = _OPTIONS | {"no_cfunc_wrapper": not address}
+    return _kept_on_disk(njit(**options)(function))
+
+
+def is_kept(signature: Any, function: Callable[..., Any], *, address: bool = False) -> bool:
+    """Whether :func:`compiled_for` would find machine code on disk, or has no disk to look on."""
+    compiled = _with_cache(function, address)
+    if not isinstance(compiled._cache, _PackageCache):
+        return True
+    with quick_compiling():
+        return compiled._cache.load_overload(signature, compiled.targetctx) is not None
 
 
 def loop_for(signature: Any, function: Function) -> Function:

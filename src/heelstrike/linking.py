@@ -10,14 +10,23 @@ from __future__ import annotations
 
 from typing import Any
 
+from llvmlite.binding import parse_assembly
+from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes
 
 
 class _UnfinishedLibrary(JITCodeLibrary):
     """A module with what it calls linked in, and nothing else done to it."""
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        # Not verified, as the outer kernel is.
+        module = parse_assembly(normalize_ir_text(str(ir_module)))
+        module.name = ir_module.name
+        self.add_llvm_module(module)
 
     def finalize(self) -> None:
         for library in dict.fromkeys(self._linking_libraries):
@@ -44,8 +53,8 @@ class _UnfinishedLowering(NativeLowering):
         return True
 
 
-# Passes that look for array expressions and functions to inline, of which kernels have none.
-_NEEDLESS = (NopythonRewrites, InlineOverloads)
+# Passes that look for array expressions, closures and functions to inline: kernels have none.
+_NEEDLESS = (NopythonRewrites, InlineOverloads, InlineClosureLikes)
 
 
 class InnerKernelCompiler(CompilerBase):

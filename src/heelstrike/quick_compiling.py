@@ -1,8 +1,9 @@
-"""Numba made quicker at compiling many small kernels."""
+"""Numba made quicker to start, and at compiling many small kernels."""
 
 from __future__ import annotations
 
 import gc
+import importlib
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Any
@@ -10,8 +11,23 @@ from typing import Any
 from numba import types
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.types.functions import BaseFunction
+from numba.np import linalg
 
 _PLAIN = (types.Number, types.Boolean, types.Array, types.UniTuple)
+
+
+def load_numba() -> None:
+    """Load what Numba compiles with, but not SciPy's linear algebra.
+
+    Numba would load that, which takes as long as all the rest, only to see whether it is there.
+    This package requires SciPy. A kernel that needs it still loads it.
+    """
+    ensure_blas = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = ensure_blas
 
 
 @contextmanager
@@ -19,6 +35,7 @@ def quick_compiling() -> Iterator[None]:
     """Compile quicker while the context lasts."""
     with ExitStack() as stack:
         stack.enter_context(global_compiler_lock)  # one thread at a time, as Numba compiles anyway
+        load_numba()
         stack.enter_context(_remembered_typings())
         stack.enter_context(_no_garbage_collection())
         yield

@@ -111,6 +111,19 @@ def test_joint_stop_takes_what_the_pendulum_brings() -> None:
     assert balance.stops[after] == pytest.approx(-work, rel=2e-2)
 
 
+def test_joint_stop_between_rows() -> None:
+    """The same when the stop is reached in an instant: what no work explains is of sampling."""
+    robot, start = pendulum(limited=True), np.deg2rad(-60.0)
+    run = hs.simulate(
+        robot, Push(3.0), state=hs.State([start], [0.0]), duration=2.0, method=hs.EventDriven()
+    )
+    balance = energy_balance(run)
+    after = int(np.argmax(balance.stops < -1.0))
+    assert balance.kinetic[after] == pytest.approx(0.0, abs=1e-4)
+    assert balance.stops[after] == pytest.approx(-3.0 * np.deg2rad(120.0), rel=1e-5)
+    np.testing.assert_allclose(balance.residual, 0.0, atol=1e-5)
+
+
 def test_walk() -> None:
     """Over a steady walk motors give what impacts take, and hard contact gives nothing.
 

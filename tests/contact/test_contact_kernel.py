@@ -25,6 +25,7 @@ from heelstrike.contact.modes import (
 )
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.repetition import repeat
+from heelstrike.contact.search import contact_workspace
 from heelstrike.contact.workspace import (
     FAILURES,
     FALLBACKS,
@@ -32,7 +33,6 @@ from heelstrike.contact.workspace import (
     SHORTCUTS,
     SOLVES,
     SUCCEEDED,
-    contact_workspace,
 )
 
 ALL = (LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL)

@@ -160,6 +160,12 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -
     assert message in str(caught.value)
 
 
+def test_a_place_that_cannot_be_written_is_named(gait: hs.Gait, tmp_path: Path) -> None:
+    for path in (tmp_path / "missing" / "gait.json", tmp_path):
+        with pytest.raises(GaitError, match="the gait cannot be written: "):
+            gait.save(path)
+
+
 def test_paths_that_are_no_files(tmp_path: Path) -> None:
     with pytest.raises(GaitError, match="is a directory"):
         hs.load_gait(tmp_path)

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.actuation import actuator_power
-from heelstrike.analysis.intervals import event_impulse, impulses_in_events, mean_over_intervals
+from heelstrike.analysis.intervals import (
+    event_impulse,
+    impulses_in_events,
+    mean_over_intervals,
+    stop_impulse,
+)
 from heelstrike.analysis.motion import motion, run_motion
 from heelstrike.dynamics import point_jacobian
 from heelstrike.sim.run import Run
@@ -84,6 +89,7 @@ def energy_balance(run: Run) -> EnergyBalance:
         contact_work = np.zeros_like(held)
         jumps = run.world_force[:-1] * held[:, None, None]
     contact_work = contact_work + (jumps * over_steps.contact_velocity).sum(axis=(1, 2))
+    stop_work = mean_over_intervals(run, run.stop_torque) * held[:, None] + stop_impulse(run)
     damper_power = -(mean * mean_over_intervals(run, run.velocity)) @ model.damping
 
     def summed(work: Floats) -> Floats:
@@ -96,7 +102,7 @@ def energy_balance(run: Run) -> EnergyBalance:
         actuators=summed(actuator_power(run).sum(axis=1) * held),
         dampers=summed(damper_power * held),
         contacts=summed(contact_work),
-        stops=summed((mean_over_intervals(run, run.stop_torque) * mean).sum(axis=1) * held),
+        stops=summed((stop_work * mean).sum(axis=1)),
         dry_friction=summed(
             (mean_over_intervals(run, run.friction_torque) * mean).sum(axis=1) * held
         ),

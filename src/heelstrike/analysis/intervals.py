@@ -53,6 +53,25 @@ def event_impulse(run: Run) -> Floats:
     return impulse
 
 
+def stop_impulse(run: Run) -> Floats:
+    """Impulse of joint stops that only the events know, (nt − 1, nv), in N m s (N s for a slide).
+
+    On the joint's coordinate, and like :func:`event_impulse` in the interval of its jump.
+    """
+    impulse = np.zeros((max(len(run.time) - 1, 0), run.robot.nv))
+    if not impulses_in_events(run) or not len(impulse):
+        return impulse
+    model = run.robot.model
+    for event in run.events:
+        if event.kind is not EventKind.JOINT_STOP:
+            continue
+        row, joint = _interval_of(event.time, run.time), event.contact
+        middle = 0.5 * (model.lower[joint] + model.upper[joint])  # infinite if it has one stop
+        side = 1.0 if run.position[row, joint] < middle else -1.0
+        impulse[row, joint] += side * event.impulse[0]
+    return impulse
+
+
 def _interval_of(instant: float, time: Floats) -> int:
     """Interval between two rows whose ends are nearest to an instant: the one of a jump there.
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.certificate import certify
+from heelstrike.contact.elimination import POOR_PIVOT
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.workspace import (
     BASIS,
@@ -29,15 +30,13 @@ from heelstrike.contact.workspace import (
     Floats,
     Integers,
 )
+from heelstrike.dynamics.straight_line import play
 
 SAME_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
 
 GOOD_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
-
-POOR_PIVOT = 1e-7
-"""Pivots that keep more than this are taken where there are no good ones left."""
 
 NO_PIVOT = 1e-11
 """Rows that keep less depend on those before; what lies between is left to the general way."""
@@ -87,6 +86,73 @@ def list_equations(
 
 
 @dissolved_kernel
+def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+    """Like :func:`solve_equations` for few equations, by straight-line code."""
+    if size >= work.eliminations.shape[0] or work.eliminations[size] == 0:
+        return False
+    source, matrix = work.labels[EQUATION], work.lower_half
+    x, pivot = work.vectors[POINT], work.vectors[STEP]
+    place = 0
+    for i in range(size):
+        row = source[i]
+        x[i] = -free[row]
+        for j in range(i + 1):
+            matrix[place] = delassus[row, source[j]]
+            place += 1
+    play(work.eliminations[size], (matrix, x, pivot))
+    rank = 0
+    for i in range(size):
+        diagonal = delassus[source[i], source[i]]
+        if pivot[i] > POOR_PIVOT * diagonal:
+            rank += 1
+        elif abs(pivot[i]) > NO_PIVOT * diagonal:
+            return False
+    if rank < size:
+        leave_out_idle(size, work)
+    return True
+
+
+@kernel
+def leave_out_idle(size: int, work: ContactWorkspace) -> None:
+    """Take from the solution what lies along directions that change no velocity.
+
+    There is one such direction n for every row that depends on others, Lᵀ n = e. They are made
+    orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
+    counts 1/m.
+    """
+    matrix, x, basis = work.lower_half, work.vectors[POINT], work.squares[BASIS]
+    sharers = work.vectors[SHARERS]
+    found = 0
+    for row in range(size):
+        if matrix[row * (row + 1) // 2 + row] != 0.0:
+            continue
+        direction = basis[found]
+        for i in range(size):
+            direction[i] = 0.0
+        direction[row] = 1.0
+        for i in range(row, 0, -1):
+            for j in range(i):
+                direction[j] -= matrix[i * (i + 1) // 2 + j] * direction[i]
+        for earlier in range(found):
+            remove_part(size, basis[earlier], sharers, direction)
+        remove_part(size, direction, sharers, x)
+        found += 1
+
+
+@kernel
+def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -> None:
+    """Make a vector orthogonal to a direction."""
+    part = 0.0
+    length = 0.0
+    for i in range(size):
+        weighted = direction[i] / sharers[i]
+        part += weighted * vector[i]
+        length += weighted * direction[i]
+    for i in range(size):
+        vector[i] -= part / length * direction[i]
+
+
+@dissolved_kernel
 def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
     """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
 
@@ -94,6 +160,8 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
     end of the list and bring no column to L: their number costs little. Neighbours among many
     points of a sole nearly do, and are tried again after the others.
     """
+    if solve_at_once(size, delassus, free, work):
+        return True
     source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
     rank = 0
     rest = size

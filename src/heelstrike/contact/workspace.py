@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.bundle import Bundle
+from heelstrike.contact.elimination import LARGEST, elimination_programs
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -88,6 +89,12 @@ class ContactWorkspace(Bundle):
         general complementarity problem.
     tableau : float64
         The dictionary that is pivoted.
+    solvers : (1,) int64
+        Address of the machine code that tries the solvers in turn, shared by all workspaces.
+    eliminations : (any,) int64
+        Addresses of the programs that solve small systems, by size; zero where there is none.
+    lower_half : float64
+        The matrix of a small system.
     """
 
     counters: Integers
@@ -95,10 +102,13 @@ class ContactWorkspace(Bundle):
     vectors: Floats
     squares: Floats
     tableau: Floats
+    solvers: Integers
+    eliminations: Integers
+    lower_half: Floats
 
 
-def contact_workspace(capacity: int) -> ContactWorkspace:
-    """Allocate the buffers for contact problems of up to ``capacity`` contacts."""
+def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:
+    """Allocate the buffers; see :func:`~heelstrike.contact.search.contact_workspace`."""
     contacts = max(int(capacity), 1)
     unknowns = 2 * contacts
     pairs = 4 * contacts
@@ -110,4 +120,7 @@ def contact_workspace(capacity: int) -> ContactWorkspace:
         vectors=vectors,
         squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
         tableau=np.zeros((pairs, pairs + 2)),
+        solvers=solvers,
+        eliminations=elimination_programs(),
+        lower_half=np.zeros(LARGEST * (LARGEST + 1) // 2),
     )

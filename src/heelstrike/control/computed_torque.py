@@ -459,7 +459,8 @@ class ComputedTorque:
         robot, gait = self.robot, self.gait
         model = robot.model
         mirror = robot.mirror
-        unactuated = np.setdiff1d(np.arange(robot.nv), model.actuator_joint)
+        actuated = set(model.actuator_joint.tolist())
+        unactuated = np.array([j for j in range(robot.nv) if j not in actuated], dtype=np.int64)
         if not robot.floating or mirror is None or len(robot.feet) != 2:
             raise ControllerError(
                 f"computed torque needs a floating robot with two mirrored feet; "

@@ -24,6 +24,7 @@ from heelstrike.dynamics.tape import (
     ADD,
     COSINE,
     DIVIDE,
+    INVERT_ABOVE,
     MULTIPLY,
     NEGATE,
     READ,
@@ -33,6 +34,7 @@ from heelstrike.dynamics.tape import (
     Tape,
     Value,
     cosine,
+    inverse_above,
     sine,
 )
 from heelstrike.dynamics.trigonometry import sine_and_cosine
@@ -40,6 +42,9 @@ from heelstrike.dynamics.trigonometry import sine_and_cosine
 CONSTANT = "model"
 """The argument that never changes. Where its numbers are 0, 1 or -1, they are so in every robot
 that shares the code."""
+
+_RECORDED = {"sin": sine, "cos": cosine, "inverse_above": inverse_above}
+"""What takes the place of functions that kernels call."""
 
 _DOUBLE = ir.DoubleType()
 _WORD = ir.IntType(64)
@@ -88,7 +93,7 @@ class Recording:
                 operands.append(self._symbols(name, argument, known or {}))
             else:
                 operands.append(argument)
-        uncompiled(kernel, replace={"sin": sine, "cos": cosine})(*operands)
+        uncompiled(kernel, replace=_RECORDED)(*operands)
         self._scratch = scratch
 
     def _symbols(self, name: str, value: Any, known: Mapping[str, Symbols]) -> Symbols:
@@ -196,6 +201,11 @@ class _Writer:
             return builder.fneg(*values)
         if operation == DIVIDE:
             return builder.fdiv(*values)
+        if operation == INVERT_ABOVE:
+            value, least = values
+            inverse = builder.fdiv(ir.Constant(_DOUBLE, 1.0), value)
+            above = builder.fcmp_ordered(">", value, least)
+            return builder.select(above, inverse, ir.Constant(_DOUBLE, 0.0))
         # A product and a sum may be fused, which rounds once instead of twice.
         emit = {ADD: builder.fadd, SUBTRACT: builder.fsub, MULTIPLY: builder.fmul}[operation]
         return emit(*values, flags=("contract",))

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SINE, COSINE, READ = range(8)
+ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SINE, COSINE, READ, INVERT_ABOVE = range(9)
 
 Symbols = NDArray[Any]
 
@@ -103,6 +103,13 @@ def sine(value: Any) -> Any:
 def cosine(value: Any) -> Any:
     """Cosine of a number or of a value of a tape."""
     return value.tape.record(COSINE, value) if isinstance(value, Value) else math.cos(value)
+
+
+def inverse_above(value: Any, least: Any) -> Any:
+    """Inverse of a number or of a value of a tape if it is more than `least`, or else zero."""
+    if isinstance(value, Value):
+        return value.tape.record(INVERT_ABOVE, value, least)
+    return 1.0 / value if value > least else 0.0
 
 
 def _is(value: Any, number: float) -> bool:

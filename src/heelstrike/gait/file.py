@@ -96,7 +96,11 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     if isinstance(gait, PiecewiseGait):
         data |= {key: getattr(gait, name).tolist() for key, name in _PIECES.items()}
     lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
-    Path(path).write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    try:
+        Path(path).write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise GaitError(f"{path}: the gait cannot be written: {reason}.") from error
 
 
 def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:

@@ -225,7 +225,7 @@ class Gait:
 
         Raises
         ------
-        OSError
+        GaitError
             If the file cannot be written.
         """
         from heelstrike.gait.file import save_gait

@@ -20,6 +20,7 @@ from numba import types
 from heelstrike.compilation import kernel, loop_for, type_of
 from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
+from heelstrike.contact.search import try_solvers
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -769,7 +770,10 @@ def compiled_advance() -> tuple[Any, float]:
         type_of(allocate_phase(robot)),
         types.int64[::1],
     )
-    return loop_for(signature, _advance), perf_counter() - begin
+    try_solvers.begin()
+    compiled = loop_for(signature, _advance)
+    try_solvers.finish()
+    return compiled, perf_counter() - begin
 
 
 def _check_start(setting: Setting, swing_feet_pass: bool) -> None:

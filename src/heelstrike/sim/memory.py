@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.bundle import Bundle
-from heelstrike.contact.workspace import ContactWorkspace, contact_workspace
+from heelstrike.contact.search import contact_workspace
+from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies, articulated_bodies
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
@@ -231,7 +232,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         point_delassus=np.zeros((2 * len(usual), 2 * len(usual))),
         point_velocity=np.zeros((nc, 2)),
         point_impulse=np.zeros((nc, 2)),
-        solver=contact_workspace(max(capacity, 1)),
+        solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
         pushes=pushes_on(robot, pushes),
         tally=np.zeros(TALLIES, dtype=np.int64),
         extreme=np.zeros(EXTREMES),

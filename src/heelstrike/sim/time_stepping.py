@@ -29,6 +29,7 @@ from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.search import try_solvers
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.dynamics.straight_line import play
 from heelstrike.errors import SimulationError
@@ -316,8 +317,8 @@ def are_usual(memory: Memory, count: int) -> bool:
 
 
 @dissolved_kernel
-def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
-    """Delassus matrix of the candidates out of that of all usual points."""
+def gather_delassus(model: Model, memory: Memory, count: int) -> None:
+    """Delassus matrix of all usual points; that of the candidates too, if they are fewer."""
     contacts = memory.contacts
     play(
         memory.programs[DELASSUS],
@@ -327,7 +328,7 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
         ),
     )  # fmt: skip
     if count == memory.usual_points.shape[0]:
-        return memory.point_delassus
+        return
     for place in range(count):
         row = 2 * memory.usual_place[memory.candidate[place]]
         for other in range(count):
@@ -336,7 +337,6 @@ def gather_delassus(model: Model, memory: Memory, count: int) -> Floats:
                 for j in range(2):
                     entry = memory.point_delassus[row + i, column + j]
                     memory.delassus[2 * place + i, 2 * other + j] = entry
-    return memory.delassus
 
 
 @dissolved_kernel
@@ -382,13 +382,15 @@ def solve_contacts(
     if count == 0:
         return True
     straight = are_usual(memory, count)
+    delassus = memory.delassus
     if straight:
-        delassus = gather_delassus(model, memory, count)
+        gather_delassus(model, memory, count)
+        if count == memory.usual_points.shape[0]:
+            delassus = memory.point_delassus
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
         press_dry_joints(model, step, count, memory)
-        delassus = memory.delassus
     status = solve_contact_kernel(
         count,
         delassus,
@@ -532,7 +534,9 @@ def compiled_advance() -> tuple[Any, float]:
         integers,
         integers,
     )
+    try_solvers.begin()
     compiled = loop_for(signature, _advance)
+    try_solvers.finish()
     return compiled, perf_counter() - begin
 
 

@@ -103,9 +103,11 @@ def _best(code: str, names: dict[str, str], times: int) -> dict[str, Any]:
 def _run(code: str, names: dict[str, str], **variables: str) -> dict[str, Any]:
     for name, value in names.items():
         code = code.replace(name, value)
+    # Python keeps the bytecode of what it imports, as pip does of what it installs.
+    environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     done = subprocess.run(
         [sys.executable, "-c", code],
-        env=os.environ | variables,
+        env=environment | variables,
         capture_output=True,
         text=True,
         check=False,

@@ -1,0 +1,119 @@
+"""Kernels with machine code of their own, which several loops call by its address.
+
+A loop takes its kernels in and is compiled with them as a whole. What is large, used by several
+loops and not called in most steps is better compiled once, apart: and, while a loop is compiled in
+this process, in another one.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from heelstrike.compilation import compiled_for, is_kept
+
+
+class SeparateKernel:
+    """A kernel that returns an integer and is called by :func:`call_at`.
+
+    Parameters
+    ----------
+    function : callable
+        The kernel. Its name in its module must be that of the :class:`SeparateKernel`.
+    signature : callable
+        Gives its Numba signature.
+
+    Attributes
+    ----------
+    address : (1,) int64
+        Where its machine code is; zero until :meth:`finish` was called.
+    """
+
+    def __init__(self, function: Callable[..., int], signature: Callable[[], Any]) -> None:
+        self.address: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+        self._function = function
+        self._signature = signature
+        self._helper: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+
+    def begin(self) -> None:
+        """Have another process compile it meanwhile, if it has no machine code on disk yet."""
+        with self._lock:
+            if self.address[0] or self._helper or not _can_start_python():
+                return
+            if not is_kept(self._signature(), self._function, address=True):
+                self._helper = self._start_helper()
+
+    def finish(self) -> None:
+        """Compile it, or wait until that is done, or load what there is."""
+        with self._lock:
+            if self.address[0]:
+                return
+            if self._helper:
+                self._helper.wait()  # whether it succeeded shows in what it left on disk
+                self._helper = None
+            signature = self._signature()
+            compiled: Any = compiled_for(signature, self._function, address=True)
+            result = compiled.get_compile_result(signature)
+            self._compiled = compiled  # the code lives as long as this
+            self.address[0] = result.library.get_pointer_to_function(
+                result.fndesc.llvm_cfunc_wrapper_name
+            )
+
+    def _start_helper(self) -> subprocess.Popen[bytes] | None:
+        module, name = self._function.__module__, self._function.__name__
+        try:
+            return subprocess.Popen(
+                [sys.executable, "-c", f"from {module} import {name}; {name}.finish()"],
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
+            )
+        except OSError:
+            return None
+
+
+def separate_kernel(
+    signature: Callable[[], Any],
+) -> Callable[[Callable[..., int]], SeparateKernel]:
+    """Turn a function into a :class:`SeparateKernel` of the given Numba signature."""
+    return lambda function: SeparateKernel(function, signature)
+
+
+def _can_start_python() -> bool:
+    """Whether a second Python would run at the same time, and on the same packages."""
+    is_python = Path(sys.executable or "").stem.lower().startswith("python")
+    return is_python and not getattr(sys, "frozen", False) and (os.cpu_count() or 1) > 1
+
+
+def _call_at(context: Any, address: Any, arguments: Any) -> Any:
+    del context
+    signature = types.int64(address, arguments)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        kinds = [context.get_value_type(kind) for kind in signature.args[1]]
+        function = ir.FunctionType(ir.IntType(64), kinds)
+        parts = [builder.extract_value(values[1], place) for place in range(len(kinds))]
+        return builder.call(builder.inttoptr(values[0], function.as_pointer()), parts)
+
+    return signature, generate
+
+
+call_at: Any = intrinsic(_call_at)
+"""``call_at(address, arguments)`` calls a :class:`SeparateKernel` from a kernel.
+
+The types of the arguments must be those of its signature; nothing checks them.
+"""
