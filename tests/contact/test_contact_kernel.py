@@ -24,6 +24,7 @@ from heelstrike.contact.modes import (
     WARM_START,
 )
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.repetition import repeat
 from heelstrike.contact.search import contact_workspace
 from heelstrike.contact.workspace import (
     FAILURES,
@@ -208,3 +209,35 @@ def test_prescribed_sliding_beside_a_foot_at_rest() -> None:
         assert abs(impulse[3]) <= 0.6 * impulse[2] * (1.0 + 1e-12) + 1e-12
         if caller.mode[1] == SLIP_FORWARD:
             assert impulse[3] == pytest.approx(-0.6 * impulse[2])
+
+
+@pytest.mark.parametrize("close", [False, True], ids=["apart", "in pairs"])
+@pytest.mark.parametrize("points", [1, 2, 3, 5, 16, 64])
+def test_many_points_of_two_soles_that_stick(points: int, close: bool) -> None:
+    """The quick way finds the least-norm impulses, of few directions or of many.
+
+    A rigid body on two soles, of which one is twice as high as the other: rank 3 whatever the
+    number of points. The pseudo-inverse gives the shortest impulse; all are pressed, and none
+    leaves its cone. Neighbours 1e-2 apart differ by 1e-4 in what they add to the matrix, so that
+    1e-16 becomes 1e-12, and more where few such points carry all.
+    """
+    draw = np.random.default_rng([11, points])
+    x = np.sort(draw.uniform(-1.0, 1.0, points))
+    if close:
+        x[points // 2 :] = x[: points - points // 2] + 1e-2
+    z = np.where(np.arange(points) < points // 2, -0.5, -1.0)
+    jacobian = np.zeros((2 * points, 3))
+    jacobian[0::2] = np.array([0.0 * x, 0.0 * x + 1.0, -x]).T
+    jacobian[1::2] = np.array([0.0 * x + 1.0, 0.0 * x, z]).T
+    delassus = jacobian @ np.diag([0.5, 0.5, 3.0]) @ jacobian.T
+    pressed = np.ravel(np.column_stack([1.0 + 0.0 * x, draw.uniform(-0.01, 0.01, points)]))
+    free = -delassus @ pressed
+    work = contact_workspace(points)
+    mode = np.full(points, STICK)
+    impulse, velocity, left = np.zeros(2 * points), np.zeros(2 * points), np.zeros(3)
+    friction = np.full(points, 0.8)
+    assert repeat(points, delassus, free, friction, mode, impulse, velocity, left, 1e-11, work)
+    # Impulses with the same effect differ by what J takes to zero.
+    shortest = np.linalg.pinv(jacobian.T, rcond=1e-12) @ (jacobian.T @ pressed)
+    np.testing.assert_allclose(impulse, shortest, atol=1e-9)
+    assert np.all(mode == STICK)

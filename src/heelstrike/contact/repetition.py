@@ -116,7 +116,8 @@ def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorksp
 def leave_out_idle(size: int, work: ContactWorkspace) -> None:
     """Take from the solution what lies along directions that change no velocity.
 
-    There is one such direction n for every row that depends on others, Lᵀ n = e. They are made
+    For few equations it is quicker than :func:`shorten`, which needs them in another order. There
+    is one such direction n for every row that depends on others, Lᵀ n = e. They are made
     orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
     counts 1/m.
     """
@@ -167,6 +168,7 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
     rest = size
     least = GOOD_PIVOT
     poor = False
+    moved = False
     while rank < rest:
         row = source[rank]
         total = -free[row]
@@ -189,10 +191,13 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
             rank += 1
         elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
             poor = poor or pivot > POOR_PIVOT * diagonal
-            if rest == size and least == GOOD_PIVOT:
-                begin_order(size, work)
             rest -= 1
-            put_off(rank, rest, work)
+            work.labels[SPAN, rest] = rank
+            if rest > rank:
+                if not moved:
+                    begin_order(size, work)
+                    moved = True
+                exchange(rank, rest, work)
         else:
             return False
         if poor and rank == rest:
@@ -206,6 +211,8 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
             x[j] -= matrix[i, j] * x[i]
     if rank < size:
         shorten(rank, size, work)
+    if moved:
+        put_back(size, work)
     return True
 
 
@@ -217,15 +224,26 @@ def begin_order(size: int, work: ContactWorkspace) -> None:
 
 
 @kernel
-def put_off(rank: int, rest: int, work: ContactWorkspace) -> None:
-    """Exchange the row in hand, which depends on those before, for the last that is untried."""
+def exchange(rank: int, rest: int, work: ContactWorkspace) -> None:
+    """Exchange the equation in hand for the last that is untried."""
     source, order, matrix = work.labels[EQUATION], work.labels[ORDER], work.tableau
-    work.labels[SPAN, rest] = rank
-    if rest > rank:
-        source[rank], source[rest] = source[rest], source[rank]
-        order[rank], order[rest] = order[rest], order[rank]
-        for i in range(rank):
-            matrix[rest, i] = matrix[rank, i]
+    sharers = work.vectors[SHARERS]
+    source[rank], source[rest] = source[rest], source[rank]
+    order[rank], order[rest] = order[rest], order[rank]
+    sharers[rank], sharers[rest] = sharers[rest], sharers[rank]
+    for i in range(rank):
+        matrix[rest, i] = matrix[rank, i]
+
+
+@kernel
+def put_back(size: int, work: ContactWorkspace) -> None:
+    """Undo all exchanges in the solution and the list of sharers."""
+    order, x, sharers = work.labels[ORDER], work.vectors[POINT], work.vectors[SHARERS]
+    for vector in (x, sharers):
+        for place in range(size):
+            work.vectors[SPEED, place] = vector[place]
+        for place in range(size):
+            vector[order[place]] = work.vectors[SPEED, place]
 
 
 @kernel
@@ -236,13 +254,10 @@ def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
     with ``x₁ + Cᵀ x₂ = y`` is a solution. In the norm of the impulses, where what m rows share in
     equal parts counts 1/m (they make the diagonal M), the shortest has::
 
-        x₂ = (M₂⁻¹ + C M₁⁻¹ Cᵀ)⁻¹ C M₁⁻¹ y    =    M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
-
-    of which the smaller system is solved.
+        x₂ = M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
     """
-    order, matrix, x = work.labels[ORDER], work.tableau, work.vectors[POINT]
-    sharers, y, system = work.vectors[SHARERS], work.vectors[STEP], work.squares[BASIS]
-    spread = work.vectors[SPEED]
+    matrix, x, sharers = work.tableau, work.vectors[POINT], work.vectors[SHARERS]
+    y, system = work.vectors[STEP], work.squares[BASIS]
     for place in range(rank, size):
         part = matrix[place]
         for j in range(work.labels[SPAN, place], rank):
@@ -252,53 +267,27 @@ def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
             for i in range(j + 1, rank):
                 entry -= part[i] * matrix[i, j]
             part[j] = entry
-    many = size - rank > rank
-    few = min(rank, size - rank)
-    if many:
-        for i in range(rank):
-            y[i] = x[i]
-            for j in range(i):
-                system[i, j] = 0.0
-            system[i, i] = sharers[order[i]]
-        for place in range(rank, size):
-            part = matrix[place]
-            for i in range(rank):
-                weighted = sharers[order[place]] * part[i]
-                for j in range(i + 1):
-                    system[i, j] += weighted * part[j]
-    else:
-        for i in range(few):
-            part = matrix[rank + i]
-            along = 0.0
-            length = 1.0 / sharers[order[rank + i]]
-            for k in range(rank):
-                weighted = part[k] / sharers[order[k]]
-                spread[k] = weighted
-                along += weighted * x[k]
-                length += weighted * part[k]
-            y[i] = along
-            system[i, i] = length
-            for j in range(i):
-                entry = 0.0
-                for k in range(rank):
-                    entry += spread[k] * matrix[rank + j, k]
-                system[i, j] = entry
-    solve_regular(few, system, y)
+    for i in range(rank):
+        y[i] = x[i]
+        for j in range(i):
+            system[i, j] = 0.0
+        system[i, i] = sharers[i]
     for place in range(rank, size):
         part = matrix[place]
-        entry = y[place - rank]
-        if many:
-            entry = 0.0
-            for i in range(rank):
-                entry += part[i] * y[i]
-            entry *= sharers[order[place]]
-        spread[place] = entry
+        for i in range(rank):
+            weighted = sharers[place] * part[i]
+            for j in range(i + 1):
+                system[i, j] += weighted * part[j]
+    solve_regular(rank, system, y)
+    for place in range(rank, size):
+        part = matrix[place]
+        entry = 0.0
+        for i in range(rank):
+            entry += part[i] * y[i]
+        entry *= sharers[place]
+        x[place] = entry
         for i in range(rank):
             x[i] -= part[i] * entry
-    for place in range(rank):
-        spread[place] = x[place]
-    for place in range(size):
-        x[order[place]] = spread[place]
 
 
 @dissolved_kernel

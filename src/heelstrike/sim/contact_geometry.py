@@ -9,9 +9,12 @@ from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.kernels import (
     bias_force,
+    factorize,
     forward_kinematics,
     link_velocities,
+    mass_matrix,
     point_position,
+    solve_lower,
 )
 from heelstrike.dynamics.straight_line import play
 from heelstrike.dynamics.workspace import Workspace
@@ -96,51 +99,85 @@ def write_unit_row(memory: Memory, joint: int, row: int, sign: float) -> None:
     memory.leaf[place] = joint
 
 
-@kernel
-def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
-    """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates, by articulated bodies.
+@dissolved_kernel
+def halve_by_factor(model: Model, memory: Memory, place: int) -> None:
+    """Write the columns of ``memory.half`` that belong to a candidate, by A = Lᵀ D L."""
+    parents, factor, half = model.parent, memory.factor, memory.half
+    row = 2 * place
+    j = memory.leaf[place]
+    while j >= 0:
+        half[j, row] = memory.jacobian[row, j]
+        half[j, row + 1] = memory.jacobian[row + 1, j]
+        j = parents[j]
+    j = memory.leaf[place]
+    while j >= 0:
+        normal = half[j, row]
+        tangent = half[j, row + 1]
+        half[j, row] = memory.root[j] * normal
+        half[j, row + 1] = memory.root[j] * tangent
+        i = parents[j]
+        while i >= 0:
+            half[i, row] -= factor[j, i] * normal
+            half[i, row + 1] -= factor[j, i] * tangent
+            i = parents[i]
+        j = parents[j]
 
-    With A = Lᵀ D L it is the square of ``memory.half`` = D^(-1/2) L⁻ᵀ Jᵀ. A column of L⁻ᵀ Jᵀ
-    is what a force along the row leaves to each joint on its way to the root
-    (:mod:`heelstrike.dynamics.articulated`).
+
+@dissolved_kernel
+def halve_by_bodies(model: Model, memory: Memory, place: int) -> None:
+    """Write the columns of ``memory.half`` that belong to a candidate, by articulated bodies.
+
+    They are what a force along its rows leaves to each joint on the way to the root.
     """
     parents, motion, root, half = model.parent, memory.tree.motion, memory.root, memory.half
-    jacobian, delassus, bodies = memory.jacobian, memory.delassus, memory.bodies
-    momentum, inverse = bodies.momentum, bodies.inverse
-    if memory.programs[EQUATIONS] != 0:
-        articulate(model, memory.tree, memory.added, bodies)
-    nv = parents.shape[0]
+    jacobian, momentum = memory.jacobian, memory.bodies.momentum
+    row = 2 * place
+    n0 = 0.0
+    n1 = 0.0
+    n2 = 0.0
+    t0 = 0.0
+    t1 = 0.0
+    t2 = 0.0
+    j = memory.leaf[place]
+    while j >= 0:
+        m0 = motion[j, 0]
+        m1 = motion[j, 1]
+        m2 = motion[j, 2]
+        normal = root[j] * (jacobian[row, j] + m0 * n0 + m1 * n1 + m2 * n2)
+        tangent = root[j] * (jacobian[row + 1, j] + m0 * t0 + m1 * t1 + m2 * t2)
+        half[j, row] = normal
+        half[j, row + 1] = tangent
+        normal *= root[j]
+        tangent *= root[j]
+        n0 -= momentum[j, 0] * normal
+        n1 -= momentum[j, 1] * normal
+        n2 -= momentum[j, 2] * normal
+        t0 -= momentum[j, 0] * tangent
+        t1 -= momentum[j, 1] * tangent
+        t2 -= momentum[j, 2] * tangent
+        j = parents[j]
+
+
+@kernel
+def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
+    """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates.
+
+    With A = Lᵀ D L it is the square of ``memory.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are
+    coordinates, so that the inner loops run over the candidates.
+    """
+    half, delassus = memory.half, memory.delassus
+    straight = memory.programs[EQUATIONS] != 0
+    nv = model.parent.shape[0]
     rows = 2 * count
     for j in range(nv):
-        root[j] = math.sqrt(inverse[j])
+        memory.root[j] = math.sqrt(memory.factor[j, j] if straight else memory.bodies.inverse[j])
         for row in range(rows):
             half[j, row] = 0.0
     for place in range(count):
-        row = 2 * place
-        n0 = 0.0
-        n1 = 0.0
-        n2 = 0.0
-        t0 = 0.0
-        t1 = 0.0
-        t2 = 0.0
-        j = memory.leaf[place]
-        while j >= 0:
-            m0 = motion[j, 0]
-            m1 = motion[j, 1]
-            m2 = motion[j, 2]
-            normal = root[j] * (jacobian[row, j] + m0 * n0 + m1 * n1 + m2 * n2)
-            tangent = root[j] * (jacobian[row + 1, j] + m0 * t0 + m1 * t1 + m2 * t2)
-            half[j, row] = normal
-            half[j, row + 1] = tangent
-            normal *= root[j]
-            tangent *= root[j]
-            n0 -= momentum[j, 0] * normal
-            n1 -= momentum[j, 1] * normal
-            n2 -= momentum[j, 2] * normal
-            t0 -= momentum[j, 0] * tangent
-            t1 -= momentum[j, 1] * tangent
-            t2 -= momentum[j, 2] * tangent
-            j = parents[j]
+        if straight:
+            halve_by_factor(model, memory, place)
+        else:
+            halve_by_bodies(model, memory, place)
     for row in range(rows):
         empty = True
         for j in range(nv):
@@ -168,9 +205,28 @@ def add_impulse(model: Model, memory: Memory, count: int, v: Floats) -> None:
         for row in range(2 * count):
             total += half[j, row] * impulse[row]
         change[j] = memory.root[j] * total
-    carry_along(model, memory.tree, memory.bodies, change)
+    if memory.programs[EQUATIONS] != 0:
+        solve_lower(model, memory.factor, change)
+    else:
+        carry_along(model, memory.tree, memory.bodies, change)
     for j in range(model.parent.shape[0]):
         v[j] += change[j]
+
+
+@kernel
+def weigh(model: Model, memory: Memory) -> None:
+    """Find what A of the pose now is solved with, ``memory.added`` on its diagonal.
+
+    A short robot's programs leave the factor of A behind, a long one's loops articulated bodies
+    (:mod:`heelstrike.sim.programs`); all that solves with A takes what there is.
+    """
+    if memory.programs[EQUATIONS] != 0:
+        mass_matrix(model, memory.tree, memory.mass_matrix)
+        for i in range(model.parent.shape[0]):
+            memory.mass_matrix[i, i] += memory.added[i]
+        factorize(model, memory.mass_matrix, memory.factor)
+    else:
+        articulate(model, memory.tree, memory.added, memory.bodies)
 
 
 @dissolved_kernel
@@ -184,7 +240,7 @@ def evaluate_equations(model: Model, q: Floats, v: Floats, memory: Memory) -> No
         forward_kinematics(model, q, tree)
         link_velocities(model, v, tree)
         bias_force(model, tree, bias)
-        articulate(model, tree, memory.added, memory.bodies)
+        weigh(model, memory)
 
 
 @dissolved_kernel

@@ -11,7 +11,6 @@ from typing import Any
 
 from heelstrike.compilation import kernel
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.articulated import articulate
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -22,6 +21,7 @@ from heelstrike.sim.contact_geometry import (
     evaluate_equations,
     locate_contacts,
     solve_mass_matrix,
+    weigh,
 )
 from heelstrike.sim.controller import Contacts
 from heelstrike.sim.dry_friction import dry_force
@@ -361,7 +361,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
     for attempt in range(5):
         forward_kinematics(model, state[:nv], memory.tree)
         link_velocities(model, state[nv:], memory.tree)
-        articulate(model, memory.tree, memory.added, memory.bodies)
+        weigh(model, memory)
         locate_contacts(model, ground, memory)
         count = gather_closed(model, memory, phase)
         if count == 0:

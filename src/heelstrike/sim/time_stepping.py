@@ -30,11 +30,7 @@ from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.search import try_solvers
-from heelstrike.dynamics.kernels import (
-    factorize,
-    mass_matrix,
-    passive_force,
-)
+from heelstrike.dynamics.kernels import passive_force
 from heelstrike.dynamics.straight_line import play
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -47,6 +43,7 @@ from heelstrike.sim.contact_geometry import (
     evaluate_equations,
     locate_contacts,
     solve_mass_matrix,
+    weigh,
     write_unit_row,
 )
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, example_model
@@ -174,10 +171,7 @@ def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> Non
         for i in range(nv):
             memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
         if memory.programs[SOLVE] != 0:
-            mass_matrix(model, memory.tree, memory.mass_matrix)
-            for i in range(nv):
-                memory.mass_matrix[i, i] += memory.added[i]
-            factorize(model, memory.mass_matrix, memory.factor)
+            weigh(model, memory)  # the program has not heard of it
     for i in range(nv):
         memory.rate[i] = step * (memory.force[i] - memory.bias[i])
     solve_mass_matrix(model, memory, memory.rate)
