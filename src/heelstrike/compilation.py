@@ -201,8 +201,8 @@ def is_kept(signature: Any, function: Callable[..., Any], *, address: bool = Fal
     compiled = _with_cache(function, address)
     if not isinstance(compiled._cache, _PackageCache):
         return True
-    with quick_compiling():
-        return compiled._cache.load_overload(signature, compiled.targetctx) is not None
+    key = compiled._cache._index_key(signature, compiled.targetctx.codegen())
+    return key in compiled._cache._cache_file._load_index()
 
 
 def loop_for(signature: Any, function: Function) -> Function:

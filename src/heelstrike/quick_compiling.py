@@ -9,11 +9,13 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from numba import types
+from numba.core import ir
+from numba.core.base import BaseContext
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.types.functions import BaseFunction
 from numba.np import linalg
 
-_PLAIN = (types.Number, types.Boolean, types.Array, types.UniTuple)
+_PLAIN = (types.Number, types.Boolean, types.Array, types.SliceType, types.NoneType)
 
 
 def load_numba() -> None:
@@ -30,6 +32,9 @@ def load_numba() -> None:
         linalg.ensure_blas = ensure_blas
 
 
+_WITHOUT_VARIABLES = (str, int, bool, type(None), ir.Loc)
+
+
 @contextmanager
 def quick_compiling() -> Iterator[None]:
     """Compile quicker while the context lasts."""
@@ -37,6 +42,8 @@ def quick_compiling() -> Iterator[None]:
         stack.enter_context(global_compiler_lock)  # one thread at a time, as Numba compiles anyway
         load_numba()
         stack.enter_context(_remembered_typings())
+        stack.enter_context(_arrays_as_they_are())
+        stack.enter_context(_variables_listed_quickly())
         stack.enter_context(_no_garbage_collection())
         yield
 
@@ -54,7 +61,7 @@ def _remembered_typings() -> Iterator[None]:
     answers: dict[Any, Any] = {}
 
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-        if kws or not all(isinstance(argument, _PLAIN) for argument in args):
+        if kws or not all(map(_is_plain, args)):
             return ask(self, context, args, kws)
         key = (self, context, tuple(args))
         if key not in answers:
@@ -66,6 +73,59 @@ def _remembered_typings() -> Iterator[None]:
         yield
     finally:
         functions.get_call_type = ask
+
+
+def _is_plain(kind: Any) -> bool:
+    if isinstance(kind, types.BaseTuple):
+        return all(map(_is_plain, kind))
+    return isinstance(kind, _PLAIN)
+
+
+@contextmanager
+def _arrays_as_they_are() -> Iterator[None]:
+    """Do not ask how arrays become arrays.
+
+    Wherever an array is touched, Numba looks in vain for a conversion from array to array, loads
+    all its registries again, and looks once more.
+    """
+    contexts: Any = BaseContext
+    ask = contexts.get_function
+
+    def get_function(self: Any, function: Any, signature: Any, *rest: Any, **more: Any) -> Any:
+        if function == "__array__" and type(signature.args[0]) is types.Array:
+            raise NotImplementedError
+        return ask(self, function, signature, *rest, **more)
+
+    contexts.get_function = get_function
+    try:
+        yield
+    finally:
+        contexts.get_function = ask
+
+
+@contextmanager
+def _variables_listed_quickly() -> Iterator[None]:
+    """List the variables of an instruction without a call for every word and number in it."""
+    instructions: Any = ir.Inst
+    ask = instructions._rec_list_vars
+
+    def variables(self: Any, value: Any) -> list[Any]:
+        if type(value) is not dict:
+            found: list[Any] = ask(self, value)
+            return found
+        found = []
+        for part in value.values():
+            if type(part) is ir.Var:
+                found.append(part)
+            elif type(part) not in _WITHOUT_VARIABLES:
+                found += ask(self, part)
+        return found
+
+    instructions._rec_list_vars = variables
+    try:
+        yield
+    finally:
+        instructions._rec_list_vars = ask
 
 
 @contextmanager

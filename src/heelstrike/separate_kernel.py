@@ -1,8 +1,8 @@
-"""Kernels with machine code of their own, which several loops call by its address.
+"""Kernels with machine code of their own, which loops call by its address.
 
 A loop takes its kernels in and is compiled with them as a whole. What is large, used by several
-loops and not called in most steps is better compiled once, apart: and, while a loop is compiled in
-this process, in another one.
+loops and not called in most steps is better compiled once, apart, and so are controllers: while a
+loop is compiled in this process, they are in others.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from heelstrike.compilation import compiled_for, is_kept
 
 
 class SeparateKernel:
-    """A kernel that returns an integer and is called by :func:`call_at`.
+    """A kernel that is compiled when it is needed, or in another process until then.
 
     Parameters
     ----------
@@ -37,39 +37,41 @@ class SeparateKernel:
     Attributes
     ----------
     address : (1,) int64
-        Where its machine code is; zero until :meth:`finish` was called.
+        Where its machine code is, for :func:`call_at`; zero until :meth:`finish` was called.
     """
 
-    def __init__(self, function: Callable[..., int], signature: Callable[[], Any]) -> None:
+    def __init__(self, function: Callable[..., Any], signature: Callable[[], Any]) -> None:
         self.address: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
         self._function = function
         self._signature = signature
+        self._compiled: Any = None
         self._helper: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
 
     def begin(self) -> None:
         """Have another process compile it meanwhile, if it has no machine code on disk yet."""
         with self._lock:
-            if self.address[0] or self._helper or not _can_start_python():
+            if self._compiled or self._helper or not _can_start_python():
                 return
             if not is_kept(self._signature(), self._function, address=True):
                 self._helper = self._start_helper()
 
-    def finish(self) -> None:
-        """Compile it, or wait until that is done, or load what there is."""
+    def finish(self) -> Any:
+        """Compile it, or wait until that is done, or load what there is; return it compiled."""
         with self._lock:
-            if self.address[0]:
-                return
+            if self._compiled:
+                return self._compiled
             if self._helper:
                 self._helper.wait()  # whether it succeeded shows in what it left on disk
                 self._helper = None
             signature = self._signature()
             compiled: Any = compiled_for(signature, self._function, address=True)
             result = compiled.get_compile_result(signature)
-            self._compiled = compiled  # the code lives as long as this
             self.address[0] = result.library.get_pointer_to_function(
                 result.fndesc.llvm_cfunc_wrapper_name
             )
+            self._compiled = compiled
+            return compiled
 
     def _start_helper(self) -> subprocess.Popen[bytes] | None:
         module, name = self._function.__module__, self._function.__name__
@@ -88,7 +90,7 @@ class SeparateKernel:
 
 def separate_kernel(
     signature: Callable[[], Any],
-) -> Callable[[Callable[..., int]], SeparateKernel]:
+) -> Callable[[Callable[..., Any]], SeparateKernel]:
     """Turn a function into a :class:`SeparateKernel` of the given Numba signature."""
     return lambda function: SeparateKernel(function, signature)
 
@@ -113,7 +115,7 @@ def _call_at(context: Any, address: Any, arguments: Any) -> Any:
 
 
 call_at: Any = intrinsic(_call_at)
-"""``call_at(address, arguments)`` calls a :class:`SeparateKernel` from a kernel.
+"""``call_at(address, arguments)`` calls a :class:`SeparateKernel` that returns an integer.
 
 The types of the arguments must be those of its signature; nothing checks them.
 """

@@ -27,7 +27,8 @@ from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller import CompiledController, Contacts, controller_kernel
+from heelstrike.separate_kernel import separate_kernel
+from heelstrike.sim.controller import CONTROLLER_SIGNATURE, CompiledController, Contacts
 
 # Places in the parameters: a header, then blocks of nu numbers, then the feet.
 EARLIEST = 0  # a touchdown counts only after this time in a step, s
@@ -240,7 +241,7 @@ def estimated_velocity(samples: Floats, count: int, period: float, i: int) -> fl
     return (newest - second) / period
 
 
-@controller_kernel
+@separate_kernel(lambda: CONTROLLER_SIGNATURE)
 def computed_torque(
     t: float,
     q: Floats,
@@ -410,6 +411,7 @@ class ComputedTorque:
         self.kd = _gains("kd", kd, robot)
         self._kernel = computed_torque
         self._parameters = self._packed_parameters()
+        self._kernel.begin()
         self.reset()
 
     def reset(self) -> None:
@@ -420,7 +422,8 @@ class ComputedTorque:
 
     def compiled(self) -> CompiledController:
         """Return the controller in the form that runs inside the compiled loop."""
-        return CompiledController(self._kernel, self._parameters, self._initial_memory())
+        kernel = self._kernel.finish()
+        return CompiledController(kernel, self._parameters, self._initial_memory())
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
         """Return the joint torques (nu,), in N m."""
@@ -429,7 +432,8 @@ class ComputedTorque:
         forward_kinematics(self.robot.model, state.q, self._tree)
         link_velocities(self.robot.model, state.v, self._tree)
         torque = np.zeros(self.robot.nu)
-        self._kernel(
+        kernel = self._kernel.finish()
+        kernel(
             t,
             state.q,
             state.v,

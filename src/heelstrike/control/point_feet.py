@@ -29,7 +29,8 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller import Contacts, controller_kernel
+from heelstrike.separate_kernel import separate_kernel
+from heelstrike.sim.controller import CONTROLLER_SIGNATURE, Contacts
 
 LATEST = 1  # the reference goes on along its polynomials until this time in a step, s
 
@@ -61,7 +62,7 @@ def undriven_force(
         force[j] -= passive[j]
 
 
-@controller_kernel
+@separate_kernel(lambda: CONTROLLER_SIGNATURE)
 def point_foot_torque(
     t: float,
     q: Floats,
