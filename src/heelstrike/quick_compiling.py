@@ -61,7 +61,7 @@ def _remembered_typings() -> Iterator[None]:
     answers: dict[Any, Any] = {}
 
     def get_call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
-        if kws or not all(map(_is_plain, args)):
+        if kws or not all(_is_plain(argument) for argument in args):
             return ask(self, context, args, kws)
         key = (self, context, tuple(args))
         if key not in answers:
@@ -77,7 +77,7 @@ def _remembered_typings() -> Iterator[None]:
 
 def _is_plain(kind: Any) -> bool:
     if isinstance(kind, types.BaseTuple):
-        return all(map(_is_plain, kind))
+        return all(_is_plain(member) for member in kind)
     return isinstance(kind, _PLAIN)
 
 
