@@ -85,6 +85,7 @@ def count(folder: Path, switch: Any) -> None:
     """Run the scenarios, counting (or, without a switch, only compiling)."""
     from heelstrike import Ground, State, load_robot
     from heelstrike.experiments.benchmark.scenarios import FRICTION
+    from heelstrike.separate_kernel import SeparateKernel
     from heelstrike.sim import CompiledController
     from heelstrike.sim.engine import PAUSED
     from heelstrike.sim.simulation import compiled_form, prepared
@@ -97,6 +98,7 @@ def count(folder: Path, switch: Any) -> None:
         if name:
             module = "computed_torque" if name == "computed_torque" else "joint_feedback"
             kernel = getattr(__import__(f"heelstrike.control.{module}", fromlist=[name]), name)
+            kernel = kernel.finish() if isinstance(kernel, SeparateKernel) else kernel
             controller = CompiledController(kernel, given["parameters"], given["memory"])
         assert controller is not None
         loop = prepared(

@@ -184,6 +184,7 @@ helped = doubled._helper is not None
 doubled.finish()
 written = np.zeros(1)
 hits = sum(doubled._compiled.stats.cache_hits.values())
+assert doubled.__wrapper_address__() == doubled.address[0] != 0  # as Numba asks for functions
 print(call(doubled.address, 21, written), written[0], helped, hits)
 """
 

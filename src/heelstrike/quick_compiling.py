@@ -76,9 +76,8 @@ def _remembered_typings() -> Iterator[None]:
 
 
 def _is_plain(kind: Any) -> bool:
-    if isinstance(kind, types.BaseTuple):
-        return all(_is_plain(member) for member in kind)
-    return isinstance(kind, _PLAIN)
+    members = kind.types if isinstance(kind, types.Tuple | types.UniTuple) else (kind,)
+    return all(isinstance(member, _PLAIN) for member in members)
 
 
 @contextmanager

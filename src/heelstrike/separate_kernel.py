@@ -73,6 +73,11 @@ class SeparateKernel:
             self._compiled = compiled
             return compiled
 
+    def __wrapper_address__(self) -> int:
+        """Return what Numba asks of a function that is handed to a compiled one."""
+        self.finish()
+        return int(self.address[0])
+
     def _start_helper(self) -> subprocess.Popen[bytes] | None:
         module, name = self._function.__module__, self._function.__name__
         try:
