@@ -77,7 +77,8 @@ def _remembered_typings() -> Iterator[None]:
 
 def _is_plain(kind: Any) -> bool:
     if isinstance(kind, types.BaseTuple):
-        return all(map(_is_plain, kind))
+        parts: Any = kind
+        return all(map(_is_plain, parts))
     return isinstance(kind, _PLAIN)
 
 
