@@ -45,11 +45,16 @@ class SeparateKernel:
         self._place = np.zeros(1, dtype=np.int64)
         self.address: NDArray[np.int64] = self._place[:]
         self.address.flags.writeable = False
+        self.__module__ = function.__module__
         self._function = function
         self._signature = signature
         self._compiled: Any = None
         self._helper: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
+
+    def __reduce__(self) -> str:
+        """Copies and pickles are the one of that name, in any process: machine code stays here."""
+        return self._function.__name__
 
     def begin(self) -> None:
         """Have another process compile it meanwhile, if it has no machine code on disk yet."""
