@@ -94,3 +94,14 @@ def test_threads_that_ask_at_once_get_one_table(monkeypatch: pytest.MonkeyPatch)
         first, second = pool.map(lambda _: bundle.table, range(2))
     assert first is second is bundle.table
     assert bundle.address == first.ctypes.data
+
+
+def test_what_bundles_share_is_not_copied() -> None:
+    """Addresses of machine code are read-only; a copy may be from before they were known."""
+    shared = np.arange(3.0)
+    shared.flags.writeable = False
+    bundle, other = Inner(shared), Inner(np.zeros(3))
+    bundle.become(other)
+    assert shared.tolist() == [0.0, 1.0, 2.0]
+    other.become(bundle)
+    assert other.values.tolist() == [0.0, 1.0, 2.0]

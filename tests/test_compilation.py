@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import os
 import shutil
 import subprocess
@@ -11,13 +12,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from numba import types
+from numba.core.errors import TypingError
 from numba.core.types.functions import BaseFunction
 
 import heelstrike
 from heelstrike import compilation
 from heelstrike.compilation import compiled_for, kernel, uncompiled
+from heelstrike.contact.search import try_solvers
 from heelstrike.quick_compiling import quick_compiling
+from heelstrike.robot import load_robot
+from heelstrike.sim.memory import allocate_memory
 
 SOURCE = Path(heelstrike.__file__).parent
 
@@ -213,3 +219,48 @@ def test_a_separate_kernel_is_compiled_by_another_process_once(tmp_path: Path) -
     failing.write_text("#!/bin/sh\nexit 1\n")
     failing.chmod(0o755)
     assert answer("fourth", str(failing))[:2] == ["42", "10.5"]
+
+
+def test_the_other_process_imports_what_this_one_does(tmp_path: Path) -> None:
+    """Not what lies in the directory that a script is called from."""
+    (tmp_path / "apart.py").write_text(APART)
+    (tmp_path / "caller.py").write_text(APART_CALLER)
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (elsewhere / "llvmlite.py").write_text("open('imported', 'w').close()\n")
+    told = subprocess.run(
+        [sys.executable, "-B", "../caller.py"],
+        cwd=elsewhere,
+        env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout.split() == ["42", "10.5", "True", "1"]
+    assert not (elsewhere / "imported").exists()
+
+
+def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:
+    """As in a batch on soft ground, begun before anybody asked for the contact solvers."""
+    robot = load_robot("bravo7")
+    memory = allocate_memory(robot)
+    before = copy.deepcopy(memory)
+    before.solver.solvers[:] = 0
+    try_solvers.finish()
+    memory.become(before)
+    assert memory.solver.solvers[0] == try_solvers.address[0] != 0
+
+
+def test_a_kernel_that_returns_an_array_is_refused() -> None:
+    """Nobody would count its reference, and the caller would free its own array twice."""
+
+    @kernel
+    def same(array: np.ndarray) -> np.ndarray:
+        return array
+
+    def caller(size: int) -> float:
+        array = np.ones(size)
+        return same(array)[0]
+
+    with pytest.raises(TypingError, match="same: a kernel returns numbers"):
+        compiled_for(types.float64(types.int64), caller)

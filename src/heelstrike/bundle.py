@@ -107,9 +107,13 @@ class Bundle:
         return tuple(found)
 
     def become(self, other: Bundle) -> None:
-        """Copy what is in the arrays of a bundle of the same kind and shapes."""
+        """Copy what is in the arrays of a bundle of the same kind and shapes.
+
+        Read-only arrays are not the bundle's own but shared with others, and stay what they are.
+        """
         for mine, its in zip(self.arrays, other.arrays, strict=True):
-            mine[...] = its
+            if mine.flags.writeable:
+                mine[...] = its
 
     def members(self) -> dict[str, Any]:
         """Members by name, in their order."""

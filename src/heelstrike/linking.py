@@ -11,10 +11,12 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite.binding import parse_assembly
+from numba import types
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.errors import TypingError
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
 from numba.core.untyped_passes import InlineClosureLikes
 
@@ -42,6 +44,7 @@ class _UnfinishedLowering(NativeLowering):
     _name = "unfinished_lowering"
 
     def run_pass(self, state: Any) -> bool:
+        _check_result(state.func_id.func_name, state.return_type)
         state.library = _UnfinishedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         state.flags.no_compile = True
@@ -51,6 +54,15 @@ class _UnfinishedLowering(NativeLowering):
         state.targetctx.insert_user_function(entry, state["cr"].fndesc, [state.library])
         state["cr"] = state["cr"]._replace(cfunc=entry)
         return True
+
+
+def _check_result(name: str, kind: Any) -> None:
+    """Refuse a kernel that returns an array: nobody would count the caller's new reference."""
+    parts = getattr(kind, "types", (kind,))
+    if any(isinstance(part, types.Array) for part in parts):
+        raise TypingError(
+            f"{name}: a kernel returns numbers; let it write into an array it is given"
+        )
 
 
 # Passes that look for array expressions, closures and functions to inline: kernels have none.

@@ -38,15 +38,23 @@ class SeparateKernel:
     ----------
     address : (1,) int64
         Where its machine code is, for :func:`call_at`; zero until :meth:`finish` was called.
+        Read-only: all who call it share it.
     """
 
     def __init__(self, function: Callable[..., Any], signature: Callable[[], Any]) -> None:
-        self.address: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
+        self._place = np.zeros(1, dtype=np.int64)
+        self.address: NDArray[np.int64] = self._place[:]
+        self.address.flags.writeable = False
+        self.__module__ = function.__module__
         self._function = function
         self._signature = signature
         self._compiled: Any = None
         self._helper: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
+
+    def __reduce__(self) -> str:
+        """Copies and pickles are the one of that name, in any process: machine code stays here."""
+        return self._function.__name__
 
     def begin(self) -> None:
         """Have another process compile it meanwhile, if it has no machine code on disk yet."""
@@ -67,7 +75,7 @@ class SeparateKernel:
             signature = self._signature()
             compiled: Any = compiled_for(signature, self._function, address=True)
             result = compiled.get_compile_result(signature)
-            self.address[0] = result.library.get_pointer_to_function(
+            self._place[0] = result.library.get_pointer_to_function(
                 result.fndesc.llvm_cfunc_wrapper_name
             )
             self._compiled = compiled
@@ -82,8 +90,9 @@ class SeparateKernel:
         module, name = self._function.__module__, self._function.__name__
         try:
             return subprocess.Popen(
-                [sys.executable, "-c", f"from {module} import {name}; {name}.finish()"],
-                env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+                # -P: what lies in the current directory is imported only if it is here, too.
+                [sys.executable, "-P", "-c", f"from {module} import {name}; {name}.finish()"],
+                env=os.environ | {"PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,

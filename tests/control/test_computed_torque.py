@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 import walking
@@ -188,6 +193,17 @@ def test_a_robot_that_computed_torque_cannot_hold() -> None:
 
     with pytest.raises(hs.ControllerError, match="two mirrored feet"):
         hs.ComputedTorque(RANDOM[0].robot(), walking.gait())
+
+
+@pytest.mark.parametrize("clone", [copy.deepcopy, lambda c: pickle.loads(pickle.dumps(c))])
+def test_a_copy_is_the_same_law(clone: Callable[[Any], Any]) -> None:
+    """For another process, or to be changed: with the machine code of where it is."""
+    robot, gait = walking.bravo7(), walking.gait()
+    law = hs.ComputedTorque(robot, gait)
+    contacts = Contacts(*(np.zeros((robot.nc, *shape)) for shape in ((2,), (2,), (), (2,))))
+    state = gait.initial_state
+    torque = law.torque(0.0, state, contacts)
+    np.testing.assert_array_equal(clone(law).torque(0.0, state, contacts), torque)
 
 
 def test_unknown_keyword_raises() -> None:

@@ -8,6 +8,9 @@ springs, explicitly or implicitly, which are differences of first order in the s
 from __future__ import annotations
 
 import io
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -198,3 +201,23 @@ def test_an_engine_that_cannot_be_loaded_is_named_and_left_out(
     found = engines.peers()
     assert "cannot be loaded: ImportError: libmujoco.so" in found["mujoco"]
     assert engines.compared(found) == ["drake", "bullet", "dart", "pinocchio"]
+
+
+def test_what_engines_print_stays_out_of_the_results() -> None:
+    """From Python, too, where standard output is a file and has a buffer."""
+    told = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            "from heelstrike.experiments.benchmark.engines import output_diverted as diverted\n"
+            "with diverted():\n"
+            "    print('noise')\n"
+            "print('result')",
+        ],
+        env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert told.stdout == "result\n"
+    assert "noise" in told.stderr

@@ -66,10 +66,18 @@ def eliminate(matrix: Floats, x: Floats, pivot: Floats) -> None:
 
 @lru_cache(maxsize=1)
 def elimination_programs() -> NDArray[np.int64]:
-    """Addresses of the programs by size, (LARGEST + 1,); zero where there is none."""
+    """Addresses of the programs by size, (LARGEST + 1,); zero where there is none.
+
+    Read-only: all workspaces share them.
+    """
     programs = np.zeros(LARGEST + 1, dtype=np.int64)
-    if not can_fuse():
-        return programs
+    if can_fuse():
+        programs[1:] = _programs()
+    programs.flags.writeable = False
+    return programs
+
+
+def _programs() -> tuple[int, ...]:
     sizes = range(1, LARGEST + 1)
 
     def write() -> ir.Module:
@@ -85,5 +93,4 @@ def elimination_programs() -> NDArray[np.int64]:
             add_function(module, recording)
         return module
 
-    programs[1:] = addresses([f"eliminate_{size}" for size in sizes], b"elimination", write)
-    return programs
+    return addresses([f"eliminate_{size}" for size in sizes], b"elimination", write)

@@ -101,6 +101,7 @@ def output_diverted() -> Iterator[None]:
     try:
         yield
     finally:
+        sys.stdout.flush()
         with suppress(OSError, TypeError):  # C keeps a buffer of its own; not so on all systems
             ctypes.CDLL(None).fflush(None)
         os.dup2(kept, 1)

@@ -127,5 +127,10 @@ def _slope(rows: Sequence[dict[str, Any]], name: str) -> float | None:
 def _crossover(rows: Sequence[dict[str, Any]], side: str) -> int | None:
     """Smallest size from which on a peer is faster; None if there is none."""
     key = f"{side}_us"
-    slower = [row["size"] for row in rows if key in row and row["heelstrike_us"] > row[key]]
-    return min(slower) if slower else None
+    smallest = None
+    for row in reversed(rows):
+        if key in row:
+            if row["heelstrike_us"] <= row[key]:
+                break
+            smallest = row["size"]
+    return smallest
