@@ -24,6 +24,10 @@ from numpy.typing import NDArray
 from heelstrike.compilation import compiled_for, is_kept
 
 
+LONGEST = 300.0
+"""How long to wait for another process to compile a kernel, in s."""
+
+
 class SeparateKernel:
     """A kernel that is compiled when it is needed, or in another process until then.
 
@@ -70,7 +74,11 @@ class SeparateKernel:
             if self._compiled:
                 return self._compiled
             if self._helper:
-                self._helper.wait()  # whether it succeeded shows in what it left on disk
+                # Whether it succeeded shows in what it left on disk.
+                try:
+                    self._helper.wait(LONGEST)
+                except subprocess.TimeoutExpired:  # somebody stopped it
+                    self._helper.kill()
                 self._helper = None
             signature = self._signature()
             compiled: Any = compiled_for(signature, self._function, address=True)
