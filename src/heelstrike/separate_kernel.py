@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from heelstrike.compilation import compiled_for, is_kept
 
-
 LONGEST = 300.0
 """How long to wait for another process to compile a kernel, in s."""
 
