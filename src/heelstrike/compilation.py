@@ -18,9 +18,10 @@ import numba
 import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 
 from heelstrike.linking import InnerKernelCompiler
-from heelstrike.quick_compiling import quick_compiling
+from heelstrike.quick_compiling import load_numba, quick_compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -66,6 +67,27 @@ class _PackageCache(FunctionCache):
         super().__init__(function)
         index = self._cache_file
         index._source_stamp = (source_fingerprint(), _what_it_names(function), index._source_stamp)
+        self._is_ours = _is_ours(function)
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """Load machine code, if there is some.
+
+        Numba first loads all that it could compile with, which takes as long as to import it. What
+        kernels of this package need to run is the bare runtime.
+        """
+        load_numba()
+        if self._is_ours:
+            rtsys.initialize(context)
+            with self._guard_against_spurious_io_errors():
+                found = self._load_overload(signature, context)
+            if found is not None:
+                return found
+        return super().load_overload(signature, context)
+
+
+def _is_ours(function: Callable[..., Any]) -> bool:
+    """Whether a function belongs to this package."""
+    return (function.__module__ or "").split(".")[0] == __name__.split(".")[0]
 
 
 def _what_it_names(function: Callable[..., Any]) -> str:
@@ -76,8 +98,8 @@ def _what_it_names(function: Callable[..., Any]) -> str:
     digest = hashlib.sha256()
     found: list[Any] = [function]
     for one in found:  # grows as it goes
-        if (one.__module__ or "").split(".")[0] == __name__.split(".")[0]:
-            continue  # a function of this package
+        if _is_ours(one):
+            continue
         names = one.__code__.co_names
         modules = [one.__globals__.get(name) for name in names]
         scopes = [one.__globals__, *(vars(m) for m in modules if isinstance(m, types.ModuleType))]

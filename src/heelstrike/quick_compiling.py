@@ -40,7 +40,6 @@ def quick_compiling() -> Iterator[None]:
     """Compile quicker while the context lasts."""
     with ExitStack() as stack:
         stack.enter_context(global_compiler_lock)  # one thread at a time, as Numba compiles anyway
-        load_numba()
         stack.enter_context(_remembered_typings())
         stack.enter_context(_arrays_as_they_are())
         stack.enter_context(_variables_listed_quickly())
