@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compilation import compiled_for, is_kept
 
-LONGEST = 300.0
+LONGEST_WAIT = 300.0
 """How long to wait for another process to compile a kernel, in s."""
 
 
@@ -75,7 +75,7 @@ class SeparateKernel:
             if self._helper:
                 # Whether it succeeded shows in what it left on disk.
                 try:
-                    self._helper.wait(LONGEST)
+                    self._helper.wait(LONGEST_WAIT)
                 except subprocess.TimeoutExpired:  # somebody stopped it
                     self._helper.kill()
                 self._helper = None

@@ -16,7 +16,6 @@ from heelstrike.robot.model import Floats
 LARGEST = 8
 """Unknowns of the largest system with a program; its length grows with the cube of their number."""
 
-
 POOR_PIVOT = 1e-7
 """Pivots that keep more than this of their diagonal can be divided by, if need be."""
 
