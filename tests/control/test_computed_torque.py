@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import walking
+from gait_motion import foot_jacobian, middle, selection, standing
+from robot_cases import builtin_xml
 
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.control import Encoder
+from heelstrike.robot import read_mjcf
 from heelstrike.sim import Contacts
 
 
@@ -57,6 +61,52 @@ def test_the_law_is_the_papers(seed: int) -> None:
     expected = as_the_paper_writes_it(robot, link, q, v, wanted)
     torque = controller.torque(t, hs.State(q, v), nothing_touches())
     np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+SPRINGY = re.sub(
+    r'axis="0 1 0" range="(\S+ \S+)"/>',
+    r'axis="0 1 0" range="\1" stiffness="80" springref="20" damping="3" armature="0.05"/>',
+    builtin_xml("bravo7"),
+)
+"""The built-in robot with springs, dampers and rotors in its joints."""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_springs_and_dampers_are_made_up_for(seed: int) -> None:
+    """The law against forward dynamics with contact, which knows nothing of it.
+
+    With the stance foot flat and at rest, v̇ of the joints is the reference's plus feedback,
+    whatever springs, dampers and rotors there are in the joints.
+    """
+    robot, gait = read_mjcf(SPRINGY, name="bravo7"), walking.gait()
+    assert np.count_nonzero(robot.model.stiffness) == 6
+    assert np.count_nonzero(robot.model.rest) == 6
+    draw = np.random.default_rng(seed)
+    t, kp, kd = float(draw.uniform(0.1, 0.3)), 300.0, 30.0
+    foot, joints = gait.stance_foot, robot.model.actuator_joint
+    q = standing(robot, gait.position(t) + 0.02 * draw.normal(size=6), foot)
+    rows = foot_jacobian(robot, q, foot)
+    v = np.zeros(robot.nv)
+    v[joints] = gait.velocity(t) + 0.1 * draw.normal(size=6)
+    v[:3] = -np.linalg.solve(rows[:, :3], rows @ v)
+    wanted = (
+        gait.acceleration(t)
+        + kd * (gait.velocity(t) - v[joints])
+        + kp * (gait.position(t) - q[joints])
+    )
+    torque = hs.ComputedTorque(robot, gait, kp=kp, kd=kd).torque(
+        t, hs.State(q, v), nothing_touches()
+    )
+    # The ground holds the foot's three coordinates; what it takes to do so follows.
+    mass = dynamics.mass_matrix(robot, q)
+    drift = dynamics.point_bias_acceleration(
+        robot, q, v, robot.feet[foot].link, middle(robot, foot)
+    )
+    force = selection(robot) @ torque + dynamics.passive_force(robot, q, v)
+    force -= dynamics.bias_force(robot, q, v)
+    whole = np.block([[mass, -rows.T], [rows, np.zeros((3, 3))]])
+    found = np.linalg.solve(whole, np.concatenate([force, -drift]))[: robot.nv]
+    np.testing.assert_allclose(found[joints], wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
 
 
 def test_touchdown_exchanges_the_feet_and_restarts_the_phase() -> None:
