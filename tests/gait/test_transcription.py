@@ -31,7 +31,7 @@ def robot(request: pytest.FixtureRequest) -> hs.Robot:
     model = dataclasses.replace(
         bravo7.model,
         contact_radius=np.full(4, RADIUS),
-        contact_position=bravo7.model.contact_position + [0.0, RADIUS],
+        contact_position=bravo7.model.contact_position + np.array([0.0, RADIUS]),
     )
     return dataclasses.replace(bravo7, model=model)
 
