@@ -7,7 +7,7 @@ nothing and touches no Python object. The same source is compiled by Numba and, 
 
 from __future__ import annotations
 
-import hashlib
+import sys
 import types
 from collections.abc import Callable, Mapping
 from functools import cached_property, lru_cache, update_wrapper
@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-import numpy as np
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.runtime.nrt import rtsys
 
+from heelstrike.fingerprint import fingerprint, is_ours
 from heelstrike.linking import InnerKernelCompiler
 from heelstrike.quick_compiling import load_numba, quick_compiling
 
@@ -28,21 +28,11 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
-# Packages whose sources end up in machine code.
-_COMPILED = ("robot", "dynamics", "contact", "sim", "control", "analysis")
-
-
-@lru_cache(maxsize=1)
-def source_fingerprint() -> str:
-    """Fingerprint of all sources that kernels are made of."""
-    home = Path(__file__).parent
-    files = sorted(home.glob("*.py"))
-    for package in _COMPILED:
-        files += sorted((home / package).rglob("*.py"))
-    digest = hashlib.sha256()
-    for file in files:
-        digest.update(file.read_bytes())
-    return digest.hexdigest()
+_COMPILER = tuple(
+    Path(__file__).with_name(f"{name}.py")
+    for name in ("compilation", "linking", "quick_compiling", "bundle")
+)
+"""What shapes the machine code of every kernel."""
 
 
 def cache_directory() -> Path:
@@ -53,21 +43,33 @@ def cache_directory() -> Path:
     RuntimeError
         If there is no place to write.
     """
-    return Path(FunctionCache(source_fingerprint.__wrapped__).cache_path)
+    return Path(FunctionCache(cache_directory).cache_path)
+
+
+def made_of(function: Callable[..., Any]) -> str:
+    """Return the fingerprint of a kernel and of what compiles it."""
+    return fingerprint(function, *_COMPILER)
 
 
 class _PackageCache(FunctionCache):
-    """Machine code on disk that is good for exactly these sources.
+    """Machine code on disk that is good for exactly what the kernel is made of.
 
-    Numba looks at the file of a kernel only, and would go on using yesterday's machine code of a
-    kernel whose callee in another file has changed.
+    Numba looks at the file of a kernel only: it would go on using yesterday's machine code of a
+    kernel whose callee in another file has changed, and compile anew for the sake of a comment.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         super().__init__(function)
+        self._is_ours = is_ours(function)
         index = self._cache_file
-        index._source_stamp = (source_fingerprint(), _what_it_names(function), index._source_stamp)
-        self._is_ours = _is_ours(function)
+        if self._is_ours:
+            name = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(
+                ">", ""
+            )
+            name = f"{name}.{sys.implementation.cache_tag}"
+            self._cache_file = IndexDataCacheFile(self._cache_path, name, made_of(function))
+        else:
+            index._source_stamp = (made_of(function), index._source_stamp)
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Load machine code, if there is some.
@@ -83,41 +85,6 @@ class _PackageCache(FunctionCache):
             if found is not None:
                 return found
         return super().load_overload(signature, context)
-
-
-def _is_ours(function: Callable[..., Any]) -> bool:
-    """Whether a function belongs to this package."""
-    return (function.__module__ or "").split(".")[0] == __name__.split(".")[0]
-
-
-def _what_it_names(function: Callable[..., Any]) -> str:
-    """Fingerprint of the kernels and constants that a function of a user takes in by name.
-
-    They may be in other files than the function.
-    """
-    digest = hashlib.sha256()
-    found: list[Any] = [function]
-    for one in found:  # grows as it goes
-        if _is_ours(one):
-            continue
-        names = one.__code__.co_names
-        modules = [one.__globals__.get(name) for name in names]
-        scopes = [one.__globals__, *(vars(m) for m in modules if isinstance(m, types.ModuleType))]
-        for name, scope in ((name, scope) for name in names for scope in scopes):
-            value = scope.get(name)
-            inner = getattr(value, "py_func", None)
-            if inner is not None and inner not in found:
-                found.append(inner)
-                code = inner.__code__
-                digest.update(repr((name, code.co_code, code.co_names)).encode())
-                digest.update(
-                    repr([c for c in code.co_consts if not isinstance(c, types.CodeType)]).encode()
-                )
-            elif isinstance(value, bool | int | float | complex | str | tuple):
-                digest.update(repr((name, value)).encode())
-            elif isinstance(value, np.ndarray):
-                digest.update(repr((name, value.dtype, value.shape)).encode() + value.tobytes())
-    return digest.hexdigest()
 
 
 def _kept_on_disk(compiled: Any) -> Any:
@@ -141,13 +108,13 @@ class Kernel:
         update_wrapper(self, function)
         self.py_func = function
         self._called = False
-        self._dissolved = dissolved
+        self.dissolved = dissolved
 
     @cached_property
     def _part(self) -> Any:
         """The kernel as part of others; it allocates nothing and so counts no references."""
         options = _OPTIONS | {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "_nrt": False}
-        options["forceinline"] = self._dissolved
+        options["forceinline"] = self.dissolved
         return njit(**options, pipeline_class=InnerKernelCompiler)(self.py_func)
 
     @property

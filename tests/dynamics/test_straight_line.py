@@ -204,7 +204,7 @@ def test_spoilt_files_and_no_place_for_files_cost_time_only(
     """A file may be cut short by a loss of power; LLVM would crash on it."""
     monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
     described = b"test of spoilt files"
-    key = machine_code._key(described)
+    key = machine_code._key(described, constant)
     file = machine_code._file(key)
 
     def loaded(number: float) -> float:

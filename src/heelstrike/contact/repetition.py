@@ -22,7 +22,6 @@ from heelstrike.contact.workspace import (
     REST_TOLERANCE,
     SHARERS,
     SIZE,
-    SLOPE,
     SPAN,
     SPEED,
     STEP,
@@ -378,10 +377,9 @@ def repeat(
         delassus,
         free,
         friction,
-        work.vectors[SLOPE],
         impulse,
         velocity,
         residual,
-        work.vectors[SIZE],
+        work,
     )
     return worst <= tolerance and moves_as_named(count, friction, mode, velocity, work)

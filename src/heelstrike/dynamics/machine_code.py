@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
@@ -15,7 +16,8 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import config
 
-from heelstrike.compilation import cache_directory, source_fingerprint
+from heelstrike.compilation import cache_directory
+from heelstrike.fingerprint import fingerprint
 
 _DIGEST = 32  # bytes
 _OPTIMISATION = 1  # more costs time and gains nothing on straight-line code
@@ -55,11 +57,12 @@ def addresses(
     names : sequence of str
         Names of the functions.
     described : bytes
-        What the module depends on besides the sources of this package and the processor.
+        What the module depends on besides what its writer is made of, and the processor.
     write : callable
-        Writes the module.
+        Writes the module. What it is made of is the text of its Python module, and all that this
+        names.
     """
-    key = _key(described)
+    key = _key(described, write)
     with _loading:
         if key not in _loaded:
             _loaded[key] = _engine(key, write)
@@ -94,15 +97,18 @@ def _compiled(module: ir.Module, machine: Any) -> bytes:
     return code
 
 
-def _key(described: bytes) -> str:
+def _key(described: bytes, write: Callable[[], ir.Module]) -> str:
     digest = hashlib.sha256(described)
-    for part in (
-        source_fingerprint(),
-        *_processor(),
-        str(llvm.llvm_version_info),
-    ):
+    made_of = _made_of(write.__module__)
+    for part in (made_of, *_processor(), str(llvm.llvm_version_info)):
         digest.update(b"\0" + part.encode())
     return digest.hexdigest()
+
+
+@lru_cache
+def _made_of(module: str) -> str:
+    """Fingerprint of a module that writes, and of this one that compiles."""
+    return fingerprint(sys.modules[module], sys.modules[__name__])
 
 
 def _file(key: str) -> Path:
