@@ -1,18 +1,22 @@
-"""Mutations of our own code: which would the tests see?
+"""Mutations of our own code: which do the tests see.
 
-A line of heelstrike is changed, in a copy of the sources, and the tests that reach it run until one
-fails. Kernels run as plain Python (`plain_kernels`), so that nothing is compiled and a tracer sees
-which tests reach which lines (`reach`). Mutants are drawn from a seed: first a package, in turn,
-then an operator (`operators`), then a place, each with equal chance; those that once passed unseen
-(`known`) are always among them. Words, types and looks are left alone.
+A line of heelstrike is changed, and the tests that reach it run until one fails. Kernels run as
+plain Python (`plain_kernels`), so that nothing is compiled and a tracer sees which tests reach
+which lines (`reach`). Mutants are drawn from a seed: in each package first an operator
+(`operators`), then a place, each with equal chance; those that once passed unseen (`known`) are
+always among them. Words, types and looks are left alone.
+
+All tests are collected once, and every mutant is a fork of that process with another function in
+it (`substitution`). What cannot be exchanged so, such as constants of a module, is written into a
+copy of the sources, for a process that starts afresh.
 
 The ledger is a file of JSON lines: a campaign that was stopped goes on where it was, and mutants
 whose text is unchanged are not asked again.
 
-Run, from the top folder::
+Run, from the top folder, on a system that forks::
 
-    python benchmarks/mutations/campaign.py reach           # which tests reach what; half an hour
-    python benchmarks/mutations/campaign.py run --seed 1    # an hour or two on one core
+    python benchmarks/mutations/campaign.py reach           # which tests reach what
+    python benchmarks/mutations/campaign.py run --seed 1    # about half an hour on one core
     python benchmarks/mutations/campaign.py again           # survivors, after tests were added
     python benchmarks/mutations/campaign.py table           # as Markdown
 
@@ -23,14 +27,16 @@ what they reach. ``explained.json`` beside this file tells of survivors why they
 from __future__ import annotations
 
 import argparse
+import atexit
+import compileall
 import contextlib
 import importlib
 import json
-import math
 import os
 import random
 import shutil
 import signal
+import subprocess
 import sys
 import time
 from collections import Counter
@@ -40,16 +46,20 @@ from typing import Any
 
 from known import known_mutants
 from operators import Mutant, is_a_change, mutants_of
+from substitution import exchange
 
 HERE = Path(__file__).resolve().parent
 HOME = HERE.parent.parent
 PACKAGE = HOME / "src" / "heelstrike"
 STATE = HOME / "build" / "mutations"
-COPY = STATE / "copy"
+COPY = STATE / f"copy-{os.getpid()}"
 REACH = STATE / "reach.jsonl"
 LEDGER = STATE / "ledger.jsonl"
+VERDICT = COPY / "verdict.json"
 EXPLAINED = HERE / "explained.json"
 
+CANNOT = 77
+"""How a fork ends that could not exchange the function."""
 KEY = ("file", "scope", "line", "changed")
 """What an entry of the ledger is known by."""
 SHORT = 16
@@ -60,74 +70,63 @@ SHARES = {"contact": 0.2, "sim": 0.3, "analysis": 0.2, "gait": 0.15, "control": 
 TESTS = ("tests/control", "tests/gait", "tests/analysis", "tests/sim", "tests/physics")
 TESTS += ("tests/contact", "tests/experiments/test_library_gaits.py")
 
-LIBRARIES = ("_pytest.assertion.rewrite", "numpy", "numba", "scipy.optimize", "casadi", "mujoco")
-LIBRARIES += ("xarray", "h5netcdf", "matplotlib.figure", "rich.console", "hypothesis")
-"""What takes long to import; nothing of heelstrike."""
-
-REACH_DEADLINE = 6
+REACH_DEADLINE = 4
 """Tests that take longer than this (s of processor time, traced) are left out."""
 DEADLINE = 30
 """What a test may take with a mutant (s of processor time) before it counts as caught."""
-QUICK = 40
-"""Tests that run first, the quickest; the others only if these pass."""
-MOST_SECONDS = 60.0
+LONGEST_WAIT = 900.0
+"""What all tests together may take (s) before a mutant counts as endless."""
+QUICK = 20
+"""Tests that run first in a new process, the quickest; the others only if these pass."""
+MOST_SECONDS = 40.0
 """Tests that reach a mutant run up to this many seconds, as they took without it."""
 
 
 def copy_sources() -> None:
-    """Make a fresh copy of sources and tests to work on."""
-    shutil.rmtree(COPY, ignore_errors=True)
+    """Make a copy of sources and tests to work on, for as long as this process lives."""
+    owner = os.getpid()
+
+    def clear() -> None:
+        if os.getpid() == owner:
+            shutil.rmtree(COPY, ignore_errors=True)
+
+    atexit.register(clear)
     COPY.mkdir(parents=True)
     for name in ("src", "tests"):
         shutil.copytree(HOME / name, COPY / name, ignore=shutil.ignore_patterns("__pycache__"))
     for name in ("pyproject.toml", "README.md"):
         shutil.copy(HOME / name, COPY / name)
+    compileall.compile_dir(COPY, quiet=2)
 
 
-def load_libraries() -> None:
-    """Import what heelstrike and its tests import, once for all processes."""
-    for name in LIBRARIES:
-        importlib.import_module(name)
+def environment(**setting: str) -> dict[str, str]:
+    """Variables under which pytest runs on the copy."""
+    path = os.pathsep.join((str(COPY / "src"), str(HERE)))
+    return {"CI": "1", "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **setting}
 
 
-def pytest(arguments: Iterable[str], *, limit: float = math.inf, **setting: str) -> int | None:
-    """Run pytest on the copy in a process of its own; return its exit status.
+OPTIONS = ("-p", "plain_kernels", "-p", "reach", "-p", "no:cacheprovider", "-q", "--tb=line")
+OPTIONS += ("--assert=plain",)
 
-    None if it took more than `limit` seconds.
-    """
-    process = os.fork()  # libraries are loaded already, heelstrike is not
-    if process == 0:
-        try:
-            os._exit(_pytest_here(list(arguments), setting))
-        finally:
-            os._exit(70)
-    begin = time.monotonic()
+
+def pytest_afresh(arguments: Iterable[str], **setting: str) -> int | None:
+    """Run pytest on the copy in a new process; return its exit status, None if it never ended."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pytest", *OPTIONS, *arguments],
+        cwd=COPY,
+        env=os.environ | environment(**setting),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
-        while True:
-            finished, status, _ = os.wait4(process, os.WNOHANG)
-            if finished:
-                return os.waitstatus_to_exitcode(status)
-            if time.monotonic() - begin > limit:
-                return None
-            time.sleep(0.05)
+        return process.wait(LONGEST_WAIT)
+    except subprocess.TimeoutExpired:
+        return None
     finally:
         with contextlib.suppress(ProcessLookupError):
-            os.killpg(process, signal.SIGKILL)
-
-
-def _pytest_here(arguments: list[str], setting: dict[str, str]) -> int:
-    import pytest
-
-    os.setsid()
-    os.chdir(COPY)
-    os.environ.update({"CI": "1", "PYTHONHASHSEED": "0", **setting})
-    sys.dont_write_bytecode = True
-    sys.path[:0] = [str(COPY / "src"), str(HERE)]
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nowhere, stream)
-    options = ("-p", "plain_kernels", "-p", "reach", "-p", "no:cacheprovider", "-q", "--tb=line")
-    return int(pytest.main([*options, *arguments]))
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def read_lines(path: Path) -> Iterator[dict[str, Any]]:
@@ -144,8 +143,8 @@ def reach(paths: list[str]) -> None:
     """Find out which tests reach what, for some paths or all."""
     copy_sources()
     for path in paths or TESTS:
-        status = pytest([path], REACH=str(REACH), DEADLINE=str(REACH_DEADLINE))
-        print(f"{path}: pytest ended with {status}")
+        status = pytest_afresh([path], REACH=str(REACH), DEADLINE=str(REACH_DEADLINE))
+        print(f"{path}: pytest ended with {status}", flush=True)
 
 
 class Reached:
@@ -170,16 +169,23 @@ class Reached:
                     self.functions.setdefault((file, first), set()).add(name)
 
     def tests(self, mutant: Mutant, text: str) -> list[str]:
-        """Tests that reach a mutant, those that reach its line first, the quick before the slow."""
+        """Tests that reach a mutant: its line, its function, its file's tests; the quick first."""
         last = mutant.line + text.count("\n", mutant.begin, mutant.end)
         there: set[str] = set()
         for line in range(mutant.line, last + 1):
             there |= self.lines.get((mutant.file, line), set())
         around = self.functions.get((mutant.file, mutant.function), set())
-        if not mutant.function and not there:  # of the module: whatever uses the module
+        if not mutant.function and not there:  # of the module: whatever uses it, and its own tests
+            package, name = mutant.file.split("/")
+            mirrored = f"tests/{package}/test_{name}::"
             around = self.files.get(mutant.file, set())
+            around = around | {test for test in self.seconds if test.startswith(mirrored)}
+        # What a fixture made was reached in the test that asked first, and matters to all after it.
+        files = {test.split("::")[0] for test in there | around}
+        beside = {test for test in self.seconds if test.split("::")[0] in files}
         quick = sorted(there, key=self.seconds.__getitem__)
         quick += sorted(around - there, key=self.seconds.__getitem__)
+        quick += sorted(beside - there - around, key=self.seconds.__getitem__)
         total, chosen = 0.0, []
         for test in quick:
             total += self.seconds[test]
@@ -225,56 +231,124 @@ def key(mutant: Mutant) -> tuple[str, str, str, str]:
     return mutant.file, mutant.scope, " ".join(line.split()), " ".join(changed.split())
 
 
-def ask(mutant: Mutant, reached: Reached) -> dict[str, Any]:
-    """Run the tests that reach a mutant until one fails; return what is written down of it."""
-    text = (PACKAGE / mutant.file).read_text()
-    tests = reached.tests(mutant, text)
-    found: dict[str, Any] = dict(zip(KEY, key(mutant), strict=True)) | {"kind": mutant.kind}
-    found |= {"number": mutant.line, "outcome": "not reached", "tests": len(tests)}
-    target = COPY / "src" / "heelstrike" / mutant.file
-    target.write_text(mutant.apply(text))
-    begin = time.monotonic()
-    order, verdict = STATE / "order.txt", STATE / "verdict.json"
-    try:
-        for part in (tests[:QUICK], tests[QUICK:]):
-            if not part:
-                continue
-            order.write_text("\n".join(part) + "\n")
-            verdict.unlink(missing_ok=True)
-            files = dict.fromkeys(test.split("::")[0] for test in part)
-            status = pytest(
-                ["-x", *files],
-                limit=300.0 + 20.0 * sum(reached.seconds[test] for test in part),
-                ORDER=str(order),
-                VERDICT=str(verdict),
-                DEADLINE=str(DEADLINE),
+class Asker:
+    """Asks the tests about mutants, from within pytest, which has collected all of them."""
+
+    def __init__(self, mutants: list[Mutant]) -> None:
+        self.mutants = mutants
+        self.reached = Reached()
+
+    def pytest_runtestloop(self, session: Any) -> bool:
+        """Take the place of pytest's own loop over the tests."""
+        self.items = {item.nodeid: item for item in session.items}
+        prepare()
+        for place, mutant in enumerate(self.mutants):
+            found = self.ask(mutant)
+            with LEDGER.open("a") as ledger:
+                ledger.write(json.dumps(found, ensure_ascii=False) + "\n")
+            print(
+                f"{place + 1}/{len(self.mutants)} {found['outcome']:<11} "
+                f"{found['seconds']:6.1f} s  {mutant.file}:{mutant.line}  {found['line']}  →  "
+                f"{found['changed']}",
+                flush=True,
             )
+        return True
+
+    def ask(self, mutant: Mutant) -> dict[str, Any]:
+        """Run the tests that reach a mutant until one fails; return what is written down of it."""
+        text = (PACKAGE / mutant.file).read_text()
+        tests = [t for t in self.reached.tests(mutant, text) if t in self.items]
+        found: dict[str, Any] = dict(zip(KEY, key(mutant), strict=True))
+        found |= {"kind": mutant.kind, "outcome": "not reached", "tests": len(tests)}
+        begin = time.monotonic()
+        if tests:
+            VERDICT.unlink(missing_ok=True)
+            status = self.here(mutant, text, tests)
+            if status == CANNOT:
+                status = self.afresh(mutant, text, tests)
             found["outcome"] = {0: "survived", None: "endless"}.get(status, "caught")
-            if verdict.exists():
-                found |= json.loads(verdict.read_text())
-            if found["outcome"] != "survived":
-                break
-    finally:
-        target.write_text(text)
-    return found | {"seconds": round(time.monotonic() - begin, 1)}
+            if VERDICT.exists():
+                found |= json.loads(VERDICT.read_text())
+        return found | {"seconds": round(time.monotonic() - begin, 1)}
+
+    def here(self, mutant: Mutant, text: str, tests: list[str]) -> int | None:
+        """Ask in a fork of this process with the function exchanged."""
+        process = os.fork()
+        if process == 0:
+            try:
+                os._exit(self._in_fork(mutant, text, tests))
+            finally:
+                os._exit(1)  # the mutant spoilt what runs the tests
+        begin = time.monotonic()
+        try:
+            while time.monotonic() - begin < LONGEST_WAIT:
+                finished, status, _ = os.wait4(process, os.WNOHANG)
+                if finished:
+                    return os.waitstatus_to_exitcode(status)
+                time.sleep(0.02)
+            return None
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, signal.SIGKILL)
+
+    def _in_fork(self, mutant: Mutant, text: str, tests: list[str]) -> int:
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for stream in range(3):
+            os.dup2(nowhere, stream)
+        forget(mutant.file.split("/")[0])
+        original = COPY / "src" / "heelstrike" / mutant.file
+        if not exchange(original, text, mutant.apply(text), mutant.function):
+            return CANNOT
+        items = [self.items[test] for test in tests]
+        for item, following in zip(items, [*items[1:], None], strict=True):
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+            if VERDICT.exists():
+                return 1
+        return 0
+
+    def afresh(self, mutant: Mutant, text: str, tests: list[str]) -> int | None:
+        """Ask in a new process, with the mutant written into the copy."""
+        target = COPY / "src" / "heelstrike" / mutant.file
+        target.write_text(mutant.apply(text))
+        for compiled in (target.parent / "__pycache__").glob(f"{target.stem}.*"):
+            compiled.unlink()
+        order = COPY / "order.txt"
+        try:
+            status: int | None = 0
+            for part in (tests[:QUICK], tests[QUICK:]):
+                if part and status == 0:
+                    order.write_text("\n".join(part) + "\n")
+                    files = dict.fromkeys(test.split("::")[0] for test in part)
+                    status = pytest_afresh(["-x", *files], ORDER=str(order))
+            return status
+        finally:
+            target.write_text(text)
+
+
+def prepare() -> None:
+    """Do once what many tests begin with."""
+    walking = importlib.import_module("walking")
+    walking.gait()
+
+
+def forget(package: str) -> None:
+    """Undo it where a mutant might have had a part in it."""
+    if package == "gait":
+        importlib.import_module("walking").gait.cache_clear()
 
 
 def run(mutants: list[Mutant], *, anew: bool = False) -> None:
     """Ask for all mutants that the ledger does not know, or for all."""
+    import pytest
+
     copy_sources()
-    reached = Reached()
     known = set() if anew else {_entry_key(each) for each in read_lines(LEDGER)}
-    for place, mutant in enumerate(mutants):
-        if key(mutant) in known:
-            continue
-        found = ask(mutant, reached)
-        with LEDGER.open("a") as ledger:
-            ledger.write(json.dumps(found, ensure_ascii=False) + "\n")
-        print(
-            f"{place + 1}/{len(mutants)} {found['outcome']:<11} {found['seconds']:6.1f} s  "
-            f"{mutant.file}:{mutant.line}  {found['line']}  →  {found['changed']}",
-            flush=True,
-        )
+    asker = Asker([mutant for mutant in mutants if key(mutant) not in known])
+    os.chdir(COPY)
+    setting = {"DEADLINE": str(DEADLINE), "VERDICT": str(VERDICT)}
+    os.environ.update(environment(**setting))
+    sys.path[:0] = [str(COPY / "src"), str(HERE)]
+    pytest.main([*OPTIONS, "-s", *TESTS], plugins=[asker])
 
 
 def _entry_key(entry: dict[str, Any]) -> tuple[str, ...]:
@@ -333,8 +407,6 @@ def main() -> None:
         command.add_argument("--package", action="append", choices=list(SHARES))
     asked = parser.parse_args()
     STATE.mkdir(parents=True, exist_ok=True)
-    if asked.command in ("reach", "run", "again"):
-        load_libraries()
     if asked.command == "reach":
         reach(asked.paths)
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
 from operators import Mutant
@@ -22,7 +23,8 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
      "zmp_margin_min_m=100.0 * float(margin.min())"),
     ("analysis/summary.py", "zmp_margin_min_m=float(margin.min())",
      "zmp_margin_min_m=float(margin.max())"),
-    ("analysis/summary.py", 'm in {_number(s.duration_s, 4)} s "', 'm in {_number(s.duration_s, 4)} ms "'),
+    ("analysis/summary.py", 'm in {_number(s.duration_s, 4)} s "',
+     'm in {_number(s.duration_s, 4)} ms "'),
     ("sim/dataset.py", '"m/s or rad/s"', '"m/s or deg/s"'),
     ("sim/dataset.py", '"N m", "joint torques within their limits"',
      '"N", "joint torques within their limits"'),
@@ -60,5 +62,16 @@ def known_mutants(package: Path) -> list[Mutant]:
             raise ValueError(f"{file} has {text.count(old)} times {old!r}")
         begin = text.index(old)
         line = text.count("\n", 0, begin) + 1
-        mutants.append(Mutant(file, line, 0, "", begin, begin + len(old), old, new, "known"))
+        inside = [
+            node
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0)
+        ]
+        function, scope = 0, ""
+        if inside:
+            innermost = max(inside, key=lambda node: node.lineno)
+            scope = innermost.name
+            function = min([innermost.lineno, *(d.lineno for d in innermost.decorator_list)])
+        end = begin + len(old)
+        mutants.append(Mutant(file, line, function, scope, begin, end, old, new, "known"))
     return mutants

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 
@@ -218,7 +219,7 @@ class _Finder(ast.NodeVisitor):
 
     def visit_BoolOp(self, node: ast.BoolOp) -> None:
         symbol, new = ("and", "or") if isinstance(node.op, ast.And) else ("or", "and")
-        for left, right in zip(node.values[:-1], node.values[1:], strict=True):
+        for left, right in pairwise(node.values):
             self.between(left, right, symbol, new, "and/or")
         self.generic_visit(node)
 
@@ -243,7 +244,7 @@ class _Finder(ast.NodeVisitor):
             end = self.span(called)[1]
             self.add(called.end_lineno or 0, end - len(name), end, TWINS[name], "twin function")
         places = [a for a in node.args if isinstance(a, ast.Name | ast.Attribute | ast.Subscript)]
-        for first, second in zip(places[:-1], places[1:], strict=True):
+        for first, second in pairwise(places):
             if type(first) is not type(second):
                 continue
             one, other = (self.text[slice(*self.span(a))] for a in (first, second))

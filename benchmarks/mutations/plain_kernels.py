@@ -60,7 +60,7 @@ def _finish(self: Any) -> Any:
     return _twin(self._function)
 
 
-separate_kernel.SeparateKernel.begin = lambda self: None  # type: ignore[method-assign]
+separate_kernel.SeparateKernel.begin = lambda _: None  # type: ignore[method-assign]
 separate_kernel.SeparateKernel.finish = _finish  # type: ignore[method-assign]
 separate_kernel.call_at = _call
 

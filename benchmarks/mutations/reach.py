@@ -27,8 +27,8 @@ FIRST_CALLS = 40
 DEADLINE = float(os.environ.get("DEADLINE", "0"))
 
 
-class _Deadline(Exception):  # noqa: N818 - what happened, not what is wrong
-    """The test took too long."""
+class _Deadline(BaseException):
+    """The test took too long. No exception of the common kind, for the tested may catch those."""
 
 
 def _too_long(*_: Any) -> None:
@@ -41,7 +41,7 @@ class _Tracer:
         self.lines: set[tuple[str, int]] = set()
         self.foreign: set[CodeType] = set()
 
-    def start(self, frame: FrameType, event: str, _: Any) -> Any:
+    def start(self, frame: FrameType, *_: Any) -> Any:
         code = frame.f_code
         if code in self.foreign:
             return None
@@ -69,6 +69,7 @@ class _Tracer:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests that are asked for in their order."""
     if "ORDER" in os.environ:
         names = Path(os.environ["ORDER"]).read_text().splitlines()
         place = {name: i for i, name in enumerate(names)}
@@ -105,6 +106,7 @@ _passed = pytest.StashKey[bool]()
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item) -> Any:
+    """Note whether a test passed."""
     report: Any = yield
     item.stash[_passed] = item.stash.get(_passed, True) and report.passed
     if report.failed and "VERDICT" in os.environ:
