@@ -70,7 +70,7 @@ SHARES = {"contact": 0.2, "sim": 0.3, "analysis": 0.2, "gait": 0.15, "control": 
 TESTS = ("tests/control", "tests/gait", "tests/analysis", "tests/sim", "tests/physics")
 TESTS += ("tests/contact", "tests/experiments/test_library_gaits.py")
 
-REACH_DEADLINE = 4
+REACH_DEADLINE = 3
 """Tests that take longer than this (s of processor time, traced) are left out."""
 DEADLINE = 30
 """What a test may take with a mutant (s of processor time) before it counts as caught."""
