@@ -254,6 +254,24 @@ def test_an_impossible_gait_is_told(rabbit: hs.Robot, monkeypatch: pytest.Monkey
         hs.optimize_gait(rabbit, **{**STEP, "friction": 0.0})
 
 
+def test_where_a_joint_counts_from_is_nothing_to_the_gait(
+    rabbit: hs.Robot, rabbit_gait: hs.PiecewiseGait
+) -> None:
+    """One knee's angle is zero elsewhere than the other's: the same walk in other numbers."""
+    shift = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0])
+    model = dataclasses.replace(
+        rabbit.model,
+        reference=rabbit.model.reference + shift,
+        lower=rabbit.model.lower + shift,
+        upper=rabbit.model.upper + shift,
+    )
+    gait = hs.optimize_gait(dataclasses.replace(rabbit, model=model), **STEP)
+    assert gait.cost == pytest.approx(rabbit_gait.cost, rel=1e-6)
+    times = np.linspace(0.0, 1.2, 9)  # two steps
+    moved = shift[rabbit.model.actuator_joint]
+    np.testing.assert_allclose(gait.position(times), rabbit_gait.position(times) + moved, atol=1e-5)
+
+
 def test_the_reserve_grows_where_a_constraint_fails_between_the_points(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
