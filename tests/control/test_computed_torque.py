@@ -310,6 +310,8 @@ def test_the_estimate_is_exact_for_cubics() -> None:
     [
         ({"kp": -1.0}, "kp"),
         ({"kd": np.nan}, "kd"),
+        ({"kp": [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]}, "kp"),
+        ({"kd": [1.0, 1.0, np.nan, 1.0, 1.0, 1.0]}, "kd"),
         ({"kp": [1.0, 2.0]}, "kp must be one number or 6"),
     ],
 )
