@@ -72,13 +72,13 @@ TESTS += ("tests/contact", "tests/experiments/test_library_gaits.py")
 
 REACH_DEADLINE = 3
 """Tests that take longer than this (s of processor time, traced) are left out."""
-DEADLINE = 30
+DEADLINE = 12
 """What a test may take with a mutant (s of processor time) before it counts as caught."""
 LONGEST_WAIT = 900.0
 """What all tests together may take (s) before a mutant counts as endless."""
 QUICK = 20
 """Tests that run first in a new process, the quickest; the others only if these pass."""
-MOST_SECONDS = 12.0
+MOST_SECONDS = 5.0
 """Tests that reach a mutant run up to this many seconds, as they took without it."""
 
 
