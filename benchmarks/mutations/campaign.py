@@ -46,7 +46,7 @@ from typing import Any
 
 from known import known_mutants
 from operators import Mutant, is_a_change, mutants_of
-from substitution import exchange
+from substitution import exchange, exchange_constants
 
 HERE = Path(__file__).resolve().parent
 HOME = HERE.parent.parent
@@ -177,7 +177,7 @@ class Reached:
         around = self.functions.get((mutant.file, mutant.function), set())
         if not mutant.function and not there:  # of the module: whatever uses it, and its own tests
             package, name = mutant.file.split("/")
-            mirrored = f"tests/{package}/test_{name}::"
+            mirrored = f"tests/{package}/test_{name.removesuffix('.py')}"
             around = self.files.get(mutant.file, set())
             around = around | {test for test in self.seconds if test.startswith(mirrored)}
         # What a fixture made was reached in the test that asked first, and matters to all after it.
@@ -297,7 +297,12 @@ class Asker:
             os.dup2(nowhere, stream)
         forget(mutant.file.split("/")[0])
         original = COPY / "src" / "heelstrike" / mutant.file
-        if not exchange(original, text, mutant.apply(text), mutant.function):
+        if mutant.function:
+            done = exchange(original, text, mutant.apply(text), mutant.function)
+        else:
+            name = "heelstrike." + mutant.file.removesuffix(".py").replace("/", ".")
+            done = exchange_constants(importlib.import_module(name), mutant.apply(text))
+        if not done:
             return CANNOT
         items = [self.items[test] for test in tests]
         for item, following in zip(items, [*items[1:], None], strict=True):
@@ -356,16 +361,26 @@ def _entry_key(entry: dict[str, Any]) -> tuple[str, ...]:
 
 
 def survivors(mutants: list[Mutant]) -> list[Mutant]:
-    """Those of some mutants that the ledger's last word is not caught."""
+    """Those of some mutants that were not caught at last and are not explained."""
     outcome = {_entry_key(each): each["outcome"] for each in read_lines(LEDGER)}
-    return [m for m in mutants if outcome.get(key(m)) in ("survived", "not reached")]
+    explained = {_entry_key(each) for each in explanations()}
+    return [
+        mutant
+        for mutant in mutants
+        if outcome.get(key(mutant)) in ("survived", "not reached") and key(mutant) not in explained
+    ]
+
+
+def explanations() -> list[dict[str, Any]]:
+    """Why some mutants survive, and whether they change anything."""
+    found: list[dict[str, Any]] = json.loads(EXPLAINED.read_text()) if EXPLAINED.exists() else []
+    return found
 
 
 def table(mutants: list[Mutant], seed: int) -> str:
     """What became of the mutants, as Markdown."""
     ledger = {_entry_key(each): each for each in read_lines(LEDGER)}
-    explained = json.loads(EXPLAINED.read_text()) if EXPLAINED.exists() else []
-    reasons = {_entry_key(each): each for each in explained}
+    reasons = {_entry_key(each): each for each in explanations()}
     counts: dict[str, Counter[str]] = {}
     lines: list[str] = []
     for mutant in mutants:

@@ -6,7 +6,9 @@ import gc
 import inspect
 from collections.abc import Iterator
 from pathlib import Path
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType
+
+import numpy as np
 
 
 def exchange(path: Path, old: str, new: str, line: int) -> bool:
@@ -78,3 +80,40 @@ def _lines(code: CodeType) -> Iterator[int]:
 def _outermost(module: CodeType, line: int) -> CodeType | None:
     """The function of a module that begins at a line, or in which one does."""
     return next((code for code in _functions(module) if line in _lines(code)), None)
+
+
+PLAIN = (bool, int, float, str, tuple, list, dict, np.ndarray)
+
+
+def exchange_constants(module: ModuleType, new: str) -> bool:
+    """Give a module the constants that it would have with another text.
+
+    Wherever a module took them by name, they change; not where they went into something else when
+    it was imported.
+
+    Returns
+    -------
+    bool
+        Whether there was one that differs.
+    """
+    fresh = {"__name__": module.__name__, "__file__": module.__file__}
+    exec(compile(new, str(module.__file__), "exec"), fresh)
+    changed = {
+        name: (old, fresh[name])
+        for name, old in vars(module).items()
+        if type(old) in PLAIN and name in fresh and not name.startswith("__")
+        if not _equal(old, fresh[name])
+    }
+    scopes = {id(f.__globals__): f.__globals__ for f in gc.get_objects() if type(f) is FunctionType}
+    scopes[id(vars(module))] = vars(module)
+    for scope in scopes.values():
+        for name, (old, value) in changed.items():
+            if scope.get(name) is old:
+                scope[name] = value
+    return bool(changed)
+
+
+def _equal(first: object, second: object) -> bool:
+    if isinstance(first, np.ndarray):
+        return np.array_equal(first, second)  # type: ignore[arg-type]
+    return repr(first) == repr(second)

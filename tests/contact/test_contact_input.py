@@ -20,6 +20,7 @@ FREE = np.array([-1.0, 0.0, -1.0, 0.0])
         (EYE, FREE[:3], 0.5, {}, "3 entries, but every contact needs two"),
         (np.eye(3), FREE, 0.5, {}, r"shape \(3, 3\), but free has 2 contacts.*\(4, 4\)"),
         (EYE[:2], FREE, 0.5, {}, r"shape \(2, 4\)"),
+        (np.zeros((0, 0)), FREE, 0.5, {}, r"shape \(0, 0\)"),
         (
             EYE,
             FREE,
