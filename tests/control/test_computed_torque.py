@@ -290,7 +290,7 @@ def test_a_light_touch_is_a_touchdown() -> None:
 
 def test_a_joint_without_a_motor_is_named() -> None:
     xml = re.sub(r'\s*<motor name="\w+_ankle".*', "", builtin_xml("bravo7"))
-    with pytest.raises(hs.ControllerError, match="leaves .*right_ankle.*left_ankle without"):
+    with pytest.raises(hs.ControllerError, match=r"leaves .*right_ankle.*left_ankle without"):
         hs.ComputedTorque(read_mjcf(xml, name="bravo7"), walking.gait())
 
 
