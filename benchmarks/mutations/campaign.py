@@ -78,7 +78,9 @@ LONGEST_WAIT = 900.0
 """What all tests together may take (s) before a mutant counts as endless."""
 QUICK = 20
 """Tests that run first in a new process, the quickest; the others only if these pass."""
-MOST_SECONDS = 5.0
+SLOW = 0.5
+"""Tests that took longer (s) come after those that are less likely to fail, but quick."""
+MOST_SECONDS = 8.0
 """Tests that reach a mutant run up to this many seconds, as they took without it."""
 
 
@@ -183,11 +185,13 @@ class Reached:
         # What a fixture made was reached in the test that asked first, and matters to all after it.
         files = {test.split("::")[0] for test in there | around}
         beside = {test for test in self.seconds if test.split("::")[0] in files}
-        quick = sorted(there, key=self.seconds.__getitem__)
-        quick += sorted(around - there, key=self.seconds.__getitem__)
-        quick += sorted(beside - there - around, key=self.seconds.__getitem__)
+        tiers = {test: tier for tier, tests in enumerate((beside, around, there)) for test in tests}
+
+        def place(test: str) -> tuple[bool, int, float]:
+            return self.seconds[test] > SLOW, -tiers[test], self.seconds[test]
+
         total, chosen = 0.0, []
-        for test in quick:
+        for test in sorted(tiers, key=place):
             total += self.seconds[test]
             if total > MOST_SECONDS:
                 break
