@@ -91,7 +91,7 @@ from heelstrike.sim import programs  # noqa: E402
 
 def _programs(model: Any, points: Sequence[int]) -> np.ndarray:
     found = np.zeros(len(programs.KERNELS), dtype=np.int64)
-    if 0 < len(model.parent) <= programs.MOST_COORDINATES:
+    if 0 < len(model.parent) <= programs.MOST_COORDINATES and programs.can_fuse():
         count = len(programs.KERNELS) if len(points) > 0 else programs.DELASSUS
         found[:count] = [_number(kernel) for kernel in programs.KERNELS[:count]]
     return found

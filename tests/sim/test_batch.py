@@ -15,6 +15,7 @@ import heelstrike as hs
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import CompiledController, Contacts, RunStatus, controller_kernel
 from heelstrike.sim import batch as batch_module
+from heelstrike.sim.batch import Batch
 from heelstrike.sim.engine import Engine, Method, Setting
 from heelstrike.sim.status import EventKind
 
@@ -357,3 +358,15 @@ def test_runs_are_let_go_when_they_are_finished(monkeypatch: pytest.MonkeyPatch)
     )  # fmt: skip
     assert len(begun) == 3
     assert not alive
+
+
+def test_a_run_that_never_began_is_no_run() -> None:
+    """What an interrupted batch has of it; see the test of the interruption for the rest."""
+    nothing: dict[str, Any] = {field.name: np.zeros(2) for field in dataclasses.fields(Batch)}
+    status = (RunStatus.INTERRUPTED, RunStatus.INTERRUPTED)
+    batch = Batch(**nothing | {"status": status, "_runs": (None, None)})
+    assert not batch.completed.any()
+    with pytest.raises(hs.SimulationError, match="interrupted before run 1 began"):
+        batch.run(1)
+    with pytest.raises(IndexError, match="no run 2"):
+        batch.run(2)

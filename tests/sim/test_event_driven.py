@@ -12,7 +12,9 @@ import walking
 from numpy.typing import NDArray
 
 import heelstrike as hs
+from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot import read_mjcf
 from heelstrike.robot.model import Model
 from heelstrike.sim import (
     CompiledController,
@@ -347,3 +349,45 @@ def test_a_run_may_begin_while_a_swing_foot_passes_below_the_ground(turn: float)
     assert not run.events
     np.testing.assert_array_equal(run.position[0], start.q)
     assert np.all(run.gap[:, 1] < -0.01)
+
+
+PUSHED = """
+<mujoco model="pushed">
+  <worldbody>
+    <geom type="plane" size="10 1 0.1"/>
+    <body name="box" pos="0 0 0.05">
+      <joint name="x" type="slide" axis="1 0 0"/>
+      <joint name="z" type="slide" axis="0 0 1"/>
+      <joint name="pitch" type="hinge" axis="0 1 0"/>
+      <geom type="box" size="0.1 0.1 0.05" mass="2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="force" joint="x"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_a_block_holds_until_the_force_is_all_of_its_friction(direction: float) -> None:
+    """A force that grows by 20 N/s moves 2 kg on friction 0.5 from t = 9.81 N / (20 N/s) on.
+
+    Until then the ground holds against it; after that x = (20 N/s) (t − t₀)³ / (6 · 2 kg).
+    """
+    robot, rate = read_mjcf(PUSHED), 20.0 * direction
+    law = JointFeedback(robot, [0.0], torque=[[[0.0, rate]]], kp=0.0, kd=0.0)
+    run = hs.simulate(
+        robot,
+        law,
+        state=robot.reference_state(),
+        duration=0.6,
+        method=hs.EventDriven(output_period=0.05),
+        ground=hs.Ground(friction=0.5),
+    )
+    begins = 0.5 * 2.0 * 9.81 / 20.0
+    slips = [event.time for event in run.events if event.kind is EventKind.SLIP]
+    np.testing.assert_allclose(slips, begins, atol=1e-7)
+    assert slips
+    holds = run.time < begins - 1e-6
+    tangent = run.contact_force[..., 1].sum(axis=1)
+    np.testing.assert_allclose(tangent[holds], -rate * run.time[holds], atol=1e-7)
+    assert run.position[-1, 0] == pytest.approx(rate * (0.6 - begins) ** 3 / 12.0, rel=1e-5)

@@ -237,6 +237,43 @@ def test_dry_friction_that_holds_is_minus_what_it_holds(torque: float) -> None:
     np.testing.assert_allclose(run.velocity, 0.0, atol=1e-12)
 
 
+TWO_HINGES = """
+<mujoco model="two_hinges">
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="upper" pos="0 0 2">
+      <joint name="shoulder" type="hinge" axis="0 1 0" frictionloss="30"/>
+      <inertial pos="0 0 -0.5" mass="3" diaginertia="0.1 0.1 0.1"/>
+      <body name="lower" pos="0 0 -1">
+        <joint name="elbow" type="hinge" axis="0 1 0" frictionloss="10"/>
+        <inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.1"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("method", [hs.TimeStepping(), hs.EventDriven(output_period=1e-3)])
+def test_every_joint_that_friction_holds_is_recorded(
+    method: hs.TimeStepping | hs.EventDriven,
+) -> None:
+    """Two rods at rest, one below the other: each joint bears the moment of what hangs on it."""
+    upper, lower = 0.5, 0.3
+    run = hs.simulate(
+        read_mjcf(TWO_HINGES),
+        state=hs.State([upper, lower], [0.0, 0.0]),
+        duration=0.01,
+        method=method,
+    )
+    elbow = 2.0 * G * 0.5 * np.sin(upper + lower)
+    shoulder = (3.0 * 0.5 + 2.0) * G * np.sin(upper) + elbow
+    np.testing.assert_allclose(
+        run.friction_torque, np.tile([shoulder, elbow], (len(run.time), 1)), rtol=1e-9
+    )
+    np.testing.assert_allclose(run.velocity, 0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize(("wanted", "given"), [(30.0, 20.0), (-30.0, -25.0), (20.0, 20.0)])
 def test_torques_are_clipped_to_their_own_limit_and_counted(wanted: float, given: float) -> None:
     run = hs.simulate(hinge(), Steady(wanted), state=hs.State([0.0], [0.0]), duration=0.005)
