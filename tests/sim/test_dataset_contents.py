@@ -11,6 +11,7 @@ from synthetic_runs import make_run
 
 import heelstrike as hs
 from heelstrike.sim import Certificates, Event, EventKind, Push, RunStatus, SolverCount, Timing
+from heelstrike.sim.contact_law import HuntCrossley, KelvinVoigt, RegularisedFriction
 from heelstrike.sim.dataset import to_dataset
 
 # Every variable, with its dimensions, unit and description.
@@ -247,3 +248,32 @@ def test_slope_of_the_ground() -> None:
     assert data.attrs["ground_has_profile"] == 0
     (x0, z0), (x1, z1) = data["ground_corner"].values
     assert (z1 - z0) / (x1 - x0) == pytest.approx(np.tan(0.05))
+
+
+def test_laws_of_compliant_ground_are_told_number_by_number() -> None:
+    method = hs.Compliant(
+        law=KelvinVoigt(stiffness=4e5, damping=3e2),
+        friction=RegularisedFriction(speed=2e-3),
+        stop=HuntCrossley(stiffness=5e4, dissipation=0.25, exponent=1.5),
+        step=2e-3,
+        rtol=1e-4,
+        atol=1e-6,
+    )
+    run = dataclasses.replace(make_run(hs.load_robot("bravo7"), [0.0]), method=method)
+    told = to_dataset(run).attrs
+    expected = {
+        "method": "Compliant",
+        "method_law": "KelvinVoigt",
+        "method_law_stiffness": 4e5,
+        "method_law_damping": 3e2,
+        "method_friction": "RegularisedFriction",
+        "method_friction_speed": 2e-3,
+        "method_stop": "HuntCrossley",
+        "method_stop_stiffness": 5e4,
+        "method_stop_dissipation": 0.25,
+        "method_stop_exponent": 1.5,
+        "method_step": 2e-3,
+        "method_rtol": 1e-4,
+        "method_atol": 1e-6,
+    }
+    assert {name: told[name] for name in told if name.startswith("method")} == expected

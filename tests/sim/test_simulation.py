@@ -39,7 +39,7 @@ def run(controller: object, **options: object) -> hs.Run:
         ({"duration": -1.0}, "duration"),
         ({"duration": np.nan}, "duration"),
         ({"record_every": 0}, "record_every"),
-        ({"control_period": -1e-3}, "control_period"),
+        ({"control_period": -1e-3}, "control_period must be a positive number"),
         ({"control_period": 1.5e-3}, "whole number of steps"),
         ({"method": "fast"}, "way through time"),
         ({"ground": 0.5}, "Ground"),
