@@ -116,3 +116,15 @@ def test_what_rounding_decides(matrix: object, size: float, doubtful: bool) -> N
     work.labels[SOURCE, :number] = np.arange(number)
     work.vectors[SCALE, :number] = 1.0 / np.sqrt(unit * np.diag(delassus))
     assert uncompiled(nearly_singular)(number, unit * delassus, work) == doubtful
+
+
+def test_contacts_without_friction_never_slip() -> None:
+    count = 6
+    work = workspace(count, smooth=(1, 4))
+    begin(count, np.full(count, STICK), 1.0, work)
+    met = set()
+    while following(count, work):
+        modes = trial(count, work)
+        met.update(modes[:1])
+        assert max(modes[1], modes[4]) <= STICK
+    assert met == set(ALL)
