@@ -7,6 +7,8 @@ accuracy of central differences of a map known to 1e-11.
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import mechanisms
 import numpy as np
@@ -15,6 +17,7 @@ import walking
 from numpy.typing import NDArray
 
 import heelstrike as hs
+from heelstrike.analysis.limit_cycle import HALVINGS, _moved_on
 
 SPOKE = np.pi / 8.0  # half the angle between two spokes
 SLOPE = np.deg2rad(3.0)
@@ -194,3 +197,22 @@ def test_usable_arguments() -> None:
         hs.find_limit_cycle(robot, state, landing=[7])
     with pytest.raises(hs.SimulationError, match="mirror image"):
         hs.find_limit_cycle(mechanisms.block(), mechanisms.block().reference_state())
+
+
+def test_a_newton_step_is_halved_until_the_walk_goes_on() -> None:
+    """From 0.8 by halves: 0.4 still falls, 0.2 walks; what never walks is left at its shortest."""
+    tried: list[float] = []
+
+    def step(state: float) -> SimpleNamespace:
+        tried.append(state)
+        if state > limit:
+            raise hs.LimitCycleError("fell")
+        return SimpleNamespace(state=state)
+
+    chart: Any = SimpleNamespace(state=lambda x: float(x[0]), coordinates=lambda state: state)
+    limit = 0.3
+    assert _moved_on(step, chart, np.array([0.8])) == pytest.approx(0.2)  # type: ignore[arg-type]
+    np.testing.assert_allclose(tried, [0.8, 0.4, 0.2])
+    limit = 0.0
+    shortest = 0.8 * 0.5**HALVINGS
+    assert _moved_on(step, chart, np.array([0.8])) == pytest.approx(shortest)  # type: ignore[arg-type]

@@ -151,3 +151,10 @@ def test_joint_encoders_cannot_see_the_trunk() -> None:
 def test_a_gait_on_points_is_not_for_soles() -> None:
     with pytest.raises(hs.ControllerError):
         hs.ComputedTorque(hs.load_robot("bravo7"), gait())
+
+
+def test_feet_of_several_points_are_no_point_feet() -> None:
+    robot = rabbit()
+    foot = dataclasses.replace(robot.feet[0], contacts=(0, 1))
+    with pytest.raises(hs.ControllerError, match="several contact points"):
+        hs.ComputedTorque(dataclasses.replace(robot, feet=(foot, robot.feet[1])), gait())

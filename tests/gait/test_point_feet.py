@@ -150,6 +150,25 @@ def test_swing_foot_keeps_clear(walker: tuple[hs.Robot, hs.PiecewiseGait]) -> No
         assert height >= gait.clearance * gait.clearance_profile.height(phase) - 1e-7
 
 
+def test_margins_are_the_worst_of_the_motion(walker: tuple[hs.Robot, hs.PiecewiseGait]) -> None:
+    """Found again on a grid of its own; what lies between its points is less than the tolerance."""
+    robot, gait = walker
+    model, margins = robot.model, gait.margins
+    times = np.linspace(0.0, gait.step_duration, 200)[1:-1]
+    found = list(forces(robot, gait, times))
+    torque = np.array([needed.torque for _, needed in found])
+    load = np.array([needed.contact_force[0] for _, needed in found])
+    joints = np.array([q[3:] for q, _ in found])
+    assert margins.peak_torque == pytest.approx(np.abs(torque).max(), rel=1e-2)
+    limit = np.minimum(model.torque_upper - torque, torque - model.torque_lower).min()
+    assert margins.torque == pytest.approx(limit, rel=1e-2)
+    assert margins.normal_force == pytest.approx(load[:, 0].min(), rel=1e-2)
+    use = (np.abs(load[:, 1]) / (gait.friction * load[:, 0])).max()
+    assert margins.friction_use == pytest.approx(use, rel=1e-2)
+    free = np.minimum(model.upper[3:] - joints, joints - model.lower[3:]).min()
+    assert margins.joint_range == pytest.approx(free, abs=5e-3)
+
+
 def test_pieces_join(walker: tuple[hs.Robot, hs.PiecewiseGait]) -> None:
     _, gait = walker
     inner, tiny = gait.breakpoints[1:-1], 1e-12

@@ -164,3 +164,45 @@ def test_defaults_carry_a_walker_within_a_tenth_of_a_millimetre() -> None:
 def test_parameters_are_checked(make: object, words: str) -> None:
     with pytest.raises(SimulationError, match=words):
         make()  # type: ignore[operator]
+
+
+@pytest.mark.parametrize(
+    ("law", "gap", "speed", "expected"),
+    [
+        # k δⁿ (1 + 3/2 a δ̇): going in, at rest, coming out, above the ground.
+        (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=1.0), -1e-3, -0.5, 1300.0),
+        (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=2.0), -1e-3, 0.0, 1.0),
+        (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=1.0), -1e-3, 0.5, 700.0),
+        (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=1.0), 1e-3, -0.5, 0.0),
+        (KelvinVoigt(stiffness=1e6, damping=200.0), -1e-3, -0.5, 1100.0),
+        (KelvinVoigt(stiffness=1e6, damping=200.0), -1e-3, 0.5, 900.0),
+        (KelvinVoigt(stiffness=1e6, damping=200.0), -1e-3, 6.0, 0.0),
+    ],
+)
+def test_normal_force_by_hand(
+    law: HuntCrossley | KelvinVoigt, gap: float, speed: float, expected: float
+) -> None:
+    force = normal_force(law.kind, numbers(law), gap, speed, np.zeros(cl.PARTIALS))
+    assert force == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("law", "speed", "bend", "expected"),
+    [
+        # −μ F_n v / √(v² + v_s²) with μ F_n = 50 N.
+        (RegularisedFriction(speed=0.4), 0.3, 0.0, (-30.0, 0.0)),
+        (RegularisedFriction(speed=0.4), -0.3, 0.0, (30.0, 0.0)),
+        # The bristle holds with k s + c v, and bends with the point; or slides.
+        (BristleFriction(stiffness=1e4, damping=100.0), 0.1, 2e-3, (-30.0, 0.1)),
+        (BristleFriction(stiffness=1e4, damping=100.0), 0.9, 2e-3, (-50.0, 0.3)),
+        (BristleFriction(stiffness=1e4, damping=100.0), -0.9, -2e-3, (50.0, -0.3)),
+    ],
+)
+def test_friction_by_hand(
+    law: RegularisedFriction | BristleFriction,
+    speed: float,
+    bend: float,
+    expected: tuple[float, float],
+) -> None:
+    found = friction_force(law.kind, numbers(law), 0.5, 100.0, speed, bend, np.zeros(cl.PARTIALS))
+    assert found == pytest.approx(expected, rel=1e-12)
