@@ -18,6 +18,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from heelstrike.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
@@ -271,3 +273,36 @@ def sum_velocities_sharply(
     if settings[EFFORT] < math.inf:
         settings[EFFORT] = effort
     return rounding
+
+
+def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Floats:
+    """How far the velocities just certified may be from a solution's; see :class:`Certificate`.
+
+    To make the answer exact, let every residual vanish. Velocities that are no larger than the
+    worst residual r become zero by moving the free ones. Impulses outside their cones, or without a
+    right to be there, move by at most r in units of the data; and friction by mu g_t / g_n times
+    that where the normal impulse that holds it vanishes. A row feels such a unit of impulse by at
+    most its own unit of velocity, which moves its free velocity once more.
+
+    Parameters
+    ----------
+    worst : float
+        Largest residual, rounding included.
+    friction : (nc,) float
+        Friction coefficients.
+    work : ContactWorkspace
+        As :func:`certify` left it.
+
+    Returns
+    -------
+    (nc, 2) float
+        In the unit of the free velocity.
+    """
+    root = work.vectors[ROOT, : 2 * friction.size]
+    lever = np.zeros(friction.size)
+    np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
+    if not worst < math.inf:
+        return np.full((friction.size, 2), math.inf)
+    moved = worst * (1.0 + np.sum(2.0 + lever))
+    bound: Floats = (moved * work.vectors[SETTINGS, UNIT] * root).reshape(friction.size, 2)
+    return bound
