@@ -26,10 +26,11 @@ from heelstrike.contact.modes import Solver, SolveStatus
 from heelstrike.contact.workspace import (
     EFFORT,
     FLOOR,
+    REST,
+    REST_TOLERANCE,
     ROOT,
     ROUNDING,
     SETTINGS,
-    SIZE,
     SKEWED,
     SLOPE,
     UNIT,
@@ -126,8 +127,8 @@ def certify(
     is returned includes rounding. ``SLOPE`` is not zero where a contact is prescribed to slide; its
     friction then lies on the given edge and its tangential velocity is not constrained.
 
-    Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` and ``SIZE`` of every row,
-    ``ROUNDING``, ``EFFORT`` and ``UNIT``.
+    Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` of every row, ``ROUNDING``,
+    ``EFFORT``, ``UNIT`` and ``REST``.
     """
     settings, root, slope = work.vectors[SETTINGS], work.vectors[ROOT], work.vectors[SLOPE]
     unit = weigh(count, delassus, free, impulse, work)
@@ -138,8 +139,7 @@ def certify(
         rounding = sum_velocities_sharply(count, delassus, free, impulse, velocity, unit, work)
     settings[ROUNDING] = rounding
     settings[UNIT] = unit
-    for i in range(2 * count):
-        work.vectors[SIZE, i] = root[i] * unit * (1.0 + settings[EFFORT])
+    settings[REST] = REST_TOLERANCE * unit * (1.0 + settings[EFFORT])
     inverse = 1.0 / unit if unit > 0.0 else 0.0
 
     complementarity = 0.0
