@@ -48,6 +48,7 @@ _MAY_BE_ENDLESS = ("range", "lower", "upper", "effort", "velocity")
 _MULTIPLIERS = ("replicate", "composite", "flexcomp")
 # MuJoCo's time grows with the square of their number.
 _HEAVY = {"body": 1, "link": 1, "default": 1, "replicate": 8, "attach": 8, "model": 8}
+_COPIED = {*_MULTIPLIERS, "attach", "model"}
 # What has brought parsers down: they read files of other formats, or join models.
 _DELICATE = {"mesh", "plugin", "composite", "model", "attach"}
 
@@ -114,7 +115,7 @@ def screen(source: Path | str, label: str) -> Screened:
         )
     tags: set[str] = set()
     changed, _ = _screen_tree(root, label, place, reading, tags)
-    if changed and root.tag == "mujoco":
+    if (changed or reading.elements) and root.tag == "mujoco":
         text = xml_text(root)
     models = {name: xml_text(model).encode() for name, model in reading.models.items()}
     return Screened(
@@ -130,28 +131,26 @@ def _screen_tree(
     root: Node, label: str, place: Place, reading: Reading, tags: set[str]
 ) -> tuple[bool, _Weight]:
     """Screen a tree and the models that it joins; return whether it had to be changed."""
-    changed = _is_joined(root)
+    count, names = _check_values(root, label, tags)
     weights: dict[str, _Weight] = {}
-    for element in [model for asset in root.iter("asset") for model in asset.iter("model")]:
-        name = f"model{len(reading.models)}.xml"
-        model, there = read_model(element, label, place, reading)
-        reading.models[name] = model
-        below = f"{reading.label}: model {there.above[-1]}"
-        _, weight = _screen_tree(model, below, there, reading, tags)
-        weights[element.get("name") or model.get("model") or ""] = weight
-        element.set("file", name)
-        changed = True
-    weight = _weigh(root, label, weights)
-    names = _check_values(root, label, tags)
+    changed = False
+    if "model" in tags:
+        for element in [model for asset in root.iter("asset") for model in asset.iter("model")]:
+            name = f"model{len(reading.models)}.xml"
+            model, there = read_model(element, label, place, reading)
+            reading.models[name] = model
+            below = f"{reading.label}: model {there.above[-1]}"
+            _, weight = _screen_tree(model, below, there, reading, tags)
+            weights[element.get("name") or model.get("model") or ""] = weight
+            element.set("file", name)
+            changed = True
+    weight = _Weight(count, count, DEEPEST)
+    if place.above[1:] or reading.elements or count > MOST_BODIES or not tags.isdisjoint(_COPIED):
+        weight = _weigh(root, label, weights)
     changed |= leave_mechanics(root, tags, names)
     if "mesh" in tags and root.tag == "mujoco":
         changed |= name_mesh_files(root, label, place)
     return changed, weight
-
-
-def _is_joined(root: Node) -> bool:
-    """Whether a part of the tree comes from another file."""
-    return any(isinstance(element, Node) and element.folder for element in root.iter())
 
 
 def _weigh(root: Element, label: str, models: dict[str, _Weight]) -> _Weight:
@@ -192,12 +191,17 @@ def _weigh(root: Element, label: str, models: dict[str, _Weight]) -> _Weight:
     return _Weight(elements, bodies, deepest)
 
 
-def _check_values(root: Element, label: str, tags: set[str]) -> set[str]:
-    """Refuse values that would hurt; return the names of attributes, add to those of elements."""
+def _check_values(root: Element, label: str, tags: set[str]) -> tuple[int, set[str]]:
+    """Refuse values that would hurt; return how many elements there are and their attributes.
+
+    Their tags are added to those of other files.
+    """
     names: set[str] = set()
+    count = 0
     cells = dict.fromkeys(_CELLS, 0.0)
     for element in root.iter():
         tag, attributes = element.tag, element.attrib
+        count += 1
         tags.add(tag)
         names.update(attributes)
         if tag in _SIZED or tag == "size":
@@ -219,7 +223,7 @@ def _check_values(root: Element, label: str, tags: set[str]) -> set[str]:
                     )
             elif not _LETTERS_OF_NO_NUMBER.isdisjoint(text):
                 _refuse_what_is_no_number(element, name, text, label)
-    return names
+    return count, names
 
 
 def _refuse_sizes(element: Element, label: str) -> None:
