@@ -49,7 +49,8 @@ NUMBERS = (
 RICH = (
     """<mujoco model="rich">
   <compiler angle="radian" autolimits="true" boundmass="1e-6" meshdir="." eulerseq="zyx"/>
-  <option timestep="0.001" integrator="implicit" gravity="0 0 -9.81"><flag contact="enable"/></option>
+  <option timestep="0.001" integrator="implicit" gravity="0 0 -9.81"><flag contact="enable"/>
+    </option>
   <size memory="1M" nuser_geom="2"/>
   <visual><global offwidth="640"/><map znear="0.01"/></visual>
   <statistic extent="2" center="0 0 1"/>
@@ -66,25 +67,29 @@ RICH = (
     <mesh name="ball" builtin="sphere" params="2"/>
     <mesh name="stl" file="part.stl"/>
     <mesh name="obj" file="part.obj"/>
-    <hfield name="hills" nrow="4" ncol="4" size="1 1 0.1 0.1" elevation="0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5"/>
+    <hfield name="hills" nrow="4" ncol="4" size="1 1 0.1 0.1"
+      elevation="0 1 2 3 4 5 6 7 8 9 0 1 2 3 4 5"/>
   </asset>
   <worldbody>
     <light pos="0 0 3" dir="0 0 -1"/><camera name="eye" pos="0 -3 1" xyaxes="1 0 0 0 0 1"/>
     <geom name="floor" type="plane" size="5 5 0.1" material="grid"/>
     <geom name="terrain" type="hfield" hfield="hills" pos="9 0 0"/>
-    <replicate count="3" offset="0.5 0 0" sep="-"><geom type="sphere" size="0.1" pos="0 3 0"/></replicate>
+    <replicate count="3" offset="0.5 0 0" sep="-"><geom type="sphere" size="0.1" pos="0 3 0"/>
+      </replicate>
     <body name="trunk" pos="0 0 1" childclass="leg">
       <joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide" axis="0 0 1"/>
       <joint name="pitch" axis="0 1 0" ref="0.1" springref="0.2" stiffness="1"/>
       <inertial pos="0 0 0" mass="10" diaginertia="1 1 1"/>
       <geom name="trunk" type="mesh" mesh="stl"/><site name="hip" pos="0 0 -0.1"/>
-      <frame pos="0 0 0.1" euler="0 0.1 0"><geom type="ellipsoid" size="0.1 0.1 0.2" mass="1"/></frame>
+      <frame pos="0 0 0.1" euler="0 0.1 0"><geom type="ellipsoid" size="0.1 0.1 0.2" mass="1"/>
+        </frame>
       <body name="thigh" pos="0 0.1 0" euler="0 0.2 0">
         <joint name="hip" axis="0 1 0" range="-1 1" solreflimit="0.01 1" frictionloss="0.1"/>
         <geom name="thigh" fromto="0 0 0 0 0 -0.4"/><geom type="mesh" mesh="tetra" mass="0.1"/>
         <body name="shank" pos="0 0 -0.4">
           <joint name="knee" axis="0 1 0" range="-2 0" actuatorfrcrange="-40 40"/>
-          <geom fromto="0 0 0 0 0 -0.4" user="1 2"/><geom type="box" size="0.1 0.05 0.02" pos="0 0 -0.4"/>
+          <geom fromto="0 0 0 0 0 -0.4" user="1 2"/>
+            <geom type="box" size="0.1 0.05 0.02" pos="0 0 -0.4"/>
           <site name="foot" pos="0 0 -0.4" size="0.01"/>
         </body>
       </body>
@@ -92,12 +97,15 @@ RICH = (
         <geom type="cylinder" size="0.02 0.1" density="500"/><geom type="mesh" mesh="obj"/></body>
       <attach body="thigh" prefix="other_"/>
     </body>
-    <body name="target" mocap="true" pos="1 0 0"><geom type="box" size="0.1 0.1 0.1" contype="0"/></body>
+    <body name="target" mocap="true" pos="1 0 0">
+      <geom type="box" size="0.1 0.1 0.1" contype="0"/></body>
   </worldbody>
-  <contact><exclude body1="trunk" body2="thigh"/><pair geom1="floor" geom2="thigh" condim="3"/></contact>
+  <contact><exclude body1="trunk" body2="thigh"/><pair geom1="floor" geom2="thigh" condim="3"/>
+    </contact>
   <equality>
     <joint joint1="hip" joint2="knee" polycoef="0 1 0 0 0"/>
-    <connect body1="shank" body2="arm" anchor="0 0 0"/><weld body1="arm" body2="target" relpose="0 0 0 1 0 0 0"/>
+    <connect body1="shank" body2="arm" anchor="0 0 0"/>
+      <weld body1="arm" body2="target" relpose="0 0 0 1 0 0 0"/>
     <tendon tendon1="rope" polycoef="1 0 0 0 0"/>
   </equality>
   <tendon>
@@ -106,12 +114,15 @@ RICH = (
     <fixed name="both"><joint joint="hip" coef="1"/><joint joint="knee" coef="-1"/></fixed>
   </tendon>
   <actuator>
-    <motor name="hip" joint="hip" gear="10" class="leg"/><position name="knee" joint="knee" kp="100" forcerange="-9 9"/>
-    <general name="arm" joint="arm" dyntype="filter" dynprm="0.1" gainprm="3" biastype="affine" biasprm="0 -3 0"/>
+    <motor name="hip" joint="hip" gear="10" class="leg"/>
+      <position name="knee" joint="knee" kp="100" forcerange="-9 9"/>
+    <general name="arm" joint="arm" dyntype="filter" dynprm="0.1" gainprm="3" biastype="affine"
+      biasprm="0 -3 0"/>
     <velocity tendon="both" kv="2"/><muscle tendon="rope" lengthrange="0.1 1"/>
     <motor joint="arm" nsample="4" delay="0.01"/>
   </actuator>
-  <sensor><jointpos joint="hip"/><framepos objtype="site" objname="foot"/><user dim="3"/><touch site="foot"/></sensor>
+  <sensor><jointpos joint="hip"/><framepos objtype="site" objname="foot"/><user dim="3"/>
+    <touch site="foot"/></sensor>
   <keyframe><key name="home" qpos="0 0 1 0 0 0 0 0"/></keyframe>
   <custom><numeric name="speed_limit:hip" data="3"/><text name="note" data="hello"/>
     <tuple name="pair"><element objtype="body" objname="trunk"/></tuple></custom>

@@ -327,7 +327,8 @@ def test_spoilt_files(name: str, ending: str, tmp_path: Path) -> None:
         assert seconds < LONGEST, case
         refused += robot is None
         if slip in MALICE:
-            assert robot is None or (slip is hostile_path and said), case
+            left_out = slip is hostile_path and robot is not None and (said or same(robot, sound))
+            assert robot is None or left_out, case
         if robot is None:
             continue
         assert robot.total_mass > 0.0, case

@@ -22,6 +22,9 @@ know have 200 kB."""
 DEEPEST_INCLUDE = 20
 """Most files that include one another in a chain."""
 
+MOST_FILES = 500
+"""Most files that a robot is made of, each counted as often as it is included."""
+
 
 @dataclass
 class Reading:
@@ -31,13 +34,14 @@ class Reading:
     ----------
     label : str
         What to call the main file in messages.
-    characters, elements : int
+    files, characters, elements : int
         How much has been read, repetitions included.
     models : dict of str to Node
         The other models (``<asset><model>``) of the robot, by names for the parser's eyes.
     """
 
     label: str
+    files: int = 0
     characters: int = 0
     elements: int = 0
     models: dict[str, Node] = field(default_factory=dict)
@@ -146,6 +150,12 @@ def _below(path: Path, label: str, where: str, place: Place, reading: Reading) -
         raise RobotError(
             f"{reading.label}: more than {DEEPEST_INCLUDE} files include one another in a chain, "
             f"the last of them {path.name}, which no robot needs. Join some of them."
+        )
+    reading.files += 1
+    if reading.files > MOST_FILES:
+        raise RobotError(
+            f"{reading.label}: it is made of more than {MOST_FILES} files, repetitions included, "
+            "which no robot needs. Join some of them."
         )
     below = Place(place.main, path.parent, (*place.above, here))
     return _tree(_read(path, label), label, below, reading)

@@ -56,8 +56,13 @@ def leave_mechanics(root: Element, tags: set[str], names: set[str]) -> bool:
     if "muscle" in tags or not _ACTUATOR_LAWS.isdisjoint(names):
         changed |= _skip_muscles(root)
     if "numeric" in tags:
-        for numeric in root.iter("numeric"):
-            changed |= numeric.attrib.pop("size", None) is not None
+        for custom in root.iter("custom"):
+            for numeric in custom.findall("numeric"):
+                if numeric.get("data"):
+                    changed |= numeric.attrib.pop("size", None) is not None
+                else:  # an empty place for so many numbers
+                    custom.remove(numeric)
+                    changed = True
     return changed
 
 
