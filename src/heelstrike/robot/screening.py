@@ -21,8 +21,8 @@ from heelstrike.robot.mesh_files import name_mesh_files
 from heelstrike.robot.xml_tree import DEEPEST, MOST_ELEMENTS, Node, xml_text
 
 MOST_BODIES = 4000
-"""Most bodies, classes and copies that a robot file may come to; MuJoCo's time grows with their
-square."""
+"""Most bodies that a robot file may come to, copies included. Classes count as bodies, and what
+takes a parser longer (meshes, replicas, joined models) as eight."""
 
 LARGEST_SIZE = 10_000
 """Largest number in ``<size>``, and of rows, columns and pixels of height fields and textures."""
@@ -41,14 +41,18 @@ LONGEST_NUMBERS = 100_000
 
 _CELLS = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}
 _SIZED = {**_CELLS, "general": ("actdim",), "numeric": ("size",), "mesh": ("params",)}
-_LARGEST = {"mesh": 200.0}  # corners around a mesh that MuJoCo makes itself
+_LARGEST = {"mesh": 100.0}  # corners around a mesh that MuJoCo makes itself
 _MAY_BE_LARGE = ("nstack", "njmax", "nconmax")
 _UNITS = {letter: 1024.0 ** (power + 1) for power, letter in enumerate("KMGTPE")}
 _MAY_BE_ENDLESS = ("range", "lower", "upper", "effort", "velocity")
 _MULTIPLIERS = ("replicate", "composite", "flexcomp")
-# MuJoCo's time grows with the square of their number.
-_HEAVY = {"body": 1, "link": 1, "default": 1, "replicate": 8, "attach": 8, "model": 8}
-_COPIED = {*_MULTIPLIERS, "attach", "model"}
+# What MuJoCo takes long for; mostly its time grows with the square of their number.
+_HEAVY = {
+    **{"body": 1, "link": 1, "default": 1},
+    **{"replicate": 8, "attach": 8, "model": 8, "mesh": 8},
+}
+_MADE = 200  # what a mesh weighs that MuJoCo makes itself: nobody sees its corners
+_WEIGHED = {*_MULTIPLIERS, "attach", "model", "mesh"}
 # What has brought parsers down: they read files of other formats, or join models.
 _DELICATE = {"mesh", "plugin", "composite", "model", "attach"}
 
@@ -145,7 +149,7 @@ def _screen_tree(
             element.set("file", name)
             changed = True
     weight = _Weight(count, count, DEEPEST)
-    if place.above[1:] or reading.elements or count > MOST_BODIES or not tags.isdisjoint(_COPIED):
+    if place.above[1:] or reading.elements or count > MOST_BODIES or not tags.isdisjoint(_WEIGHED):
         weight = _weigh(root, label, weights)
     changed |= leave_mechanics(root, tags, names)
     if "mesh" in tags and root.tag == "mujoco":
@@ -163,7 +167,7 @@ def _weigh(root: Element, label: str, models: dict[str, _Weight]) -> _Weight:
         element, copies, depth = stack.pop()
         tag = element.tag
         elements += copies
-        bodies += copies * _HEAVY.get(tag, 0)
+        bodies += copies * (_MADE if "builtin" in element.attrib else _HEAVY.get(tag, 0))
         if tag in _MULTIPLIERS:
             copies *= _count(element)
             bodies += copies
@@ -180,7 +184,7 @@ def _weigh(root: Element, label: str, models: dict[str, _Weight]) -> _Weight:
             raise RobotError(
                 f"{label}: line {getattr(element, 'line', 0)}: with <{tag[:60]}> the robot comes "
                 f"to more than {most}, copies included, which no robot needs. Lower the count of "
-                "<replicate>, <composite> and <attach>, or leave parts out."
+                "<replicate>, <composite>, <attach> and <mesh>, or leave parts out."
             )
         if deepest > DEEPEST:
             raise RobotError(

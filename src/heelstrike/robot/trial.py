@@ -18,10 +18,11 @@ import sys
 
 from heelstrike.errors import RobotError
 
-LONGEST = 60.0
-"""Seconds after which a file counts as one that never ends; large meshes take ten."""
+LONGEST = 300.0
+"""Seconds after which a file counts as one that never ends. Large meshes take ten, and a machine may
+be busy."""
 
-_survived: set[bytes] = set()
+_tried: dict[bytes, str] = {}
 
 
 def try_apart(text: str, models: dict[str, bytes], label: str) -> None:
@@ -42,36 +43,37 @@ def try_apart(text: str, models: dict[str, bytes], label: str) -> None:
         If that process crashes or does not end.
     """
     order = json.dumps({"text": text, "models": {k: v.decode() for k, v in models.items()}})
-    digest = hashlib.sha256(order.encode("utf-8", "surrogatepass")).digest()
-    if digest in _survived or not sys.executable:
-        return
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    data = order.encode("utf-8", "surrogatepass")
+    digest = hashlib.sha256(data).digest()
+    if digest not in _tried:
+        _tried[digest] = _trouble(data)
+    if _tried[digest]:
+        raise RobotError(
+            f"{label}: MuJoCo's parser {_tried[digest]}. Look at its meshes (are their files "
+            "whole?), plugins and attached models, or replace the meshes by boxes, capsules and "
+            "spheres."
+        )
+
+
+def _trouble(order: bytes) -> str:
+    """What happens to a process that parses a file, in words; nothing if it ends well."""
+    if not sys.executable:
+        return ""  # Python inside another program, which cannot start another
     try:
         done = subprocess.run(
             [sys.executable, "-P", __file__],
-            input=order.encode("utf-8", "surrogatepass"),
-            env=environment,
+            input=order,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
             timeout=LONGEST,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        raise RobotError(
-            f"{label}: MuJoCo's parser has not finished with this file after {LONGEST:.0f} s. "
-            f"{_MEND}"
-        ) from None
+        return f"has not finished with this file after {LONGEST:.0f} s"
     except OSError:
-        return  # a system without processes
-    if done.returncode != 0:
-        raise RobotError(f"{label}: MuJoCo's parser crashes on this file. {_MEND}")
-    _survived.add(digest)
-
-
-_MEND = (
-    "Look at its meshes (are their files whole?), plugins and attached models, or replace the "
-    "meshes by boxes, capsules and spheres."
-)
+        return ""  # a system without processes
+    return "crashes on this file" if done.returncode else ""
 
 
 def _try(text: str, models: dict[str, bytes]) -> None:
