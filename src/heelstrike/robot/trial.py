@@ -19,8 +19,8 @@ import sys
 from heelstrike.errors import RobotError
 
 LONGEST = 300.0
-"""Seconds after which a file counts as one that never ends. Large meshes take ten, and a machine may
-be busy."""
+"""Seconds after which a file counts as one that never ends. Large meshes take ten, on a machine
+that does nothing else."""
 
 _tried: dict[bytes, str] = {}
 
