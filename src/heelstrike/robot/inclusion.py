@@ -58,7 +58,7 @@ class Place:
     own : Path
         Folder of the file itself.
     above : tuple of Path
-        The files that are being read, from the main file to this one, resolved.
+        The files that are being read, from the main file to this one.
     """
 
     main: Path
@@ -84,7 +84,7 @@ def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:
         If a file cannot be read, is no robot file, includes itself, or if it is all too much.
     """
     if isinstance(source, Path):
-        place = Place(source.parent, source.parent, (resolved(source),))
+        place = Place(source.parent, source.parent, (source,))
     else:
         place = Place(Path(), Path())
     text = _read(source, reading.label) if isinstance(source, Path) else source
@@ -144,7 +144,7 @@ def _included(include: Element, label: str, place: Place, reading: Reading) -> l
 def _below(path: Path, label: str, where: str, place: Place, reading: Reading) -> Node:
     """Read a file that another one names."""
     here = resolved(path)
-    if here in place.above:
+    if here in map(resolved, place.above):
         raise RobotError(f"{where}: {path.name} includes itself, directly or by others.")
     if len(place.above) > DEEPEST_INCLUDE:
         raise RobotError(
