@@ -58,7 +58,8 @@ class Place:
     own : Path
         Folder of the file itself.
     above : tuple of Path
-        The files that are being read, from the main file to this one.
+        The files that are being read, from the main file to this one; all but the main file by
+        their resolved paths.
     """
 
     main: Path
@@ -144,7 +145,8 @@ def _included(include: Element, label: str, place: Place, reading: Reading) -> l
 def _below(path: Path, label: str, where: str, place: Place, reading: Reading) -> Node:
     """Read a file that another one names."""
     here = resolved(path)
-    if here in map(resolved, place.above):
+    # The main file stands there as it is named: most robots include nothing, and save the detour.
+    if here in place.above or here in map(resolved, place.above[:1]):
         raise RobotError(f"{where}: {path.name} includes itself, directly or by others.")
     if len(place.above) > DEEPEST_INCLUDE:
         raise RobotError(
