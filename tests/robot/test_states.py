@@ -247,7 +247,7 @@ def test_what_is_no_json(robot: Robot, tmp_path: Path, content: bytes, words: st
 def test_where_no_file_can_be(robot: Robot, tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="no such file"):
         robot.load_state(tmp_path / "gone.json")
-    with pytest.raises(RobotError, match="cannot be written"):
+    with pytest.raises(RobotError, match="cannot write"):
         robot.save_state(robot.reference_state(), tmp_path / "no" / "folder" / "s.json")
     with pytest.raises(RobotError):
         robot.load_state("a\0b")

@@ -16,13 +16,14 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.errors import GaitError
+from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait, fingerprint
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.whole_file import write_whole
 
 FORMAT = "heelstrike gait"
 VERSION = 1
@@ -72,7 +73,7 @@ assert set(_MARGINS.values()) == {field.name for field in fields(Margins)}
 
 
 def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
-    """Write a gait to a JSON file."""
+    """Write a gait to a JSON file, which appears whole or not at all."""
     data: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -97,10 +98,9 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
         data |= {key: getattr(gait, name).tolist() for key, name in _PIECES.items()}
     lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     try:
-        Path(path).write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise GaitError(f"{path}: the gait cannot be written: {reason}.") from error
+        write_whole(path, f"{{\n{lines}\n}}\n")
+    except WriteError as error:
+        raise GaitError(str(error)) from error
 
 
 def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from heelstrike.errors import RobotError
+from heelstrike.errors import RobotError, WriteError
 from heelstrike.robot.coordinates import checked
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
+from heelstrike.whole_file import write_whole
 
 if TYPE_CHECKING:
     from heelstrike.robot.robot import Robot
@@ -41,12 +42,10 @@ def save_state(robot: Robot, state: State, path: str | os.PathLike[str]) -> Path
         _VECTORS[0]: state.q.tolist(),
         _VECTORS[1]: state.v.tolist(),
     }
-    file = Path(path)
     try:
-        file.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise RobotError(f"{file}: the state cannot be written: {error}.") from error
-    return file
+        return write_whole(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+    except WriteError as error:
+        raise RobotError(str(error)) from error
 
 
 def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:
