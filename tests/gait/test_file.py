@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from damage import damaged_bytes, damaged_json
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from stored_files import SAVED
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
@@ -192,3 +195,28 @@ def test_mutated_files_load_or_are_refused_in_words(saved: Path, data: st.DataOb
         message = str(path)
         assert np.all(np.isfinite(loaded.coefficients))
     assert str(path) in message
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_damaged_files_are_refused_in_words_or_still_gaits(
+    seed: int, bravo7: hs.Robot, tmp_path: Path
+) -> None:
+    draw = random.Random(seed)
+    damage = damaged_bytes if seed % 2 else damaged_json
+    path = tmp_path / "gait.json"
+    path.write_bytes(damage((SAVED / "gait.json").read_bytes(), draw))
+    for robot in (None, bravo7):
+        try:
+            gait = hs.load_gait(path, robot)
+        except GaitError as error:
+            assert str(path) in str(error)  # noqa: PT017 - it need not be refused
+            assert len(str(error)) < 2000  # noqa: PT017
+        else:
+            gait.save(tmp_path / "again.json")
+
+
+def test_files_of_version_0_1_still_load(bravo7: hs.Robot, tmp_path: Path) -> None:
+    gait = hs.load_gait(SAVED / "gait.json", bravo7)
+    assert (gait.step_length, gait.step_duration) == (0.3, 0.7)
+    gait.save(tmp_path / "again.json")
+    assert (tmp_path / "again.json").read_bytes() == (SAVED / "gait.json").read_bytes()

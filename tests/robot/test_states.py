@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import random
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from damage import damaged_bytes, damaged_json
+from stored_files import SAVED
 
 from heelstrike import dynamics
 from heelstrike.errors import RobotError
-from heelstrike.robot import Robot, State, builtin_robots, load_robot
+from heelstrike.robot import Robot, RobotBuilder, State, builtin_robots, load_robot
 
 
 @pytest.fixture
@@ -205,8 +208,8 @@ def test_joints_of_a_file_are_found_by_name(robot: Robot, tmp_path: Path) -> Non
         ({"version": 2}, "version 2 of the format is not known here, only 1"),
         ({"version": True}, "version True"),
         ({"joints": ["hip"]}, "with the joints hip; robot 'bravo7' has root_x"),
-        ({"joints": None}, "with the joints None"),
-        ({"joints": [["root_x"]]}, "with the joints"),
+        ({"joints": None}, "must be a list of names, got None"),
+        ({"joints": [["root_x"]]}, "must be a list of names"),
         ({"position_rad_or_m": [1.0]}, '"position_rad_or_m" must be a list of 9 finite numbers'),
         ({"velocity_rad_or_m_per_s": ["1"] * 9}, "must be a list of 9 finite numbers"),
         ({"velocity_rad_or_m_per_s": [True] * 9}, "must be a list of 9 finite numbers"),
@@ -251,3 +254,37 @@ def test_where_no_file_can_be(robot: Robot, tmp_path: Path) -> None:
         robot.save_state(robot.reference_state(), tmp_path / "no" / "folder" / "s.json")
     with pytest.raises(RobotError):
         robot.load_state("a\0b")
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_damaged_files_are_refused_in_words_or_still_states(
+    seed: int, robot: Robot, tmp_path: Path
+) -> None:
+    draw = random.Random(seed)
+    damage = damaged_bytes if seed % 2 else damaged_json
+    path = tmp_path / "state.json"
+    path.write_bytes(damage((SAVED / "state.json").read_bytes(), draw))
+    try:
+        state = robot.load_state(path)
+    except RobotError as error:
+        assert str(path) in str(error)  # noqa: PT017 - it need not be refused
+        assert len(str(error)) < 2000  # noqa: PT017
+    else:
+        assert np.all(np.isfinite((*state.q, *state.v)))
+
+
+def test_joints_that_only_look_like_the_names(tmp_path: Path) -> None:
+    builder = RobotBuilder("numbered")
+    builder.hinge("1", None, mass=1.0, inertia=0.1)
+    robot = builder.build()
+    path = robot.save_state(robot.reference_state(), tmp_path / "s.json")
+    path.write_text(path.read_text().replace('"1"', "1"))
+    with pytest.raises(RobotError, match="must be a list of names"):
+        robot.load_state(path)
+
+
+def test_files_of_version_0_1_still_load(robot: Robot) -> None:
+    state = robot.load_state(SAVED / "state.json")
+    expected = robot.reference_state()
+    expected.q[1] += 2e-3
+    np.testing.assert_array_equal(state.q, expected.q)

@@ -19,7 +19,8 @@ from synthetic_runs import box, make_run, pendulum
 import heelstrike as hs
 from heelstrike.robot import Robot, read_mjcf
 from heelstrike.sim import Event, EventKind, RunStatus, Scheme
-from heelstrike.sim.dataset import load_run, save, to_dataset
+from heelstrike.sim.dataset import to_dataset
+from heelstrike.sim.run_file import load_run, save
 
 
 def same(a: Any, b: Any) -> bool:
@@ -339,7 +340,7 @@ def test_a_failed_write_leaves_the_old_file(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(xarray.Dataset, "to_netcdf", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(hs.RunFileError, match="No space left"):
         walking.walk(steps=2).save(path)
     assert path.read_bytes() == before

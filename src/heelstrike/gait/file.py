@@ -171,8 +171,8 @@ class _Reader:
             raise self.error(f'not a gait file: it must be a JSON object with "format": "{FORMAT}"')
         if data.get("version") != VERSION or isinstance(data["version"], bool):
             raise self.error(
-                f"version {data.get('version')!r} of the format is not known here, only {VERSION}; "
-                "was it written by a newer heelstrike?"
+                f"version {_shown(data.get('version'))} of the format is not known here, only "
+                f"{VERSION}; was it written by a newer heelstrike?"
             )
         self.data = data
 
@@ -299,8 +299,8 @@ def _shown(value: Any) -> str:
 def _check_robot(gait: Gait, robot: Robot, path: Path) -> None:
     if gait.robot != robot.name:
         raise GaitError(
-            f"{path}: is a gait of robot {gait.robot!r}, not of {robot.name!r}. Load that robot, "
-            "or design a gait for this one with optimize_gait."
+            f"{path}: is a gait of robot {_shown(gait.robot)}, not of {robot.name!r}. Load that "
+            "robot, or design a gait for this one with optimize_gait."
         )
     try:
         gait.check_joints(robot)

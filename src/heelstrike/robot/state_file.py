@@ -58,19 +58,25 @@ def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:
         )
     if data.get("version") != VERSION or isinstance(data["version"], bool):
         raise RobotError(
-            f"{file}: version {data.get('version')!r} of the format is not known here, only "
-            f"{VERSION}; was it written by a newer heelstrike?"
+            f"{file}: version {_shown(repr(data.get('version')))} of the format is not known here, "
+            f"only {VERSION}; was it written by a newer heelstrike?"
         )
     joints = data.get("joints")
-    if not isinstance(joints, list) or sorted(map(str, joints)) != sorted(robot.joint_names):
-        has = ", ".join(map(str, joints)) if isinstance(joints, list) else repr(joints)
+    if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
+        raise RobotError(f'{file}: "joints" must be a list of names, got {_shown(repr(joints))}.')
+    if sorted(joints) != sorted(robot.joint_names):
+        has = ", ".join(joints)
         raise RobotError(
-            f"{file}: this is a state of robot {data.get('robot')!r} with the joints {has}; robot "
-            f"{robot.name!r} has {', '.join(robot.joint_names)}."
+            f"{file}: this is a state of robot {_shown(repr(data.get('robot')))} with the joints "
+            f"{_shown(has)}; robot {robot.name!r} has {', '.join(robot.joint_names)}."
         )
     order = [joints.index(name) for name in robot.joint_names]
     q, v = (_numbers(file, data, key, len(joints))[order] for key in _VECTORS)
     return State(q, v)
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= 300 else text[:297] + "…"
 
 
 def _numbers(file: Path, data: dict[str, Any], key: str, size: int) -> Floats:

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Contents = dict[str, NDArray[Any]]
-"""Arrays by their path, such as ``/robot/mass``; attributes by their group's, ``/robot/@name``. are float64 or int64, texts are arrays of str; an attribute has no dimensions."""
+"""Arrays by their path, such as ``/robot/mass``, and attributes, without dimensions, by
+theirs, ``/robot/@name``. Numbers are float64 or int64, texts str."""
 
 # zlib shrinks a thousandfold at best.
 LARGEST_RATIO = 1100
@@ -108,7 +109,7 @@ def _attribute(attributes: Any, name: str) -> NDArray[Any] | None:
     import h5py
 
     kept = attributes.get_id(name)
-    if math.prod(kept.shape) != 1:
+    if kept.shape is None or math.prod(kept.shape) != 1:  # nothing at all, or a list
         return None
     if h5py.check_string_dtype(kept.dtype) is None and kept.dtype.kind not in "fiu":
         return None

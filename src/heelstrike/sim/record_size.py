@@ -134,7 +134,7 @@ def check_runs(robot: Robot, rows: int, record_every: int) -> None:
 def row_size(robot: Robot) -> int:
     """Bytes of one row of the record."""
     row = allocate_record(robot, 1, 0).members()
-    return sum(array.nbytes for name, array in row.items() if name != "row_count")
+    return sum(array.nbytes for name, array in row.items() if not name.endswith("_count"))
 
 
 def room() -> int:
@@ -146,9 +146,10 @@ def room() -> int:
 
 
 def machine_memory() -> int:
-    """Bytes of memory that this machine, or the container on it, has; what can be addressed at most.
+    """Bytes of memory that this machine, or the container on it, has.
 
-    All of it, used or not: whether a run may begin shall not hang on what else is running.
+    All of it, used or not: whether a run may begin shall not hang on what else is running. Where
+    nobody tells, as much as can be addressed.
     """
     sizes = [sys.maxsize]
     with contextlib.suppress(AttributeError, ValueError, OSError):

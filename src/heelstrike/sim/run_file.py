@@ -130,6 +130,8 @@ def load_run(path: str | os.PathLike[str], robot: Robot | None = None) -> Run:
         if not source.is_file():
             raise RunFileError(f"{source}: not a run of heelstrike: it is not a regular file")
         found = _contents(source)
+    except RunFileError:
+        raise
     except PermissionError as error:
         raise RunFileError(f"{source}: no permission to read it") from error
     except (OSError, ValueError) as error:  # also a path with a null character
