@@ -59,7 +59,7 @@ def same_arrays(one: hs.Run, other: hs.Run) -> list[str]:
 @pytest.mark.parametrize("name", METHODS)
 def test_every_method_comes_back(name: str, tmp_path: Path) -> None:
     """A box that drops onto a slope and slides: arrays equal bit by bit, everything else equal."""
-    robot = box(0.06)
+    robot = box(0.063)
     run = hs.simulate(
         robot,
         state=hs.State(robot.model.reference, [0.3, 0.0, 0.2]),

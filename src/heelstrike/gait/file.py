@@ -21,6 +21,8 @@ from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait, fingerprint
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.piecewise import PiecewiseGait
+from heelstrike.json_checksum import KEY as CHECKSUM
+from heelstrike.json_checksum import is_changed, with_checksum
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
@@ -96,6 +98,7 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     }
     if isinstance(gait, PiecewiseGait):
         data |= {key: getattr(gait, name).tolist() for key, name in _PIECES.items()}
+    data = with_checksum(data)
     lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     try:
         write_whole(path, f"{{\n{lines}\n}}\n")
@@ -121,14 +124,19 @@ def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
     Raises
     ------
     GaitError
-        If there is no such file, it is not a gait, its numbers are missing, of the wrong number or
-        not finite, or the gait belongs to another robot.
+        If there is no such file, it is not a gait, its numbers are missing, of the wrong number,
+        not finite or not those that were saved, or the gait belongs to another robot.
     """
     path = Path(path)
     reader = _Reader(path, _parsed(path))
     gait = reader.gait()
     if robot is not None:
         _check_robot(gait, robot, path)
+    if is_changed(reader.data):
+        raise GaitError(
+            f"{path}: damaged: its numbers are not those that were saved. If you changed them, "
+            f'remove the entry "{CHECKSUM}".'
+        )
     return gait
 
 

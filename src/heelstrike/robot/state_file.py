@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from heelstrike.errors import RobotError, WriteError
+from heelstrike.json_checksum import KEY as CHECKSUM
+from heelstrike.json_checksum import is_changed, with_checksum
 from heelstrike.robot.coordinates import checked
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
@@ -43,7 +45,8 @@ def save_state(robot: Robot, state: State, path: str | os.PathLike[str]) -> Path
         _VECTORS[1]: state.v.tolist(),
     }
     try:
-        return write_whole(path, json.dumps(data, indent=2, ensure_ascii=False) + "\n")
+        text = json.dumps(with_checksum(data), indent=2, ensure_ascii=False)
+        return write_whole(path, text + "\n")
     except WriteError as error:
         raise RobotError(str(error)) from error
 
@@ -72,6 +75,11 @@ def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:
         )
     order = [joints.index(name) for name in robot.joint_names]
     q, v = (_numbers(file, data, key, len(joints))[order] for key in _VECTORS)
+    if is_changed(data):
+        raise RobotError(
+            f"{file}: damaged: its numbers are not those that were saved. If you changed them, "
+            f'remove the entry "{CHECKSUM}".'
+        )
     return State(q, v)
 
 

@@ -153,8 +153,9 @@ def contents_of_stranger(path: Path, groups: tuple[str, ...]) -> Contents:
     HostileFileError
         Whatever happens to the other process.
     """
-    if not sys.executable or not Path(__file__).is_file():
-        return contents(path, groups)  # frozen into a program: there is no Python to start
+    frozen = getattr(sys, "frozen", False)  # as an application, which is not a Python to start
+    if frozen or not sys.executable or not Path(__file__).is_file():
+        return contents(path, groups)
     patience = PATIENCE * (1.0 + path.stat().st_size / PATIENCE_BYTES)
     try:
         done = subprocess.run(
