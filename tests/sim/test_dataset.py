@@ -247,7 +247,7 @@ def _last_set(value: float) -> Any:
     [
         (None, _drop("torque"), "'torque' is missing"),
         (None, _drop("ground_friction"), "'ground_friction' is missing"),
-        (None, _replaced("gap", lambda v: v.astype(str)), "not numbers"),
+        (None, _replaced("gap", lambda v: v.astype(str)), "holds no numbers"),
         (None, lambda d: d.drop_dims("contact"), "'contact_point' is missing"),
         (None, lambda d: d.isel(coordinate=slice(0, 4)), "has shape 51 × 4 instead of 51 × 9"),
         (None, _replaced("ground_friction", lambda v: v - 9.0), "friction"),

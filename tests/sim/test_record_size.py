@@ -32,6 +32,7 @@ SMALL = 60_000
 @pytest.fixture
 def small_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(record_size, "machine_memory", lambda: SMALL / record_size.SHARE)
+    monkeypatch.setattr(record_size, "FEW_ROWS", 0)
     monkeypatch.setattr(record_size, "ALWAYS_THERE", 0)
     monkeypatch.setattr(record_size, "BESIDE", 4)
 
@@ -116,6 +117,8 @@ def test_runs_of_a_batch_share_the_memory() -> None:
     batch = hs.simulate_batch(robot, duration=durations, record_every=every, **options)
     size = record_size.row_size(robot)
     assert sum(len(batch.run(i).time) for i in range(6)) * size <= SMALL
+    with pytest.raises(hs.SimulationError, match="fewer runs at once"):
+        hs.simulate_batch(robot, duration=np.full(60, 0.05), record_every=50, **options)
 
 
 def test_the_size_of_a_row_is_that_of_a_run() -> None:

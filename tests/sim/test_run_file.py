@@ -187,6 +187,14 @@ def test_one_flipped_bit_in_the_numbers(sealed: Path, tmp_path: Path) -> None:
         load_run(path)
 
 
+@pytest.mark.parametrize("missing", [1, LENGTH // 2, LENGTH - 20])
+def test_a_seal_that_is_cut_short(sealed: Path, missing: int, tmp_path: Path) -> None:
+    path = tmp_path / "cut.nc"
+    path.write_bytes(sealed.read_bytes()[:-missing])
+    with pytest.raises(hs.RunFileError, match=r"cut\.nc: damaged"):
+        load_run(path)
+
+
 def test_damage_where_there_is_no_checksum(unsealed: Path, tmp_path: Path) -> None:
     content = unsealed.read_bytes()
     path = tmp_path / "damaged.nc"

@@ -271,7 +271,7 @@ def simulate_batch(
             else:
                 rows += each.new_engine(loops[0].memory).rows_left
     if record_every is not None:
-        check_runs(entries["robot"][0], rows, record_every)
+        check_runs(entries["robot"][0], rows, count, record_every)
     compile_s = loops[0].engine.compile_s
     crew = _Crew(loops, controller_of, recorded=record_every is not None)
     del loops, each  # the crew lets go of each when it is finished

@@ -20,8 +20,9 @@ MOST_STEPS = 2**53
 """Steps are counted, and times are whole multiples of a step, as long as they are exact."""
 SHARE = 0.75
 """Part of the machine's memory that a record may take: the rest is the system's and ours."""
+FEW_ROWS = 1024
 ALWAYS_THERE = 2**28
-"""Bytes for which nobody is asked."""
+"""Rows, and bytes, for which nobody is asked."""
 BESIDE = 128
 """Rows besides those of the period: the first, the last, some of events."""
 
@@ -76,7 +77,7 @@ def check_room(setting: Setting, name: str, period: float) -> None:
     name : str
         What `period` is called where the user gave it.
     period : float
-        Seconds between two rows, times `record_every`.
+        Seconds between two rows if `record_every` were one.
 
     Raises
     ------
@@ -85,6 +86,8 @@ def check_room(setting: Setting, name: str, period: float) -> None:
     """
     periods = setting.duration / period
     rows = periods / setting.record_every + BESIDE
+    if rows <= FEW_ROWS:
+        return
     size = row_size(setting.robot)
     # At the end the pieces of the record are joined: every row is there twice.
     if 2.0 * rows * size <= ALWAYS_THERE:
@@ -100,15 +103,15 @@ def check_room(setting: Setting, name: str, period: float) -> None:
     )
 
 
-def check_runs(robot: Robot, rows: int, record_every: int) -> None:
+def check_runs(robot: Robot, rows: int, runs: int, record_every: int) -> None:
     """Refuse several recorded runs that do not fit into memory together.
 
     Parameters
     ----------
     robot : Robot
         A robot of the size of all.
-    rows : int
-        Rows of all runs.
+    rows, runs : int
+        Rows of all runs, and how many runs there are.
     record_every : int
         Steps between two rows.
 
@@ -123,11 +126,19 @@ def check_runs(robot: Robot, rows: int, record_every: int) -> None:
     available = room()
     if rows * size <= available:
         return
-    enough = _rounded_up(record_every * rows * size / (0.5 * available))
-    raise SimulationError(
+    words = (
         f"the records of all runs do not fit into memory: {_count(rows)} rows of {size} bytes, "
-        f"{_gigabytes(rows * size)}, where records may take {_gigabytes(available)}. They fit with "
-        f"record_every={enough:.0f}, fewer runs at once, or final states only (record_every=None)"
+        f"{_gigabytes(rows * size)}, where records may take {_gigabytes(available)}"
+    )
+    spare = available / size - BESIDE * runs
+    if spare < 1.0:
+        raise SimulationError(
+            f"{words}. Simulate fewer runs at once, or keep final states only (record_every=None)"
+        )
+    enough = _rounded_up(record_every * rows / spare)
+    raise SimulationError(
+        f"{words}. They fit with record_every={enough:.0f}; or keep final states only "
+        "(record_every=None)"
     )
 
 

@@ -6,6 +6,7 @@ import hashlib
 from pathlib import Path
 
 _MARK = b"\nheelstrike run, sha256 of all before this line: "
+_BEGINNING = _MARK[:12]
 _DIGITS = 64
 LENGTH = len(_MARK) + _DIGITS + 1
 """Bytes that a seal takes."""
@@ -19,7 +20,7 @@ def seal(content: bytes | memoryview) -> bytes:
 
 
 def seal_holds(path: Path) -> bool | None:
-    """Tell whether a file is as it was sealed; None if it has no seal.
+    """Tell whether a file is as it was sealed; None if it has no seal, not even a piece of one.
 
     Raises
     ------
@@ -34,7 +35,7 @@ def seal_holds(path: Path) -> bool | None:
         file.seek(rest)
         found = file.read()
         if not found.startswith(_MARK):
-            return None
+            return False if _BEGINNING in found else None
         file.seek(0)
         while rest > 0 and (block := file.read(min(rest, _BLOCK))):
             digest.update(block)
