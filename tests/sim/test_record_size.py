@@ -118,7 +118,7 @@ def test_runs_of_a_batch_share_the_memory() -> None:
     size = record_size.row_size(robot)
     assert sum(len(batch.run(i).time) for i in range(6)) * size <= SMALL
     with pytest.raises(hs.SimulationError, match="fewer runs at once"):
-        hs.simulate_batch(robot, duration=np.full(60, 0.05), record_every=50, **options)
+        hs.simulate_batch(robot, duration=np.full(300, 0.05), record_every=50, **options)
 
 
 def test_the_size_of_a_row_is_that_of_a_run() -> None:
