@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
     from heelstrike.errors import ViewError as ViewError
+    from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PiecewiseGait as PiecewiseGait
@@ -108,6 +109,7 @@ _HOME = {
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "ViewError": "heelstrike.errors",
+    "WriteError": "heelstrike.errors",
     "builtin_robots": "heelstrike.robot",
     "compare": "heelstrike.experiments.comparison",
     "contact_forward_dynamics": "heelstrike.contact",

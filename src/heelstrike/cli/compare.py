@@ -68,6 +68,7 @@ def compare(
     from heelstrike.experiments.comparison import compare as compare_methods
     from heelstrike.experiments.walk import typical_step
     from heelstrike.view.style import save_figure
+    from heelstrike.whole_file import write_whole
 
     loaded = hs.load_robot(robot)
     ways = method or ALL
@@ -99,7 +100,7 @@ def compare(
             ground=ground,
         )
     out.mkdir(parents=True, exist_ok=True)
-    (out / "compare.json").write_text(json.dumps(comparison.to_dict(), indent=2) + "\n")
+    write_whole(out / "compare.json", json.dumps(comparison.to_dict(), indent=2) + "\n")
     if as_json:
         typer.echo(json.dumps(comparison.to_dict(), indent=2))
     else:

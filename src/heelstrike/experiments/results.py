@@ -13,6 +13,7 @@ from pathlib import Path
 from heelstrike.gait import Gait
 from heelstrike.sim import Run
 from heelstrike.view.figures import FIGURES
+from heelstrike.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -87,9 +88,7 @@ class Results:
         """
         tasks: dict[str, Callable[[Path], object]] = {
             "run.nc": run.save,
-            "summary.json": lambda path: path.write_text(
-                run.summary(gait=gait).to_json() + "\n", encoding="utf-8"
-            ),
+            "summary.json": lambda path: write_whole(path, run.summary(gait=gait).to_json() + "\n"),
         }
         for figure in FIGURES:
             tasks[f"{figure}.png"] = _drawing(run, gait, figure)

@@ -36,6 +36,7 @@ from heelstrike.sim.memory import (
     allocate_memory,
 )
 from heelstrike.sim.push import Push, pushes_on
+from heelstrike.sim.record_size import check_runs
 from heelstrike.sim.run import Run, Timing
 from heelstrike.sim.simulation import Loop, compiled_form, prepared
 from heelstrike.sim.status import EventKind, RunStatus
@@ -261,12 +262,16 @@ def simulate_batch(
     _check_parameters(compiled, entries["parameters"])
     loops = [loop(index) for index in range(count)]
     # What only the method can refuse (and compiling) comes before the first run, too.
+    rows = 0
     for index, each in enumerate(loops):
         with _naming(index, count):
             if index == 0:
                 each.begin()
+                rows += each.engine.rows_left
             else:
-                each.new_engine(loops[0].memory)
+                rows += each.new_engine(loops[0].memory).rows_left
+    if record_every is not None:
+        check_runs(entries["robot"][0], rows, count, record_every)
     compile_s = loops[0].engine.compile_s
     crew = _Crew(loops, controller_of, recorded=record_every is not None)
     del loops, each  # the crew lets go of each when it is finished

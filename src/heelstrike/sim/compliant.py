@@ -71,6 +71,7 @@ from heelstrike.sim.memory import (
     allocate_record,
 )
 from heelstrike.sim.push import share_over_step
+from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import (
     JOINT_STOP,
     LIFTOFF,
@@ -183,7 +184,8 @@ class Compliant:
         Raises
         ------
         SimulationError
-            If the ground has a restitution of its own.
+            If the ground has a restitution of its own; if steps or rows are too many to be counted
+            or kept.
         """
         return _CompliantEngine(self, setting)
 
@@ -537,6 +539,8 @@ class _CompliantEngine:
                 "on compliant ground the restitution follows from the contact law; leave that of "
                 "the ground at zero and use HuntCrossley.from_sink or KelvinVoigt.from_sink"
             )
+        check_steps(setting, "step", method.step)
+        check_room(setting, "step", method.step)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
         self._work = compliant_workspace(setting.robot.nv, setting.robot.nu, setting.robot.nc)

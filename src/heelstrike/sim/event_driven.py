@@ -96,6 +96,7 @@ from heelstrike.sim.memory import (
     allocate_record,
 )
 from heelstrike.sim.push import switch_at
+from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import center_height, limit_torque, sound
 from heelstrike.sim.status import EventKind
 
@@ -203,7 +204,8 @@ class EventDriven:
         Raises
         ------
         SimulationError
-            If the robot begins in the ground, or with a joint beyond its range.
+            If the robot begins in the ground, or with a joint beyond its range; if steps or rows
+            are too many to be counted or kept.
         """
         return _EventDrivenEngine(self, setting)
 
@@ -808,6 +810,14 @@ class _EventDrivenEngine:
     """Event-driven simulation at work."""
 
     def __init__(self, method: EventDriven, setting: Setting) -> None:
+        check_steps(setting, "max_step", method.max_step, recorded=method.output_period is None)
+        if setting.control_period is not None:
+            check_steps(setting, "control_period", setting.control_period, recorded=False)
+        if method.output_period is None:
+            check_room(setting, "max_step", method.max_step)  # and more, if steps get shorter
+        else:
+            check_steps(setting, "output_period", method.output_period)
+            check_room(setting, "output_period", method.output_period)
         _check_start(setting, method.swing_feet_pass)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting

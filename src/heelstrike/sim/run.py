@@ -228,6 +228,6 @@ class Run:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`."""
-        from heelstrike.sim.dataset import save
+        from heelstrike.sim.run_file import save
 
         return save(self, path)

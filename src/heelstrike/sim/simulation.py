@@ -51,6 +51,9 @@ from heelstrike.sim.time_stepping import TimeStepping
 # Rows of one chunk of the record, and steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096
 
+# The loops count in 64 bits.
+MOST_EVERY = 2**62
+
 # A walking robot has fallen when its centre of mass is below this fraction of its first height.
 FALL_FRACTION = 0.5
 
@@ -159,8 +162,8 @@ def prepared(
         raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
     if control_period is not None and not 0.0 < control_period < np.inf:
         raise SimulationError(f"control_period must be a positive number, got {control_period}")
-    if record_every < 1:
-        raise SimulationError(f"record_every must be at least 1, got {record_every}")
+    if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
+        raise SimulationError(f"record_every must be a whole number ≥ 1, got {record_every!r}")
     if stop_when_fallen is None:
         stop_when_fallen = robot.floating and len(robot.feet) > 1
     fallen_height = -np.inf

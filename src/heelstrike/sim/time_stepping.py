@@ -65,6 +65,7 @@ from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, alloca
 from heelstrike.sim.point_contacts import point_velocities
 from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
+from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import (
     center_height,
     limit_torque,
@@ -544,6 +545,8 @@ class _TimeSteppingEngine:
     """Time stepping of one simulation."""
 
     def __init__(self, method: TimeStepping, setting: Setting) -> None:
+        check_steps(setting, "step", method.step)
+        check_room(setting, "step", method.step)
         self._advance, self.compile_s = compiled_advance()
         if method.scheme is not Scheme.MOREAU_JEAN and np.any(setting.ground.restitution > 0.0):
             raise SimulationError(

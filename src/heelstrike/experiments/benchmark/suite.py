@@ -72,11 +72,12 @@ class Benchmark:
         """Write benchmark.json and the figures into a folder; return the files."""
         from heelstrike.experiments.benchmark.figures import draw
         from heelstrike.view.style import save_figure
+        from heelstrike.whole_file import write_whole
 
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         files = [target / "benchmark.json"]
-        files[0].write_text(json.dumps(self.to_dict(), indent=2) + "\n", encoding="utf-8")
+        write_whole(files[0], json.dumps(self.to_dict(), indent=2) + "\n")
         for name, figure in draw(self.parts).items():
             files.append(save_figure(figure, target / f"{name}.png"))
         return files
