@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -58,6 +60,20 @@ def test_the_gait_keeps_its_limits(name: str) -> None:
     assert margins.landing_velocity <= 0.0
     assert margins.touchdown_error <= 1e-8
     assert (why_unstable(gait) is None) == (name in FLAT)
+
+
+def test_the_page_tells_the_steps_and_costs() -> None:
+    """docs/gaits.md says what the optimiser finds, to the digits that it prints."""
+    page = Path(__file__).parents[2] / "docs" / "gaits.md"
+    row = re.compile(r"^\| (\w+)[^|]*\| ([\d.]+) m in ([\d.]+) s \| ([\d.]+) \|", re.MULTILINE)
+    told = {name: numbers for name, *numbers in row.findall(page.read_text(encoding="utf-8"))}
+    assert told.keys() == {"bravo7", *FLAT, *POINTS}
+    for name in (*FLAT, *POINTS):
+        gait = designed(name).gait
+        found = (gait.step_length, gait.step_duration, gait.cost)
+        for number, text in zip(found, told[name], strict=True):
+            digit = 10.0 ** -len(text.partition(".")[2])
+            assert number == pytest.approx(float(text), abs=0.6 * digit), name
 
 
 def walked(name: str, method: Method) -> Summary:
