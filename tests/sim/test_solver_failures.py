@@ -11,8 +11,8 @@ from heelstrike.sim import RunStatus
 
 SOLVERS = ("lemke", "fischer_burmeister", "gauss_seidel")
 
-# Speeds (m/s, rad/s) at which bravo7, its soles on the ground, makes Gauss-Seidel try the same modes
-# again and again. They are found by drawing; within 1e-3 of them it happens as well.
+# Speeds (m/s, rad/s) at which bravo7, its soles on the ground, makes Gauss-Seidel try the same
+# modes again and again. They are found by drawing; within 1e-3 of them it happens as well.
 CIRCLING = [-1.0, -0.6, -1.3, -2.3, -10.0, -10.0, 5.9, -3.9, -3.2]
 
 # A ball on the ground whose joint wants it five centimetres deeper.
