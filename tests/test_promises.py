@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import json
 import re
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import pytest
 import robot_cases
 
 from heelstrike.cli.bench import Part
+from heelstrike.cli.main import app
 from heelstrike.cli.walk import walk
 from heelstrike.robot import builtin_robots
 
@@ -91,12 +93,15 @@ def test_counts_are_those_of_the_tests() -> None:
 
 
 def test_commands_do_what_is_said_of_them() -> None:
+    commands = {command.name or command.callback.__name__ for command in app.registered_commands}
+    named = {word for word in re.findall(r"`heelstrike (\w+)", README) if word.islower()}
+    assert {"walk", "inspect", "paper", "compare", "bench", "robots"} <= named <= commands
     steps = inspect.signature(walk).parameters["steps"].default
     assert f"walks {steps} steps" in README
     parts = re.findall(r"--part (\w+)", README)
     assert parts
     assert set(parts) <= {part.value for part in Part}
-    assert all("heelstrike bench" in named for _, named in MEASURED.values())
+    assert all("heelstrike bench" in place for _, place in MEASURED.values())
 
 
 def test_fifteen_lines_are_fifteen() -> None:
@@ -155,3 +160,9 @@ def test_growth_is_that_of_the_page() -> None:
             if cells[0].isdigit():
                 peers = [float(cell) for cell in cells[2:6] if re.fullmatch(r"[\d.e+]+", cell)]
                 assert min(peers) > float(cells[1])
+
+
+def test_instructions_are_those_that_are_kept() -> None:
+    kept = json.loads((ROOT / "benchmarks" / "instructions.json").read_text(encoding="utf-8"))
+    told = {name: float(count) for name, count in rows(PERFORMANCE, "benchmark: instructions")}
+    assert told == {name: round(n) for name, n in kept["instructions_a_step"].items()}
