@@ -12,15 +12,21 @@ import ast
 import inspect
 import json
 import re
+from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 import robot_cases
 
 from heelstrike.cli.bench import Part
 from heelstrike.cli.main import app
 from heelstrike.cli.walk import walk
-from heelstrike.robot import builtin_robots
+from heelstrike.dynamics.kernels import state_equations
+from heelstrike.dynamics.straight_line import Recording
+from heelstrike.dynamics.tape import ADD, COSINE, DIVIDE, MULTIPLY, NEGATE, READ, SINE, SUBTRACT
+from heelstrike.dynamics.workspace import workspace
+from heelstrike.robot import builtin_robots, load_robot
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -166,3 +172,28 @@ def test_instructions_are_those_that_are_kept() -> None:
     kept = json.loads((ROOT / "benchmarks" / "instructions.json").read_text(encoding="utf-8"))
     told = {name: float(count) for name, count in rows(PERFORMANCE, "benchmark: instructions")}
     assert told == {name: round(n) for name, n in kept["instructions_a_step"].items()}
+
+
+def test_operations_are_those_that_are_recorded() -> None:
+    """What straight-line code of bravo7's equations of motion computes, and reads to do so."""
+    robot = load_robot("bravo7")
+    matrix, vector = np.zeros((robot.nv, robot.nv)), np.zeros(robot.nv)
+    recording = Recording(
+        state_equations,
+        {
+            "model": robot.model, "q": vector, "v": vector, "tree": workspace(robot.nv),
+            "matrix": matrix, "factor": matrix, "bias": vector,
+        },
+        known={"tree.zero": np.zeros(robot.nv, object)},
+    )  # fmt: skip
+    tape = recording.tape.operations
+    operations = [entry for entry in tape if entry[0] != READ]
+    count = Counter(entry[0] for entry in operations)
+    assert count[SINE] == count[COSINE]
+    operands = {place for _, *places in operations for place in places if isinstance(place, int)}
+    read = sum(tape[place][0] == READ for place in operands)
+    assert (
+        f"{len(operations) + read} operations for bravo7: {count[MULTIPLY]} products, "
+        f"{count[ADD] + count[SUBTRACT]} sums and differences, {count[NEGATE]} negations, "
+        f"{count[DIVIDE]} divisions, {count[SINE]} sines and cosines, {read} numbers read"
+    ) in " ".join(PERFORMANCE.split())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -18,18 +17,7 @@ from robot_cases import NAMED, RANDOM, RobotCase
 from heelstrike.compilation import kernel
 from heelstrike.dynamics import machine_code
 from heelstrike.dynamics.straight_line import Recording, add_function, play
-from heelstrike.dynamics.tape import (
-    ADD,
-    COSINE,
-    DIVIDE,
-    MULTIPLY,
-    NEGATE,
-    READ,
-    SINE,
-    SUBTRACT,
-    Tape,
-    Value,
-)
+from heelstrike.dynamics.tape import Tape, Value
 from heelstrike.dynamics.trigonometry import sine_and_cosine
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs, usual_points
@@ -160,29 +148,6 @@ def test_a_tape_tells_a_number_from_the_place_of_a_value() -> None:
     _, second, third = tape.array("x", (3,))
     assert second.place == 1
     assert (third + second).place != (third + 1.0).place
-
-
-def test_the_page_tells_what_bravo7_takes() -> None:
-    """docs/performance.md counts the operations of its equations of motion."""
-    (case,) = [case for case in NAMED if case.name == "bravo7"]
-    names = ("model", "q", "v", "tree", "matrix", "factor", "bias")
-    values = dict(zip(names, arguments(case, 0)[0], strict=True))
-    recording = Recording(KERNELS[0], values, known={"tree.zero": np.zeros(9, object)})
-    operations = [entry for entry in recording.tape.operations if entry[0] != READ]
-    count = Counter(entry[0] for entry in operations)
-    assert count[SINE] == count[COSINE]
-    read = {
-        place
-        for entry in operations
-        for place in entry[1:]
-        if isinstance(place, int) and recording.tape.operations[place][0] == READ
-    }
-    page = (Path(__file__).parents[2] / "docs" / "performance.md").read_text(encoding="utf-8")
-    assert (
-        f"{len(operations) + len(read)} operations for bravo7: {count[MULTIPLY]} products, "
-        f"{count[ADD] + count[SUBTRACT]} sums and differences, {count[NEGATE]} negations, "
-        f"{count[DIVIDE]} divisions, {count[SINE]} sines and cosines, {len(read)} numbers read"
-    ) in " ".join(page.split())
 
 
 @kernel
