@@ -183,7 +183,7 @@ def test_threads_that_ask_at_once_get_one_engine(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The engine holds the code: a second one in its place would free what others are to call."""
-    monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "directories", lambda _: [tmp_path])
     written = []
 
     def write() -> ir.Module:
@@ -198,36 +198,21 @@ def test_threads_that_ask_at_once_get_one_engine(
     assert len(written) == 1
 
 
-def test_spoilt_files_and_no_place_for_files_cost_time_only(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """A file may be cut short by a loss of power; LLVM would crash on it."""
-    monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
-    described = b"test of spoilt files"
-    key = machine_code._key(described, constant)
-    file = machine_code._file(key)
+def test_code_is_kept_for_the_next_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(machine_code, "directories", lambda _: [tmp_path])
 
-    def loaded(number: float) -> float:
-        machine_code._loaded.pop(key, None)
+    def loaded(described: bytes, number: float) -> float:
+        machine_code._loaded.clear()
         (address,) = machine_code.addresses(["constant"], described, lambda: constant(number))
         result = np.zeros(1)
         called(address, result)
         return float(result[0])
 
-    assert loaded(1.0) == 1.0
-    kept = file.read_bytes()
-    assert loaded(2.0) == 1.0  # from the file
-    for spoilt in (b"", kept[: len(kept) // 2], kept[:-1], bytes(len(kept))):
-        file.write_bytes(spoilt)
-        assert loaded(3.0) == 3.0
-        assert len(file.read_bytes()) == len(kept)
-    assert [path.name for path in tmp_path.iterdir()] == [file.name]
-
-    def nowhere() -> Path:
-        raise RuntimeError("no locator available")
-
-    monkeypatch.setattr(machine_code, "cache_directory", nowhere)
-    assert loaded(4.0) == 4.0
+    monkeypatch.setattr(machine_code, "_loaded", {})
+    assert loaded(b"one", 1.0) == 1.0
+    assert loaded(b"one", 2.0) == 1.0  # from the file
+    assert loaded(b"two", 2.0) == 2.0
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_arrays_with_gaps_are_refused() -> None:
