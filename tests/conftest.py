@@ -9,6 +9,8 @@ os.environ["MPLBACKEND"] = "Agg"
 
 from hypothesis import HealthCheck, settings
 
+import heelstrike  # noqa: F401, before NumPy: it may be asked for plain code
+
 # The first example of a property pays for compilation, so time limits mean nothing here.
 settings.register_profile(
     "local", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
