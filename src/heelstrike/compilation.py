@@ -40,10 +40,14 @@ _COMPILER = tuple(
 )
 """What shapes the machine code of every kernel."""
 
+_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
+"""Settings of Numba (``NUMBA_OPT`` and so on) that do so, too."""
+
 
 def made_of(function: Callable[..., Any]) -> str:
     """Return the fingerprint of a kernel and of what compiles it."""
-    return fingerprint(function, *_COMPILER)
+    settings = (str(getattr(numba.config, name, None)) for name in _SETTINGS)
+    return fingerprint(function, *settings, *_COMPILER)
 
 
 class _PackageCache(NullCache):
@@ -54,10 +58,12 @@ class _PackageCache(NullCache):
     comment, and take damaged files for good.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, compiled: Any) -> None:
+        function = compiled.py_func
         source = Path(function.__code__.co_filename)
         self.places = directories(source if source.is_file() else None)
         self._made_of = made_of(function)
+        self._options = sorted(compiled.targetoptions.items())
         self._is_ours = is_ours(function)
         self._name = re.sub("[<>]", "", f"{function.__module__}.{function.__qualname__}")
         self._twin = "" if self._is_ours else _twin_of(function)
@@ -94,7 +100,7 @@ class _PackageCache(NullCache):
 
     def _name_and_key(self, signature: Any, codegen: Any) -> tuple[str, bytes]:
         """Name of the file, which the next version of the kernel takes over, and what it is for."""
-        kind = repr((signature, codegen.magic_tuple(), self._twin))
+        kind = repr((signature, self._options, codegen.magic_tuple(), self._twin))
         place = hashlib.sha256(kind.encode()).hexdigest()[:16]
         name = f"{self._name}.{place}.{sys.implementation.cache_tag}.machine_code"
         return name, hashlib.sha256(f"{self._made_of} {kind}".encode()).digest()
@@ -107,7 +113,7 @@ def _twin_of(function: Any) -> str:
 
 
 def _kept_on_disk(compiled: Any) -> Any:
-    compiled._cache = _PackageCache(compiled.py_func)
+    compiled._cache = _PackageCache(compiled)
     return compiled
 
 
