@@ -194,6 +194,39 @@ def test_code_made_with_other_settings_is_not_taken(tmp_path: Path) -> None:
     assert answer("0", address=True) == "read 0"
 
 
+FACTORY = """
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def scaling(factor):
+    def scale(x):
+        return factor * x
+    return scale
+
+compiled = [compiled_for(types.float64(types.float64), scaling(factor)) for factor in (2.0, 3.0)]
+print([one(1.0) for one in compiled], [sum(one.stats.cache_hits.values()) for one in compiled])
+"""
+
+
+def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path) -> None:
+    """Such as controllers that a function makes, with gains that it has been given."""
+    (tmp_path / "factory.py").write_text(FACTORY)
+
+    def answer() -> str:
+        told = subprocess.run(
+            [sys.executable, "-B", "factory.py"],
+            cwd=tmp_path,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer() == "[2.0, 3.0] [0, 0]"
+    assert answer() == "[2.0, 3.0] [1, 1]"
+
+
 APART = """
 from numba import types
 from heelstrike.separate_kernel import separate_kernel
