@@ -1,8 +1,12 @@
-"""Brute force: every combination of contact modes, each a linear feasibility problem."""
+"""The judge of contact solves: the contact laws in exact arithmetic, and all solutions by force.
+
+Nothing here is shared with the solvers or their certificates.
+"""
 
 from __future__ import annotations
 
 import itertools
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,29 +17,95 @@ Floats = NDArray[np.float64]
 OPEN, STICK, FORWARD, BACKWARD = range(4)
 
 
+def exact_velocity(delassus: Floats, free: Floats, impulse: Floats) -> Floats:
+    """``G impulse + free`` in whole numbers, without any rounding but that of the result."""
+    matrix, matrix_shift = _whole(delassus)
+    vector, vector_shift = _whole(impulse)
+    offset, offset_shift = _whole(free)
+    shift = max(matrix_shift + vector_shift, offset_shift, 0)
+    total = [
+        (
+            sum(a * x for a, x in zip(row, vector, strict=True))
+            << (shift - matrix_shift - vector_shift)
+        )
+        + (b << (shift - offset_shift))
+        for row, b in zip(matrix, offset, strict=True)
+    ]
+    return np.array([entry / (1 << shift) for entry in total])
+
+
+def _whole(values: Floats) -> tuple[Any, int]:
+    """Write numbers as whole ones over a power of two; return them and the exponent."""
+    mantissa, exponent = np.frexp(values)
+    present = exponent[mantissa != 0.0]
+    shift = 53 - int(present.min()) if present.size else 0
+
+    def convert(m: Any, e: Any) -> Any:
+        if np.ndim(m):
+            return [convert(*pair) for pair in zip(m, e, strict=True)]
+        return int(m * 2.0**53) << (int(e) - 53 + shift) if m else 0
+
+    return convert(mantissa, exponent), shift
+
+
+def size_of_data(delassus: Floats, free: Floats) -> float:
+    """Largest free velocity, each over the root of its diagonal entry."""
+    root = np.sqrt(np.diag(delassus))
+    moved = root > 0.0
+    return float(np.max(np.abs(free[moved]) / root[moved], initial=0.0))
+
+
+def effort(delassus: Floats, free: Floats, impulse: Floats) -> float:
+    """Largest sum of |G_ij lambda_j| of a row, in units of the data's velocities."""
+    unit = np.sqrt(np.diag(delassus)) * size_of_data(delassus, free)
+    cancelled = np.abs(delassus) @ np.abs(impulse)
+    return float(np.max(cancelled[unit > 0.0] / unit[unit > 0.0], initial=0.0))
+
+
 def residual(delassus: Floats, free: Floats, friction: Floats, impulse: Floats) -> float:
-    """Largest relative violation of the contact laws, written down a second time and plainly."""
-    velocity = delassus @ impulse + free
-    speed = np.abs(free).max() + np.abs(free) + np.abs(delassus) @ np.abs(impulse)
+    """Largest relative violation of the contact laws, written down a second time and plainly.
+
+    The velocities are exact, and everything is set against the size of the data.
+    """
+    velocity = exact_velocity(delassus, free, impulse)
+    beta = size_of_data(delassus, free)
+    root = np.sqrt(np.diag(delassus))
+
+    def relative(speed: float, row: int) -> float:
+        if speed == 0.0:
+            return 0.0
+        return float(speed / (root[row] * beta)) if root[row] * beta > 0.0 else np.inf * speed
+
     worst = 0.0
     for k, mu in enumerate(friction):
         n, t = 2 * k, 2 * k + 1
-        wn, wt = velocity[n], velocity[t]
+        wn, wt = relative(velocity[n], n), relative(velocity[t], t)
         ln, lt = impulse[n], impulse[t]
-        vn, vt = max(speed[n], 1e-300), max(speed[t], 1e-300)
-        gn, gt = delassus[n, n], delassus[t, t]
-        force = ln * gn / vn if gn > 0 else np.sign(ln)
-        worst = max(worst, -wn / vn, -force, min(wn / vn, force))
-        size = mu * abs(ln) + abs(lt)
-        unit = gt / vt if gt > 0 else (1.0 / size if size > 0 else 0.0)
-        worst = max(worst, (abs(lt) - mu * ln) * unit)
-        lacking = (mu * ln + lt) * unit if wt > 0 else (mu * ln - lt) * unit
-        worst = max(worst, min(abs(wt) / vt, lacking))
+        if root[n] > 0.0:
+            unit = root[n] / beta if beta > 0.0 else np.inf
+            force = ln * unit if ln else 0.0
+        else:
+            unit, force = 0.0, np.sign(ln)
+        worst = max(worst, -wn, -force, min(wn, force))
+        if root[t] > 0.0:
+            unit = root[t] / beta if beta > 0.0 else np.inf
+        elif mu > 0.0 and unit > 0.0:
+            unit /= mu
+        else:
+            size = mu * abs(ln) + abs(lt)
+            unit = 1.0 / size if size > 0 else 0.0
+        excess = abs(lt) - mu * ln
+        worst = max(worst, excess * unit if excess > 0.0 else 0.0)
+        lacking = mu * ln + lt if wt > 0 else mu * ln - lt
+        worst = max(worst, min(abs(wt), lacking * unit) if lacking > 0.0 and wt else 0.0)
     return float(worst)
 
 
 def solutions(delassus: Floats, free: Floats, friction: Floats) -> list[Floats]:
-    """All velocities that solve the problem, one for each that differs from the others."""
+    """All velocities that solve the problem, one for each that differs from the others.
+
+    Every combination of contact modes is a linear feasibility problem.
+    """
     count = friction.size
     diagonal = np.diag(delassus)
     scale = np.where(diagonal > 0, 1.0 / np.sqrt(np.where(diagonal > 0, diagonal, 1.0)), 1.0)

@@ -150,6 +150,67 @@ def random_problem(rng: np.random.Generator, contacts: int | None = None) -> Pro
     )
 
 
+def hard_problem(rng: np.random.Generator, contacts: int | None = None) -> tuple[Problem, Floats]:
+    """Draw a problem that no robot need have; return it and the impulse it was planted from.
+
+    Rows of the Jacobian are random, many depend on others exactly or nearly (down to 1e-8), and are
+    as long as masses 1e8 apart make them. Friction goes up to 1000. Half of the free velocities are
+    planted: made from a solution on edges and corners of the cones, often of impulses that almost
+    cancel. The others are drawn, and the impulse returned is NaN; many of these problems have no
+    solution.
+    """
+    count = int(rng.integers(1, 9)) if contacts is None else contacts
+    rows = 2 * count
+    nv = int(rng.integers(1, rows + 3))
+    J = rng.standard_normal((rows, nv))
+    if rng.random() < 0.5:
+        J *= rng.random((rows, nv)) < 0.6
+    if rng.random() < 0.3:
+        J = np.round(4.0 * J) / 4.0
+    closeness = rng.choice([0.0, 0.0, 1.0, 1.0]) * 10.0 ** rng.uniform(-8.0, 0.0)
+    for row in range(1, rows):
+        if rng.random() < 0.3:
+            other = int(rng.integers(row))
+            J[row] = rng.choice([-1.0, 1.0]) * J[other] + closeness * rng.standard_normal(nv)
+    spread = rng.choice([0.0, 2.0, 4.0])
+    J *= 10.0 ** rng.uniform(-spread, spread, nv)
+    friction = 10.0 ** rng.uniform(-2.0, rng.choice([0.5, 3.0]), count)
+    friction[rng.random(count) < 0.15] = 0.0
+    planted = rng.random() < 0.5
+    impulse = np.full(rows, np.nan)
+    if planted:
+        root = np.sqrt(np.sum(J * J, axis=1))
+        push = np.divide(1.0, root, out=np.ones(rows), where=root > 0.0)
+        velocity = np.zeros(rows)
+        impulse = np.zeros(rows)
+        for k in range(count):
+            n, t = 2 * k, 2 * k + 1
+            if rng.random() < 0.3:
+                velocity[n] = root[n] * rng.random() * (rng.random() < 0.8)
+                velocity[t] = root[t] * rng.standard_normal()
+                continue
+            impulse[n] = push[n] * rng.random() * 10.0 ** rng.uniform(-1.0, 1.0)
+            limit = friction[k] * impulse[n]
+            if rng.random() < 0.4:
+                velocity[t] = root[t] * rng.standard_normal()
+                impulse[t] = -limit * np.sign(velocity[t])
+            else:
+                impulse[t] = limit * (rng.uniform(-1.0, 1.0) if rng.random() < 0.7 else 1.0)
+        if rng.random() < 0.5 and impulse.any():  # almost an internal force
+            rest = 10.0 ** rng.uniform(-10.0, 0.0)
+            J -= (1.0 - rest) * np.outer(impulse, impulse @ J) / (impulse @ impulse)
+            velocity *= rest
+    G = J @ J.T
+    G = 0.5 * (G + G.T)
+    if planted:
+        b = velocity - G @ impulse
+    else:
+        b = J @ rng.standard_normal(nv)
+        if rng.random() < 0.5:
+            b += rng.choice([1e-6, 1e-2, 1.0]) * np.abs(b).max() * rng.standard_normal(rows)
+    return Problem("planted" if planted else "drawn", G, b, friction, J, np.eye(nv)), impulse
+
+
 def _made(rng: np.random.Generator, G: Floats, J: Floats, friction: Floats, v: Floats) -> Floats:
     """Return the free term of a problem whose solution is drawn first, degenerate on purpose."""
     count = friction.size

@@ -132,7 +132,7 @@ def test_counters() -> None:
     assert status == RAY
     assert counters[SOLVES] == 3
     assert counters[FAILURES] == 1
-    assert counters[FALLBACKS] == counters[LAST_FALLBACKS] == 2
+    assert counters[FALLBACKS] == counters[LAST_FALLBACKS] == 3
 
 
 def test_no_solver_left_means_failure_not_zero_force_in_silence() -> None:

@@ -58,7 +58,9 @@ def test_wedge_pushed_apart() -> None:
     assert loose.certificate.valid  # it slips up and out
     jammed = solve_contact(J @ J.T, free, 3.0)
     check_failure(jammed)
-    assert jammed.certificate.status is SolveStatus.RAY
+    # The last digits of sin and cos decide whether 1e16 N s would push the walls apart.
+    assert jammed.certificate.status is SolveStatus.UNDECIDABLE
+    assert "no impulse gives" in jammed.certificate.status.text
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

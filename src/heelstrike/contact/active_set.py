@@ -17,6 +17,8 @@ from heelstrike.contact.least_norm import split
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.pivoting import pivot
 from heelstrike.contact.workspace import (
+    BEFORE,
+    EFFORT,
     EQUATION,
     IMPULSE,
     LEAN,
@@ -25,11 +27,12 @@ from heelstrike.contact.workspace import (
     PIVOT_ROW,
     POINT,
     RESIDUAL,
-    REST_TOLERANCE,
+    REST,
+    ROOT,
+    ROUNDING,
     ROW_LABEL,
     SCALE,
     SETTINGS,
-    SIZE,
     SKEWED,
     SLOPE,
     SOURCE,
@@ -50,7 +53,7 @@ GOOD_PIVOT = 0.03
 """Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
 matrix is stable in any order, and only its rank needs the large pivots first."""
 
-ROUNDING = 2e-15
+SINGULAR = 2e-15
 """Pivots of the unit-diagonal matrix below this are rounding."""
 
 CONSISTENT = 1e-12
@@ -58,6 +61,12 @@ CONSISTENT = 1e-12
 
 SHARP = 1e-13
 """Residuals above this are worth a step of iterative refinement."""
+
+PROMISING = 1e-6
+"""Residuals below this, relative to the velocities that cancel, may be due to rounding."""
+
+REFINEMENTS = 5
+"""Most steps of iterative refinement."""
 
 
 @kernel
@@ -152,9 +161,9 @@ def eliminate(size: int, symmetric: bool, work: ContactWorkspace) -> int:
         for i in range(size):
             if taken[i] == 0:
                 left = max(left, abs(tableau[i, 0]))
-        if smallest == ROUNDING or left <= CONSISTENT * speeds:
+        if smallest == SINGULAR or left <= CONSISTENT * speeds:
             break
-        smallest = ROUNDING
+        smallest = SINGULAR
     for j in range(size):
         point[j] = weight[j] * tableau[pivot_row[j], 0] if pivot_row[j] >= 0 else 0.0
     return nullity
@@ -197,55 +206,75 @@ def evaluate(
 ) -> float:
     """Find the impulse of the modes in ``TRIAL_MODE`` and return its largest residual.
 
-    The impulse, its velocity and residuals are left in the workspace. Where rounding shows, up
-    to two steps of iterative refinement sharpen them.
+    The impulse, its velocity and residuals are left in the workspace. Where rounding shows,
+    iterative refinement sharpens them as long as it helps.
     """
-    equation, pivot_row, source = work.labels[EQUATION], work.labels[PIVOT_ROW], work.labels[SOURCE]
-    point, weight, scale = work.vectors[POINT], work.vectors[WEIGHT], work.vectors[SCALE]
-    impulse, velocity, speed = work.vectors[IMPULSE], work.vectors[VELOCITY], work.vectors[SPEED]
-    lean, tableau = work.vectors[LEAN], work.tableau
+    point, before, lean = work.vectors[POINT], work.vectors[BEFORE], work.vectors[LEAN]
+    settings = work.vectors[SETTINGS]
     size = assemble(count, delassus, friction, work)
-    symmetric = work.vectors[SETTINGS, SKEWED] == 0.0
+    symmetric = settings[SKEWED] == 0.0
     for j in range(size):
         symmetric = symmetric and lean[j] == 0.0
     singular = eliminate(size, symmetric, work) > 0
     held = not symmetric  # whether directions that change a velocity are held back
-    worst = math.inf
-    refinements = 0
-    while True:
-        if singular and refinements == 0:
-            held = split(count, size, held, delassus, friction, work)
-        expand(count, friction, work)
-        worst = certify(
-            count,
-            delassus,
-            free,
-            friction,
-            work.vectors[SLOPE],
-            impulse,
-            velocity,
-            work.vectors[RESIDUAL],
-            work.vectors[SIZE],
-        )
-        if worst < SHARP or refinements == 2:
-            return worst
-        if not worst < 1e-6:
-            if singular and held:
-                # The slip speed is not unique, and what the elimination left it at does not do.
-                held = not held
-                refinements = 0
-                continue
-            return worst
+    if singular:
+        held = split(count, size, held, delassus, friction, work)
+    worst = prove(count, delassus, free, friction, work)
+    if singular and held and not worst < PROMISING * (1.0 + settings[EFFORT]):
+        # The slip speed is not unique, and what the elimination left it at does not do.
+        split(count, size, False, delassus, friction, work)
+        worst = prove(count, delassus, free, friction, work)
+    for _ in range(REFINEMENTS):
+        if worst < max(SHARP, 4.0 * settings[ROUNDING]):
+            break
+        if not worst < PROMISING * (1.0 + settings[EFFORT]):
+            break
         for j in range(size):
-            speed[j] = scale[equation[j]] * velocity[source[equation[j]]]
-        for j in range(size):
-            if pivot_row[j] >= 0:
-                correction = 0.0
-                for k in range(size):
-                    if pivot_row[k] >= 0:
-                        correction -= tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
-                point[j] += weight[j] * correction
-        refinements += 1
+            before[j] = point[j]
+        refine(size, work)
+        sharper = prove(count, delassus, free, friction, work)
+        if not sharper < worst:
+            for j in range(size):
+                point[j] = before[j]
+            return prove(count, delassus, free, friction, work)
+        worst = sharper
+    return worst
+
+
+@kernel
+def prove(
+    count: int, delassus: Floats, free: Floats, friction: Floats, work: ContactWorkspace
+) -> float:
+    """Write ``POINT`` out as an impulse and certify it; return its largest residual."""
+    vectors = work.vectors
+    expand(count, friction, work)
+    return certify(
+        count,
+        delassus,
+        free,
+        friction,
+        vectors[IMPULSE],
+        vectors[VELOCITY],
+        vectors[RESIDUAL],
+        work,
+    )
+
+
+@kernel
+def refine(size: int, work: ContactWorkspace) -> None:
+    """Correct ``POINT`` by what the equations' velocities still lack to zero."""
+    equation, pivot_row, source = work.labels[EQUATION], work.labels[PIVOT_ROW], work.labels[SOURCE]
+    point, weight, scale = work.vectors[POINT], work.vectors[WEIGHT], work.vectors[SCALE]
+    velocity, speed, tableau = work.vectors[VELOCITY], work.vectors[SPEED], work.tableau
+    for j in range(size):
+        speed[j] = scale[equation[j]] * velocity[source[equation[j]]]
+    for j in range(size):
+        if pivot_row[j] >= 0:
+            correction = 0.0
+            for k in range(size):
+                if pivot_row[k] >= 0:
+                    correction -= tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
+            point[j] += weight[j] * correction
 
 
 @kernel
@@ -254,18 +283,19 @@ def label(count: int, velocity: Floats, mode: Integers, work: ContactWorkspace) 
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
     impulse in its cone. Only with all of these admitted is the least-norm split unique. The
-    velocity is judged on the scale that the last certificate left in ``SIZE``.
+    velocity is judged by what the last certificate left in ``REST``.
     """
-    size, tangent = work.vectors[SIZE], work.labels[TANGENT]
+    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
+    tangent = work.labels[TANGENT]
     changed = False
     for contact in range(count):
         row = 2 * contact
         name = STICK
-        if velocity[row] > REST_TOLERANCE * size[row]:
+        if velocity[row] > rest * root[row]:
             name = OPEN
-        elif velocity[row + 1] > REST_TOLERANCE * size[row + 1]:
+        elif velocity[row + 1] > rest * root[row + 1]:
             name = SLIP_FORWARD
-        elif velocity[row + 1] < -REST_TOLERANCE * size[row + 1]:
+        elif velocity[row + 1] < -rest * root[row + 1]:
             name = SLIP_BACKWARD
         if tangent[contact] >= 0:
             changed = changed or name != mode[contact]

@@ -1,13 +1,45 @@
-"""Certificates: what a contact solve is worth, measured on the original data."""
+"""Certificates: what a contact solve is worth, measured on the original data.
+
+The yardstick is the size of the data, never that of the answer: an impulse of 1e16 would prove
+itself. Row i has the weight ``g_i = sqrt(G_ii)``, and the data have the size::
+
+    beta = max_j |b_j| / g_j                [m/s kg^(1/2)]
+
+Velocities count in units of ``g_i beta``, impulses in units of ``beta / g_i``. Multiplying rows of
+the problem by any positive numbers (other units, another normal's length) changes neither. The
+Delassus matrix is positive semidefinite, ``|G_ij| <= g_i g_j``, so that the impulse is summed from
+velocities of at most ``effort = sum_j g_j |lambda_j| / beta`` in these units. Rounding hides
+machine epsilon times that. Where it would show, the velocities are summed again with all rounding
+errors kept, so that the residuals are those of the impulse as it is written down.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from heelstrike.compilation import kernel
+from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.workspace import Floats
+from heelstrike.contact.workspace import (
+    EFFORT,
+    FLOOR,
+    REST,
+    REST_TOLERANCE,
+    ROOT,
+    ROUNDING,
+    SETTINGS,
+    SKEWED,
+    SLOPE,
+    UNIT,
+    ContactWorkspace,
+    Floats,
+)
+
+VISIBLE = 1e-12
+"""Rounding of more than this, relative, is not left in the velocities."""
 
 
 @dataclass(frozen=True)
@@ -15,10 +47,12 @@ class Certificate:
     """The residuals of a contact solve and how it came about.
 
     The residuals are relative and have no unit. The velocity of row i is set against
-    ``v_i = max_j |b_j| + |b_i| + sum_j |G_ij lambda_j|``, the speeds in the problem and the size
-    of the numbers it was summed from, and an impulse against ``v_i / G_ii``, what it takes to
-    make such a velocity. A light body is thus held to the same accuracy as a heavy one beside
-    it, and a residual of 1e-16 is what rounding leaves.
+    ``sqrt(G_ii) beta`` and its impulse against ``beta / sqrt(G_ii)``, where ``beta``, the size of
+    the data, is the largest ``|b_j| / sqrt(G_jj)``, or the floor if that is larger.
+
+    A certificate proves this much: there is an impulse, within the residuals of the reported one,
+    that solves exactly, without any residual, the problem whose free velocities differ from the
+    given ones by at most ``velocity_error``.
 
     Attributes
     ----------
@@ -38,8 +72,13 @@ class Certificate:
         Largest excess of the friction over the cone, or of a normal impulse below zero.
     penetration : float
         Largest negative normal velocity.
+    rounding : float
+        How far the true residuals of the impulse may exceed these.
     tolerance : float
-        What the residuals had to meet.
+        What the residuals, rounding included, had to meet.
+    velocity_error : (nc, 2) float
+        How far the contact velocities may be from a solution's, in the unit of the free velocity
+        (m/s, or m/s²): the bound above, for each row.
     """
 
     status: SolveStatus
@@ -49,7 +88,9 @@ class Certificate:
     complementarity: float
     cone: float
     penetration: float
+    rounding: float
     tolerance: float
+    velocity_error: Floats = field(compare=False, repr=False)
 
     @property
     def valid(self) -> bool:
@@ -58,8 +99,8 @@ class Certificate:
 
     @property
     def worst(self) -> float:
-        """Return the largest residual."""
-        return max(self.complementarity, self.cone, self.penetration)
+        """Return the largest residual, rounding included."""
+        return max(self.complementarity, self.cone, self.penetration) + self.rounding
 
     def __str__(self) -> str:
         return (
@@ -75,86 +116,193 @@ def certify(
     delassus: Floats,
     free: Floats,
     friction: Floats,
-    slope: Floats,
     impulse: Floats,
     velocity: Floats,
     residual: Floats,
-    size: Floats,
+    work: ContactWorkspace,
 ) -> float:
     """Compute the velocity an impulse gives and the residuals; return the largest of them.
 
-    The residuals are complementarity, cone and penetration, scaled as in :class:`Certificate`;
-    ``size`` receives the scale of each velocity. ``slope`` is not zero where a contact is
-    prescribed to slide; its friction then lies on the given edge and its tangential velocity is
-    not constrained.
+    The residuals are complementarity, cone and penetration, scaled as in :class:`Certificate`. What
+    is returned includes rounding. ``SLOPE`` is not zero where a contact is prescribed to slide; its
+    friction then lies on the given edge and its tangential velocity is not constrained.
+
+    Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` of every row, ``ROUNDING``,
+    ``EFFORT``, ``UNIT`` and ``REST``.
     """
+    settings, root, slope = work.vectors[SETTINGS], work.vectors[ROOT], work.vectors[SLOPE]
+    unit = weigh(count, delassus, free, impulse, work)
+    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + settings[EFFORT])
+    if rounding <= VISIBLE and settings[SKEWED] == 0.0:
+        sum_velocities(count, delassus, free, impulse, velocity)
+    else:
+        rounding = sum_velocities_sharply(count, delassus, free, impulse, velocity, unit, work)
+    settings[ROUNDING] = rounding
+    settings[UNIT] = unit
+    settings[REST] = REST_TOLERANCE * unit * (1.0 + settings[EFFORT])
+    inverse = 1.0 / unit if unit > 0.0 else 0.0
+
     complementarity = 0.0
     cone = 0.0
-    penetration = 0.0
-    speeds = 0.0
-    for i in range(2 * count):
-        speeds = max(speeds, abs(free[i]))
+    # Impulses without any cause in the data; NaN or infinite.
+    penetration = 0.0 if settings[EFFORT] + rounding < math.inf else math.inf
     for contact in range(count):
-        row = 2 * contact
-        normal_velocity = free[row]
-        tangent_velocity = free[row + 1]
-        normal_size = speeds + abs(normal_velocity)
-        tangent_size = speeds + abs(tangent_velocity)
-        # Friction is summed apart from the normal impulses: the sums run side by side.
-        normal_friction = 0.0
-        tangent_friction = 0.0
-        normal_part = 0.0
-        tangent_part = 0.0
-        for other in range(count):
-            column = 2 * other
-            part = delassus[row, column] * impulse[column]
-            normal_velocity += part
-            normal_size += abs(part)
-            part = delassus[row, column + 1] * impulse[column + 1]
-            normal_friction += part
-            normal_part += abs(part)
-            part = delassus[row + 1, column] * impulse[column]
-            tangent_velocity += part
-            tangent_size += abs(part)
-            part = delassus[row + 1, column + 1] * impulse[column + 1]
-            tangent_friction += part
-            tangent_part += abs(part)
-        normal_velocity += normal_friction
-        normal_size += normal_part
-        tangent_velocity += tangent_friction
-        tangent_size += tangent_part
-        if not (normal_size < math.inf and tangent_size < math.inf):
-            penetration = math.inf  # NaN or infinite
-        velocity[row] = normal_velocity
-        velocity[row + 1] = tangent_velocity
-        size[row] = normal_size
-        size[row + 1] = tangent_size
-        normal_impulse = impulse[row]
-        tangent_impulse = impulse[row + 1]
+        normal = 2 * contact
+        tangent = normal + 1
+        normal_impulse = impulse[normal]
+        tangent_impulse = impulse[tangent]
         limit = friction[contact] * normal_impulse
 
-        speed = 0.0 if normal_size == 0.0 else normal_velocity / normal_size
-        if delassus[row, row] <= 0.0 or normal_size == 0.0:
+        speed = relative_speed(velocity[normal], root[normal], inverse)
+        force_scale = root[normal] * inverse
+        if force_scale > 0.0:
+            force = normal_impulse * force_scale
+        else:  # it moves nothing
             force = 1.0 if normal_impulse > 0.0 else (-1.0 if normal_impulse < 0.0 else 0.0)
-        else:
-            force = normal_impulse * (delassus[row, row] / normal_size)
         penetration = max(penetration, -speed)
         cone = max(cone, -force)
         complementarity = max(complementarity, min(speed, force))
 
-        if delassus[row + 1, row + 1] > 0.0 and tangent_size > 0.0:
-            force_scale = delassus[row + 1, row + 1] / tangent_size
+        if root[tangent] > 0.0:
+            force_scale = root[tangent] * inverse
+        elif friction[contact] > 0.0 and force_scale > 0.0:
+            force_scale /= friction[contact]
         else:
-            both = limit + abs(tangent_impulse)
+            both = abs(limit) + abs(tangent_impulse)
             force_scale = 1.0 / both if both > 0.0 else 0.0
         if slope[contact] != 0.0:
             cone = max(cone, abs(tangent_impulse - slope[contact] * normal_impulse) * force_scale)
             continue
         cone = max(cone, (abs(tangent_impulse) - limit) * force_scale)
-        speed = 0.0 if tangent_size == 0.0 else tangent_velocity / tangent_size
+        speed = relative_speed(velocity[tangent], root[tangent], inverse)
         complementarity = max(complementarity, min(speed, (limit + tangent_impulse) * force_scale))
         complementarity = max(complementarity, min(-speed, (limit - tangent_impulse) * force_scale))
     residual[0] = complementarity
     residual[1] = cone
     residual[2] = penetration
-    return max(complementarity, max(cone, penetration))
+    return max(complementarity, max(cone, penetration)) + rounding
+
+
+@kernel
+def weigh(
+    count: int, delassus: Floats, free: Floats, impulse: Floats, work: ContactWorkspace
+) -> float:
+    """Return the size of the data, beta; write the weights of the rows and the effort."""
+    settings, root = work.vectors[SETTINGS], work.vectors[ROOT]
+    unit = settings[FLOOR]
+    effort = 0.0
+    for i in range(2 * count):
+        weight = delassus[i, i]
+        if settings[SKEWED] != 0.0 and not weight > 0.0:
+            for j in range(2 * count):
+                weight = max(weight, max(abs(delassus[i, j]), abs(delassus[j, i])))
+        root[i] = math.sqrt(weight) if weight > 0.0 else 0.0
+        if weight > 0.0:
+            unit = max(unit, abs(free[i]) / root[i])
+        effort += root[i] * abs(impulse[i])
+    if effort > 0.0:
+        effort = effort / unit if unit > 0.0 else math.inf
+    settings[EFFORT] = effort
+    return unit
+
+
+@kernel
+def relative_speed(velocity: float, root: float, inverse: float) -> float:
+    """Return a velocity in units of the data's; one that no impulse can change counts fully."""
+    if root > 0.0:
+        return velocity / root * inverse
+    return 1.0 if velocity > 0.0 else (-1.0 if velocity < 0.0 else 0.0)
+
+
+@kernel
+def sum_velocities(
+    count: int, delassus: Floats, free: Floats, impulse: Floats, velocity: Floats
+) -> None:
+    """Write ``velocity = G impulse + free``."""
+    for i in range(2 * count):
+        # Friction is summed apart from the normal impulses: the sums run side by side.
+        by_normal = free[i]
+        by_friction = 0.0
+        for contact in range(count):
+            by_normal += delassus[i, 2 * contact] * impulse[2 * contact]
+            by_friction += delassus[i, 2 * contact + 1] * impulse[2 * contact + 1]
+        velocity[i] = by_normal + by_friction
+
+
+@kernel
+def sum_velocities_sharply(
+    count: int,
+    delassus: Floats,
+    free: Floats,
+    impulse: Floats,
+    velocity: Floats,
+    unit: float,
+    work: ContactWorkspace,
+) -> float:
+    """Write ``velocity = G impulse + free`` in twice the precision; return what rounding is left.
+
+    What is left is relative to the data's velocities. ``EFFORT`` becomes the largest sum of
+    magnitudes of any row, in the same unit.
+    """
+    settings, root = work.vectors[SETTINGS], work.vectors[ROOT]
+    terms = 2.0 * count + 1.0
+    effort = 0.0
+    rounding = 0.0
+    for i in range(2 * count):
+        total = free[i]
+        error = 0.0
+        magnitude = abs(free[i])
+        for j in range(2 * count):
+            product = delassus[i, j] * impulse[j]
+            if product == 0.0:
+                continue
+            error += product_error(delassus[i, j], impulse[j], product)
+            longer = total + product
+            error += sum_error(total, product, longer)
+            total = longer
+            magnitude += abs(product)
+        velocity[i] = total + error
+        size = root[i] * unit
+        if size > 0.0:
+            effort = max(effort, magnitude / size)
+            left = UNIT_ROUNDOFF * abs(velocity[i])
+            left += (2.0 * terms * UNIT_ROUNDOFF) ** 2 * magnitude
+            rounding = max(rounding, left / size)
+        elif not magnitude < math.inf:
+            rounding = math.inf
+    if settings[EFFORT] < math.inf:
+        settings[EFFORT] = effort
+    return rounding
+
+
+def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Floats:
+    """How far the velocities just certified may be from a solution's; see :class:`Certificate`.
+
+    To make the answer exact, let every residual vanish. Velocities that are no larger than the
+    worst residual r become zero by moving the free ones. Impulses outside their cones, or without a
+    right to be there, move by at most r in units of the data; and friction by mu g_t / g_n times
+    that where the normal impulse that holds it vanishes. A row feels such a unit of impulse by at
+    most its own unit of velocity, which moves its free velocity once more.
+
+    Parameters
+    ----------
+    worst : float
+        Largest residual, rounding included.
+    friction : (nc,) float
+        Friction coefficients.
+    work : ContactWorkspace
+        As :func:`certify` left it.
+
+    Returns
+    -------
+    (nc, 2) float
+        In the unit of the free velocity.
+    """
+    root = work.vectors[ROOT, : 2 * friction.size]
+    lever = np.zeros(friction.size)
+    np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
+    if not worst < math.inf:
+        return np.full((friction.size, 2), math.inf)
+    moved = worst * (1.0 + np.sum(2.0 + lever))
+    bound: Floats = (moved * work.vectors[SETTINGS, UNIT] * root).reshape(friction.size, 2)
+    return bound

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.modes import OPEN, Solver
-from heelstrike.contact.problem import run_solvers, solver_order
+from heelstrike.contact.problem import check_accuracy, run_solvers, solver_order
 from heelstrike.contact.workspace import Floats
 from heelstrike.errors import ContactProblemError
 
@@ -39,6 +39,7 @@ def solve_lcp(
     *,
     solver: str | Solver = Solver.LEMKE,
     tolerance: float = 1e-9,
+    floor: float = 0.0,
     fallback: bool = True,
 ) -> LcpSolution:
     """Solve a linear complementarity problem: ``w = M z + q``, ``0 <= w _|_ z >= 0``.
@@ -56,7 +57,10 @@ def solve_lcp(
     solver : {"lemke", "fischer_burmeister", "gauss_seidel"}
         The solver to try first.
     tolerance : float
-        Largest relative residual that is accepted, see :class:`Certificate`.
+        Largest relative residual that is accepted, see :class:`Certificate`. Where a diagonal
+        entry is not positive, the largest entry of its row and column takes its place there.
+    floor : float
+        Smallest size of the data that residuals are set against, see :func:`solve_contact`.
     fallback : bool
         Whether the other solvers are tried when the first fails.
 
@@ -79,8 +83,7 @@ def solve_lcp(
     True
     """
     order = solver_order(solver, fallback=fallback)
-    if not tolerance > 0.0:
-        raise ContactProblemError(f"tolerance must be positive; got {tolerance}")
+    check_accuracy(tolerance, floor)
     try:
         matrix = np.array(M, dtype=np.float64)
         constant = np.array(q, dtype=np.float64)
@@ -104,6 +107,13 @@ def solve_lcp(
     free[::2] = constant
     mode = np.full(count, OPEN, np.int64)
     impulse, velocity, certificate = run_solvers(
-        delassus, free, np.zeros(count), order, mode, tolerance=tolerance, symmetric=False
+        delassus,
+        free,
+        np.zeros(count),
+        order,
+        mode,
+        tolerance=tolerance,
+        floor=floor,
+        semidefinite=False,
     )
     return LcpSolution(z=impulse[::2].copy(), w=velocity[::2].copy(), certificate=certificate)

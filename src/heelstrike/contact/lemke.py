@@ -31,13 +31,21 @@ from heelstrike.contact.workspace import (
     ContactWorkspace,
 )
 
-PATHS = 3
-"""How many covering vectors are tried: what rounding spoils on one path it spares on another."""
+PATHS = 9
+"""How many covering vectors are tried: what rounding spoils on one path it spares on another, and
+where one path ends in a ray another may find a solution."""
 
 AT_REST = 1e-11
 """Velocities below this, where the largest free one is one, are read as zero."""
 
 GOLDEN = 0.6180339887498949
+
+
+@kernel
+def covering(path: int, row: int) -> float:
+    """Return an entry of the covering vector of a path, from 1 to 2 at first, later to 1e6."""
+    share = (GOLDEN * path * (row + 1)) % 1.0
+    return 1.0 + share if path < 3 else 10.0 ** (6.0 * share)
 
 
 @kernel
@@ -61,7 +69,7 @@ def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace
     for i in range(pairs):
         for j in range(pairs + 1):
             tableau[i, j] = 0.0
-        tableau[i, pairs + 1] = 1.0 + (GOLDEN * path * (i + 1)) % 1.0
+        tableau[i, pairs + 1] = covering(path, i)
     row = 0
     for contact in range(count):
         height = 3 if tangent[contact] >= 0 else 1
@@ -99,9 +107,9 @@ def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
     ``path``, from 0 to ``PATHS`` - 1, chooses the covering vector and how close a tie is.
     """
     tie = 1e-11
-    if path == 1:
+    if path % 3 == 1:
         tie = 1e-13
-    elif path == 2:
+    elif path % 3 == 2:
         tie = 1e-9
     pairs = load_frictional(count, unknowns, path, work)
     status = pivot_to_solution(work.tableau, pairs, tie, work)

@@ -18,11 +18,13 @@ LEMKE = 0
 FISCHER_BURMEISTER = 1
 GAUSS_SEIDEL = 2
 WARM_START = 3
+COMBINATIONS = 4
 
 SOLVED = 0
 RAY = 1
 ITERATION_LIMIT = 2
 UNCERTIFIED = 3
+UNDECIDABLE = 4
 
 
 class ContactMode(enum.IntEnum):
@@ -45,12 +47,17 @@ class ContactMode(enum.IntEnum):
 
 
 class Solver(enum.Enum):
-    """The ways to solve a contact problem; the values are the names that options accept."""
+    """The ways to solve a contact problem; the values are the names that options accept.
+
+    The last two cannot be asked for: ``WARM_START`` stands for modes that were guessed right, and
+    ``COMBINATIONS`` is the last resort after the others.
+    """
 
     LEMKE = "lemke"
     FISCHER_BURMEISTER = "fischer_burmeister"
     GAUSS_SEIDEL = "gauss_seidel"
     WARM_START = "warm_start"
+    COMBINATIONS = "combinations"
 
     @property
     def code(self) -> int:
@@ -68,6 +75,7 @@ _SOLVER_CODES = {
     Solver.FISCHER_BURMEISTER: FISCHER_BURMEISTER,
     Solver.GAUSS_SEIDEL: GAUSS_SEIDEL,
     Solver.WARM_START: WARM_START,
+    Solver.COMBINATIONS: COMBINATIONS,
 }
 _SOLVERS_BY_CODE = {code: solver for solver, code in _SOLVER_CODES.items()}
 
@@ -79,6 +87,7 @@ class SolveStatus(enum.IntEnum):
     RAY = RAY
     ITERATION_LIMIT = ITERATION_LIMIT
     UNCERTIFIED = UNCERTIFIED
+    UNDECIDABLE = UNDECIDABLE
 
     @property
     def text(self) -> str:
@@ -94,4 +103,8 @@ _STATUS_TEXTS = {
     ),
     SolveStatus.ITERATION_LIMIT: "the iteration limit was reached before a solution",
     SolveStatus.UNCERTIFIED: "the solver stopped, but the residuals do not confirm its answer",
+    SolveStatus.UNDECIDABLE: (
+        "undecidable in this precision: either no impulse gives the contacts the velocities they "
+        "are asked for, or it is so large that rounding it changes them by more than the tolerance"
+    ),
 }

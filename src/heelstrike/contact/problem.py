@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.compilation import kernel
-from heelstrike.contact.certificate import Certificate
+from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
 from heelstrike.contact.repetition import repeat
 from heelstrike.contact.search import CLEAN, contact_workspace
 from heelstrike.contact.workspace import (
+    FLOOR,
     ITERATIONS,
     LAST_FALLBACKS,
+    ROUNDING,
     SETTINGS,
     SHORTCUTS,
     SKEWED,
@@ -146,6 +148,7 @@ def solve_contact(
     *,
     solver: str | Solver = Solver.LEMKE,
     tolerance: float = 1e-9,
+    floor: float = 0.0,
     fallback: bool = True,
 ) -> ContactSolution:
     """Solve a contact problem with Coulomb friction in the plane.
@@ -167,6 +170,10 @@ def solve_contact(
         The solver to try first.
     tolerance : float
         Largest relative residual that is accepted, see :class:`Certificate`.
+    floor : float
+        Smallest size of the data that residuals are set against, as velocity times the root of
+        the mass it belongs to [m/s kg^(1/2)]: what is known of the free velocities. With zero
+        the smallest velocities are solved as sharply as large ones.
     fallback : bool
         Whether the other solvers are tried, in the order Lemke, Fischer-Burmeister,
         Gauss-Seidel, when the first fails.
@@ -196,12 +203,18 @@ def solve_contact(
     """
     matrix, offset, coefficient = _checked(delassus, free, friction)
     count = coefficient.size
-    if not tolerance > 0.0:
-        raise ContactProblemError(f"tolerance must be positive; got {tolerance}")
+    check_accuracy(tolerance, floor)
     order = solver_order(solver, fallback=fallback)
     mode = np.full(count, OPEN, np.int64)
     impulse, velocity, certificate = run_solvers(
-        matrix, offset, coefficient, order, mode, tolerance=tolerance
+        matrix,
+        offset,
+        coefficient,
+        order,
+        mode,
+        tolerance=tolerance,
+        floor=floor,
+        semidefinite=_may_be_semidefinite(matrix),
     )
     return ContactSolution(
         impulse=impulse.reshape(count, 2),
@@ -219,17 +232,25 @@ def run_solvers(
     mode: Integers,
     *,
     tolerance: float,
-    symmetric: bool = True,
+    floor: float = 0.0,
+    semidefinite: bool = True,
 ) -> tuple[Floats, Floats, Certificate]:
-    """Call the kernel on checked data with fresh memory; return impulse, velocity, certificate."""
+    """Call the kernel on checked data with fresh memory; return impulse, velocity, certificate.
+
+    ``semidefinite`` tells that the matrix is symmetric and no entry exceeds the root of the product
+    of its diagonal entries.
+    """
     count = friction.size
     work = contact_workspace(count)
     work.vectors[SETTINGS, TOLERANCE] = tolerance
-    work.vectors[SETTINGS, SKEWED] = 0.0 if symmetric else 1.0
+    work.vectors[SETTINGS, FLOOR] = floor
+    work.vectors[SETTINGS, SKEWED] = 0.0 if semidefinite else 1.0
     impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
     status = solve_contact_kernel(
         count, delassus, free, friction, order, mode, impulse, velocity, residual, work
     )
+    # The solvers leave in the workspace what belongs to the last candidate, not to the best one.
+    worst = certify(count, delassus, free, friction, impulse, velocity, residual, work)
     certificate = Certificate(
         status=SolveStatus(status),
         solver=Solver.from_code(work.counters[SUCCEEDED]),
@@ -238,9 +259,31 @@ def run_solvers(
         complementarity=float(residual[0]),
         cone=float(residual[1]),
         penetration=float(residual[2]),
+        rounding=float(work.vectors[SETTINGS, ROUNDING]),
         tolerance=float(tolerance),
+        velocity_error=velocity_error(worst, friction, work),
     )
     return impulse, velocity, certificate
+
+
+def _may_be_semidefinite(matrix: Floats) -> bool:
+    """Whether no entry is larger than its diagonal allows, rounding apart."""
+    root = np.sqrt(np.diag(matrix))
+    return bool(np.all(np.abs(matrix) <= (1.0 + 1e-8) * np.outer(root, root)))
+
+
+def check_accuracy(tolerance: float, floor: float) -> None:
+    """Refuse a tolerance or a floor that makes no sense.
+
+    Raises
+    ------
+    ContactProblemError
+        If the tolerance is not positive or the floor is negative or not a number.
+    """
+    if not tolerance > 0.0:
+        raise ContactProblemError(f"tolerance must be positive; got {tolerance}")
+    if not 0.0 <= floor < np.inf:
+        raise ContactProblemError(f"floor must be a number ≥ 0; got {floor}")
 
 
 def _solver(solver: str | Solver) -> Solver:
@@ -249,7 +292,7 @@ def _solver(solver: str | Solver) -> Solver:
         choice = Solver(solver)
     except ValueError:
         choice = Solver.WARM_START
-    if choice is Solver.WARM_START:
+    if choice not in DEFAULT_ORDER:
         raise ContactProblemError(f"unknown contact solver {solver!r}; choose one of: {choices}")
     return choice
 
@@ -301,7 +344,7 @@ def _checked(
             f"delassus[{row}, {row}] is {diagonal[row]}; J M^-1 J^T cannot have a negative "
             "diagonal entry"
         )
-    bound = np.sqrt(np.outer(diagonal, diagonal))
+    bound = np.outer(np.sqrt(diagonal), np.sqrt(diagonal))
     asymmetry = np.abs(matrix - matrix.T) > 1e-8 * bound + np.finfo(float).tiny
     if np.any(asymmetry):
         row, column = (int(index) for index in np.argwhere(asymmetry)[0])

@@ -11,25 +11,44 @@ from numba import types
 from heelstrike.compilation import kernel, type_of
 from heelstrike.contact.active_set import evaluate, label
 from heelstrike.contact.certificate import certify
+from heelstrike.contact.combinations import (
+    begin_combinations,
+    next_combination,
+    note_residual,
+)
+from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.gauss_seidel import gauss_seidel
 from heelstrike.contact.lemke import PATHS, lemke
-from heelstrike.contact.modes import FISCHER_BURMEISTER, LEMKE, OPEN, RAY, SOLVED, UNCERTIFIED
+from heelstrike.contact.modes import (
+    COMBINATIONS,
+    FISCHER_BURMEISTER,
+    GAUSS_SEIDEL,
+    LEMKE,
+    OPEN,
+    RAY,
+    SOLVED,
+    UNCERTIFIED,
+    UNDECIDABLE,
+    WARM_START,
+)
 from heelstrike.contact.reduction import reduce_problem, scale_matrix
 from heelstrike.contact.repetition import repeat
 from heelstrike.contact.workspace import (
+    EFFORT,
     FAILURES,
     FALLBACKS,
     IMPULSE,
     LAST_FALLBACKS,
+    MATRIX,
     PRESCRIBED,
     RESIDUAL,
     REST_TOLERANCE,
+    SCALE,
     SETTINGS,
     SHORTCUTS,
-    SIZE,
     SKEWED,
-    SLOPE,
+    SOURCE,
     SUCCEEDED,
     TOLERANCE,
     TRIAL_MODE,
@@ -46,6 +65,9 @@ CLEAN = 1e-11
 
 AS_GOOD = 2.0 * REST_TOLERANCE
 """Residual up to which released contacts are preferred to a smaller residual without."""
+
+NEARLY_SINGULAR = 1e-10
+"""Pivots of the unit-diagonal matrix below this allow of impulses 1e5 times the data."""
 
 ROUNDS = 6
 """How often modes are named after the velocities and tried again."""
@@ -68,6 +90,62 @@ def keep(
         residual[i] = work.vectors[RESIDUAL, i]
     for contact in range(count):
         mode[contact] = work.labels[TRIAL_MODE, contact]
+
+
+@kernel
+def is_doubtful(count: int, worst: float, work: ContactWorkspace) -> bool:
+    """Whether an answer fails its certificate only because its impulses cannot be written down.
+
+    Rounding them changes velocities by more than the tolerance, and they miss by no more than that.
+    """
+    settings = work.vectors[SETTINGS]
+    rounding = UNIT_ROUNDOFF * settings[EFFORT]
+    return (
+        settings[TOLERANCE] < worst and settings[TOLERANCE] < rounding and worst <= count * rounding
+    )
+
+
+@kernel
+def nearly_singular(unknowns: int, delassus: Floats, work: ContactWorkspace) -> bool:
+    """Whether the matrix is singular to rounding, and not known to be so exactly.
+
+    Whether an internal force changes no velocity, so that no impulse helps, or almost none, so that
+    a huge one does, is then a question of the last digits. Elimination with complete pivoting; it
+    is exact where no operation is rounded, as with two walls that face each other.
+    """
+    source, scale = work.labels[SOURCE], work.vectors[SCALE]
+    matrix = work.squares[MATRIX]
+    for i in range(unknowns):
+        for j in range(unknowns):
+            # Powers of two round nothing.
+            shift = math.frexp(scale[i])[1] + math.frexp(scale[j])[1]
+            matrix[i, j] = math.ldexp(delassus[source[i], source[j]], shift)
+    exact = True
+    for step in range(unknowns):
+        row = step
+        column = step
+        for i in range(step, unknowns):
+            for j in range(step, unknowns):
+                if abs(matrix[i, j]) > abs(matrix[row, column]):
+                    row = i
+                    column = j
+        largest = abs(matrix[row, column])
+        if largest < NEARLY_SINGULAR:
+            return largest > 0.0 or not exact
+        for j in range(unknowns):
+            matrix[step, j], matrix[row, j] = matrix[row, j], matrix[step, j]
+        for i in range(unknowns):
+            matrix[i, step], matrix[i, column] = matrix[i, column], matrix[i, step]
+        for i in range(step + 1, unknowns):
+            factor = matrix[i, step] / matrix[step, step]
+            for j in range(step, unknowns):
+                product = factor * matrix[step, j]
+                left = matrix[i, j] - product
+                exact = exact and product_error(factor, matrix[step, j], product) == 0.0
+                exact = exact and sum_error(matrix[i, j], -product, left) == 0.0
+                matrix[i, j] = left
+            exact = exact and matrix[i, step] == 0.0
+    return False
 
 
 @kernel
@@ -148,7 +226,12 @@ def try_solvers(
 
     status = UNCERTIFIED
     best = math.inf
-    for attempt in range(-1, order.shape[0]):
+    doubtful = False
+    with_fallbacks = order.shape[0] > 1
+    for attempt in range(-1, order.shape[0] + (1 if with_fallbacks else 0)):
+        solver = WARM_START
+        if attempt >= 0:
+            solver = order[attempt] if attempt < order.shape[0] else COMBINATIONS
         outcome = UNCERTIFIED
         if attempt >= 0:
             if attempt == 0:
@@ -163,21 +246,28 @@ def try_solvers(
         while proposing:
             if attempt < 0:
                 proposing = False
-            elif order[attempt] == LEMKE:
+            elif solver == LEMKE:
                 outcome = lemke(count, unknowns, call, work)
                 proposing = call + 1 < PATHS
-            elif order[attempt] == FISCHER_BURMEISTER:
+            elif solver == FISCHER_BURMEISTER:
                 outcome = fischer_burmeister(count, unknowns, call, work)
                 proposing = outcome == SOLVED
-            else:
+            elif solver == GAUSS_SEIDEL:
                 outcome = gauss_seidel(count, unknowns, call, work)
                 proposing = outcome == SOLVED
+            else:
+                if call == 0:
+                    begin_combinations(count, mode, best, work)
+                proposing = next_combination(count, work)
             call += 1
             if attempt >= 0 and stick_or_open(count, delassus, free, friction, clean, work):
                 keep(count, mode, impulse, velocity, residual, work)
-                counters[SUCCEEDED] = order[attempt]
+                counters[SUCCEEDED] = solver
                 return SOLVED
             worst = evaluate(count, delassus, free, friction, work)
+            doubtful = doubtful or is_doubtful(count, worst, work)
+            if solver == COMBINATIONS:
+                note_residual(count, worst, work)
             latest = worst < best
             if latest:
                 best = worst
@@ -191,11 +281,10 @@ def try_solvers(
                     delassus,
                     free,
                     friction,
-                    vectors[SLOPE],
                     impulse,
                     velocity,
                     residual,
-                    vectors[SIZE],
+                    work,
                 )
             # The same answer whichever solver found it: contacts at rest are released to carry
             # any impulse in their cone, so that the split is of least norm among all. And a
@@ -211,7 +300,7 @@ def try_solvers(
                 best = worst
                 keep(count, mode, impulse, velocity, residual, work)
         if best < before and attempt >= 0:
-            counters[SUCCEEDED] = order[attempt]
+            counters[SUCCEEDED] = solver
         if best <= tolerance and (attempt >= 0 or best <= clean):
             status = SOLVED
             if best <= clean:
@@ -220,6 +309,8 @@ def try_solvers(
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         counters[FAILURES] += 1
+        if doubtful or (with_fallbacks and nearly_singular(unknowns, delassus, work)):
+            status = UNDECIDABLE
     elif attempt < 0:
         counters[SHORTCUTS] += 1
     for contact in range(count):

@@ -25,6 +25,11 @@ COUNTERS = 8
 # Places in row ``SETTINGS`` of ``ContactWorkspace.vectors``.
 TOLERANCE = 0
 SKEWED = 1
+FLOOR = 2
+ROUNDING = 3  # written by the certificate: what rounding may hide from it
+EFFORT = 4  # written by the certificate: the velocities that cancel, in units of the data's
+UNIT = 5  # written by the certificate: the size of the data
+REST = 6  # written by the certificate: velocities below this times ``ROOT`` count as zero
 
 # Rows of ``ContactWorkspace.labels``, by what they are indexed with.
 NORMAL = 0  # contact: its normal unknown
@@ -39,7 +44,8 @@ COLUMN_LABEL = 8  # tableau column: the variable it holds
 PLACE = 9  # variable: its row, or minus its column
 ORDER = 10  # place in the elimination: the equation that has it
 SPAN = 11  # the same: how many columns its row of the factor has
-LABELS = 12
+BASE_MODE = 12  # contact: the mode in the combination that is varied
+LABELS = 13
 
 # Rows of ``ContactWorkspace.vectors``, by what they are indexed with.
 CONE = 0  # contact: friction coefficient of the scaled problem
@@ -57,13 +63,14 @@ STEP = 11  # unknown or equation: a correction
 SPEED = 12  # unknown or equation: scaled velocity
 EQUATIONS = 13  # unknown: what the iterate leaves of the equations
 PROGRESS = 14  # an iterative solver's own numbers
-SIZE = 15  # row of the data: the scale of its velocity
-SETTINGS = 16  # what the caller may choose: TOLERANCE and SKEWED
+ROOT = 15  # row of the data: root of its diagonal, velocity per unit of scaled impulse
+SETTINGS = 16  # TOLERANCE and SKEWED, which the caller may choose, and what goes with them
 SHARERS = 17  # equation: how many rows share it
-VECTORS = 18
+BEFORE = 18  # equation: its unknown before the last refinement
+VECTORS = 19
 
 REST_TOLERANCE = 1e-10
-"""Velocities below this, relative to what they are summed from, count as zero."""
+"""Velocities below this, relative to the data and to what cancels in them, count as zero."""
 
 # Matrices of ``ContactWorkspace.squares``.
 MATRIX = 0  # the scaled problem
@@ -86,7 +93,8 @@ class ContactWorkspace(Bundle):
         Lists and matrices of the solvers; the module's constants name them. Row ``SETTINGS`` of
         ``vectors`` is the caller's: ``TOLERANCE`` is the largest residual that is certified,
         1e-9 unless changed; ``SKEWED`` is not zero if the matrix may be asymmetric, as in a
-        general complementarity problem.
+        general complementarity problem; ``FLOOR`` is the smallest size of the data that
+        residuals are set against, zero unless changed.
     tableau : float64
         The dictionary that is pivoted.
     solvers : (1,) int64
