@@ -153,6 +153,80 @@ def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path) -> Non
     assert answer(HELPER.replace("SLOPE = 1.0", "SLOPE = 2.0")) == (11.0, 0)
 
 
+CHECKED = """
+import numpy as np
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def third(values):
+    return values[2]
+
+compiled = compiled_for(types.float64(types.float64[::1]), third, address=ADDRESS)
+try:
+    compiled(np.arange(3.0)[:2])
+    told = "read"
+except IndexError:
+    told = "refused"
+print(told, sum(compiled.stats.cache_hits.values()))
+"""
+
+
+def test_code_made_with_other_settings_is_not_taken(tmp_path: Path) -> None:
+    def answer(check: str, address: bool = False) -> str:
+        (tmp_path / "checked.py").write_text(CHECKED.replace("ADDRESS", str(address)))
+        told = subprocess.run(
+            [sys.executable, "-B", "checked.py"],
+            cwd=tmp_path,
+            env={
+                **os.environ,
+                "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+                "NUMBA_BOUNDSCHECK": check,
+            },
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer("1") == "refused 0"
+    assert answer("0") == "read 0"
+    assert answer("0") == "read 1"
+    assert answer("0", address=True) == "read 0"
+
+
+FACTORY = """
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def scaling(factor):
+    def scale(x):
+        return factor * x
+    return scale
+
+compiled = [compiled_for(types.float64(types.float64), scaling(factor)) for factor in (2.0, 3.0)]
+print([one(1.0) for one in compiled], [sum(one.stats.cache_hits.values()) for one in compiled])
+"""
+
+
+def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path) -> None:
+    """Such as controllers that a function makes, with gains that it has been given."""
+    (tmp_path / "factory.py").write_text(FACTORY)
+
+    def answer() -> str:
+        told = subprocess.run(
+            [sys.executable, "-B", "factory.py"],
+            cwd=tmp_path,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer() == "[2.0, 3.0] [0, 0]"
+    assert answer() == "[2.0, 3.0] [1, 1]"
+
+
 APART = """
 from numba import types
 from heelstrike.separate_kernel import separate_kernel

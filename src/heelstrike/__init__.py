@@ -25,6 +25,11 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+import heelstrike.plain_code as _plain_code
+
+if _plain_code.is_asked_for():  # before anything else is imported
+    _plain_code.select()
+
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle

@@ -129,9 +129,14 @@ def _refinement(rows: Sequence[RefinedWalk]) -> str:
 def _convergence(found: Sequence[Convergence]) -> str:
     steps = found[0].steps if found else ()
     return _table(
-        ("scheme", *(f"{1e3 * step:g} ms" for step in steps), "order"),
+        ("scheme", *(f"{1e3 * step:g} ms" for step in steps), "order", "off the ground"),
         [
-            (scheme_name(each.scheme), *map(_number, each.errors), f"{each.order:.2f}")
+            (
+                scheme_name(each.scheme),
+                *map(_number, each.errors),
+                "–" if each.lost else f"{each.order:.2f}",
+                f"{100.0 * each.lost:.2g} %",
+            )
             for each in found
         ],
     )
