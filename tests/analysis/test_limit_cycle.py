@@ -172,6 +172,17 @@ def test_a_robot_that_does_not_walk() -> None:
         )
 
 
+def test_a_search_that_is_given_no_time() -> None:
+    speed, _ = wheel_cycle(9.81, 0.08, 0.01)
+    with pytest.raises(hs.LimitCycleError, match="in 0 iterations"):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=0.01),
+            wheel_state(0.08, 1.1 * speed),
+            ground=hs.Ground(friction=3.0, slope=-0.08),
+            max_iterations=0,
+        )
+
+
 def test_usable_arguments() -> None:
     robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
     with pytest.raises(hs.SimulationError, match="event-driven"):

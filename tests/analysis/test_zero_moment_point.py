@@ -55,6 +55,16 @@ def test_equation_44_with_our_sign() -> None:
     np.testing.assert_allclose(residual, 0.0, atol=1e-12)
 
 
+def test_the_moment_is_about_the_foot_wherever_the_robot_is() -> None:
+    """Far from the origin and above the ground; forces act at heel and toe, 0.1 m off the ankle."""
+    robot = walking.bravo7()
+    q = robot.model.reference.copy()
+    q[:2] += [3.0, 0.5]
+    force = np.array([[300.0, 40.0], [120.0, -10.0], [50.0, 5.0], [80.0, 60.0]])
+    wrench = foot_wrenches(one_row(force, position=q))[0]
+    np.testing.assert_allclose(wrench, [[30.0, 420.0, 18.0], [65.0, 130.0, -3.0]], atol=1e-12)
+
+
 def test_two_feet_balance_between_them() -> None:
     robot = walking.bravo7()
     q = robot.model.reference.copy()

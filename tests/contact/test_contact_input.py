@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from heelstrike.contact import SolveStatus, solve_contact
+from heelstrike.contact.problem import _may_be_semidefinite
 from heelstrike.errors import ContactProblemError
 
 EYE = np.eye(4)
@@ -20,6 +21,7 @@ FREE = np.array([-1.0, 0.0, -1.0, 0.0])
         (EYE, FREE[:3], 0.5, {}, "3 entries, but every contact needs two"),
         (np.eye(3), FREE, 0.5, {}, r"shape \(3, 3\), but free has 2 contacts.*\(4, 4\)"),
         (EYE[:2], FREE, 0.5, {}, r"shape \(2, 4\)"),
+        (np.zeros((0, 0)), FREE, 0.5, {}, r"shape \(0, 0\)"),
         (
             EYE,
             FREE,
@@ -68,3 +70,18 @@ def test_free_velocity_by_contact() -> None:
 
 def test_every_status_has_words() -> None:
     assert all(status.text for status in SolveStatus)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "possible"),
+    [
+        ([[1.0, 1.0], [1.0, 1.0]], True),
+        ([[4.0, -2.0], [-2.0, 1.0]], True),
+        ([[1.0, 1.1], [1.1, 1.0]], False),
+        ([[1.0, -1.1], [-1.1, 1.0]], False),
+        ([[0.0, 0.1], [0.1, 1.0]], False),
+    ],
+)
+def test_an_entry_larger_than_its_diagonal_allows(matrix: object, possible: bool) -> None:
+    """|G_ij| ≤ √(G_ii G_jj) in any J M⁻¹ Jᵀ (Cauchy and Schwarz)."""
+    assert _may_be_semidefinite(np.array(matrix)) == possible

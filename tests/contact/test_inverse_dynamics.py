@@ -10,6 +10,7 @@ from scipy.optimize import linprog, minimize
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.contact.force_distribution import ForceDistribution, distribute
+from heelstrike.contact.inverse_dynamics import _friction_use
 from heelstrike.errors import ContactProblemError, RobotError
 from heelstrike.robot import Robot
 
@@ -310,3 +311,10 @@ def test_motors_at_every_joint_need_no_ground() -> None:
         assert found.feasible
         assert not found.contact_force.any()
         np.testing.assert_array_equal(found.torque, dynamics.inverse_dynamics(arm, q, v, a))
+
+
+def test_use_of_the_cone_by_hand() -> None:
+    """Loaded, unloaded, rounding beside the load, pulling, and held without a load."""
+    force = np.array([[10.0, 3.0], [0.0, 0.0], [1.0, 1e-13], [-2.0, 0.0], [0.0, 1.0], [10.0, -6.0]])
+    use = _friction_use(force, np.full(6, 0.5), 1e-9)
+    np.testing.assert_allclose(use, [0.6, 0.0, 0.0, np.inf, np.inf, 1.2])

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import walking
+from gait_motion import foot_jacobian, middle, selection, standing
+from robot_cases import builtin_xml
 
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.control import Encoder
+from heelstrike.robot import read_mjcf
 from heelstrike.sim import Contacts
 
 
@@ -57,6 +61,52 @@ def test_the_law_is_the_papers(seed: int) -> None:
     expected = as_the_paper_writes_it(robot, link, q, v, wanted)
     torque = controller.torque(t, hs.State(q, v), nothing_touches())
     np.testing.assert_allclose(torque, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+SPRINGY = re.sub(
+    r'axis="0 1 0" range="(\S+ \S+)"/>',
+    r'axis="0 1 0" range="\1" stiffness="80" springref="20" damping="3" armature="0.05"/>',
+    builtin_xml("bravo7"),
+)
+"""The built-in robot with springs, dampers and rotors in its joints."""
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_springs_and_dampers_are_made_up_for(seed: int) -> None:
+    """The law against forward dynamics with contact, which knows nothing of it.
+
+    With the stance foot flat and at rest, v̇ of the joints is the reference's plus feedback,
+    whatever springs, dampers and rotors there are in the joints.
+    """
+    robot, gait = read_mjcf(SPRINGY, name="bravo7"), walking.gait()
+    assert np.count_nonzero(robot.model.stiffness) == 6
+    assert np.count_nonzero(robot.model.rest) == 6
+    draw = np.random.default_rng(seed)
+    t, kp, kd = float(draw.uniform(0.1, 0.3)), 300.0, 30.0
+    foot, joints = gait.stance_foot, robot.model.actuator_joint
+    q = standing(robot, gait.position(t) + 0.02 * draw.normal(size=6), foot)
+    rows = foot_jacobian(robot, q, foot)
+    v = np.zeros(robot.nv)
+    v[joints] = gait.velocity(t) + 0.1 * draw.normal(size=6)
+    v[:3] = -np.linalg.solve(rows[:, :3], rows @ v)
+    wanted = (
+        gait.acceleration(t)
+        + kd * (gait.velocity(t) - v[joints])
+        + kp * (gait.position(t) - q[joints])
+    )
+    torque = hs.ComputedTorque(robot, gait, kp=kp, kd=kd).torque(
+        t, hs.State(q, v), nothing_touches()
+    )
+    # The ground holds the foot's three coordinates; what it takes to do so follows.
+    mass = dynamics.mass_matrix(robot, q)
+    drift = dynamics.point_bias_acceleration(
+        robot, q, v, robot.feet[foot].link, middle(robot, foot)
+    )
+    force = selection(robot) @ torque + dynamics.passive_force(robot, q, v)
+    force -= dynamics.bias_force(robot, q, v)
+    whole = np.block([[mass, -rows.T], [rows, np.zeros((3, 3))]])
+    found = np.linalg.solve(whole, np.concatenate([force, -drift]))[: robot.nv]
+    np.testing.assert_allclose(found[joints], wanted, rtol=0, atol=1e-9 * np.abs(wanted).max())
 
 
 def test_touchdown_exchanges_the_feet_and_restarts_the_phase() -> None:
@@ -158,6 +208,92 @@ def test_walks_on_encoders(encoder: Encoder, tracking: float) -> None:
     assert -0.1 < summary.zmp_min_m < summary.zmp_max_m < 0.1
 
 
+def test_what_encoders_tell_the_law() -> None:
+    """Without a velocity to see: the reference's at first, then slopes through 2, 3, 4 samples.
+
+    A touchdown makes it forget the samples before. The foot is flat and at rest, the trunk where
+    that puts it, whatever the state says of it.
+    """
+    robot, gait = walking.bravo7(), walking.gait()
+    h, start = 0.01, 0.1
+    controller = hs.ComputedTorque(
+        robot, gait, kp=300.0, kd=30.0, encoder=Encoder(period=h, resolution=0.0)
+    )
+    driven, foot = robot.model.actuator_joint, gait.stance_foot
+    draw = np.random.default_rng(3)
+    joints = gait.position(start) + 0.02 * draw.normal(size=(6, 6)).cumsum(axis=0)
+    for k, measured in enumerate(joints):
+        t = start + k * h
+        newest, *before = joints[k::-1][:4]
+        match before:
+            case []:
+                seen = gait.velocity(t)
+            case [a]:
+                seen = (newest - a) / h
+            case [a, b]:
+                seen = (3.0 * newest - 4.0 * a + b) / (2.0 * h)
+            case [a, b, c]:
+                seen = (11.0 * newest - 18.0 * a + 9.0 * b - 2.0 * c) / (6.0 * h)
+        q = standing(robot, measured, foot)
+        v = np.zeros(robot.nv)
+        v[driven] = seen
+        rows = foot_jacobian(robot, q, foot)
+        v[:3] = -np.linalg.solve(rows[:, :3], rows @ v)
+        wanted = (
+            gait.acceleration(t)
+            + 30.0 * (gait.velocity(t) - seen)
+            + 300.0 * (gait.position(t) - measured)
+        )
+        expected = as_the_paper_writes_it(robot, robot.feet[foot].link, q, v, wanted)
+        told = q.copy()
+        told[2] += 0.3  # the trunk's pitch is not measured
+        state = hs.State(told, np.full(robot.nv, 7.0))
+        torque = controller.torque(t, state, nothing_touches())
+        np.testing.assert_allclose(torque, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def test_readings_are_rounded_and_due_once_a_period() -> None:
+    from heelstrike.compilation import uncompiled
+    from heelstrike.control import computed_torque as law
+
+    read = uncompiled(law.read_encoders)
+    robot = walking.bravo7()
+    nu = robot.nu
+    parameters, memory, samples = (
+        np.zeros(law.HEADER),
+        np.zeros(law.MEMORY_HEADER),
+        np.zeros(4 * nu),
+    )
+    parameters[law.ENCODER_PERIOD], parameters[law.ENCODER_RESOLUTION] = 0.01, 0.25
+    q = np.zeros(robot.nv)
+    for k, t in enumerate([0.0, 0.005, 0.01, 0.02, 0.03, 0.04]):
+        q[robot.model.actuator_joint] = 0.3 * k + np.arange(nu)
+        read(t, q, robot.model, parameters, memory, samples)
+        assert memory[law.SAMPLED] == (0.0 if t == 0.005 else t)
+        assert memory[law.SAMPLES] == [1, 1, 2, 3, 4, 4][k]
+    # 1.5, 1.2, 0.9 and 0.6, to quarters; the joints differ by whole numbers.
+    expected = np.array([1.5, 1.25, 1.0, 0.5])[:, None] + np.arange(nu)
+    np.testing.assert_allclose(samples.reshape(4, nu), expected, atol=1e-12)
+
+
+def test_a_light_touch_is_a_touchdown() -> None:
+    robot, gait = walking.bravo7(), walking.gait()
+    controller = hs.ComputedTorque(robot, gait)
+    touching = nothing_touches()
+    touching.force[robot.feet[1 - gait.stance_foot].contacts[1], 0] = 1e-3
+    controller.torque(0.6, gait.initial_state, touching)
+    from heelstrike.control import computed_torque as law
+
+    assert controller._memory[law.STANCE] == 1 - gait.stance_foot
+    assert controller._memory[law.START] == 0.6
+
+
+def test_a_joint_without_a_motor_is_named() -> None:
+    xml = re.sub(r'\s*<motor name="\w+_ankle".*', "", builtin_xml("bravo7"))
+    with pytest.raises(hs.ControllerError, match=r"leaves .*right_ankle.*left_ankle without"):
+        hs.ComputedTorque(read_mjcf(xml, name="bravo7"), walking.gait())
+
+
 def test_the_estimate_is_exact_for_cubics() -> None:
     from heelstrike.compilation import uncompiled
     from heelstrike.control.computed_torque import estimated_velocity
@@ -174,6 +310,8 @@ def test_the_estimate_is_exact_for_cubics() -> None:
     [
         ({"kp": -1.0}, "kp"),
         ({"kd": np.nan}, "kd"),
+        ({"kp": [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]}, "kp"),
+        ({"kd": [1.0, 1.0, np.nan, 1.0, 1.0, 1.0]}, "kd"),
         ({"kp": [1.0, 2.0]}, "kp must be one number or 6"),
     ],
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -47,13 +49,27 @@ def step_error(run: hs.Run) -> float:
     return float(max(np.abs(joints).max(), np.abs(trunk).max()))
 
 
+def springy() -> hs.Robot:
+    """Rabbit with springs, dampers and rotors in its joints."""
+    joints = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    model = dataclasses.replace(
+        rabbit().model,
+        stiffness=80.0 * joints,
+        rest=0.3 * joints,
+        damping=3.0 * joints,
+        armature=0.05 * joints,
+    )
+    return dataclasses.replace(rabbit(), model=model)
+
+
+@pytest.mark.parametrize("make", [rabbit, springy])
 @pytest.mark.parametrize("seed", range(8))
-def test_the_joints_accelerate_as_asked(seed: int) -> None:
+def test_the_joints_accelerate_as_asked(seed: int, make: Callable[[], hs.Robot]) -> None:
     """The law against forward dynamics with contact, which knows nothing of it.
 
     In any state with the stance foot at rest, v̇ of the joints is the reference's plus feedback.
     """
-    robot, kp, kd = rabbit(), 200.0, 30.0
+    robot, kp, kd = make(), 200.0, 30.0
     draw = np.random.default_rng(seed)
     t = float(draw.uniform(0.05, 0.25))
     joints = robot.model.actuator_joint

@@ -101,6 +101,35 @@ def test_cost_is_the_integral_of_the_squared_torques(walked: Walked) -> None:
     assert walked.gait.cost == pytest.approx(simpson, rel=1e-8)
 
 
+def test_where_a_joint_counts_from_is_nothing_to_the_gait(bravo7: hs.Robot, gait: hs.Gait) -> None:
+    """One knee's angle is zero elsewhere than the other's: the same walk in other numbers."""
+    shift = np.zeros(9)
+    shift[4] = 0.3
+    model = dataclasses.replace(
+        bravo7.model,
+        reference=bravo7.model.reference + shift,
+        lower=bravo7.model.lower + shift,
+        upper=bravo7.model.upper + shift,
+    )
+    robot = dataclasses.replace(bravo7, model=model)
+    found = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, friction=0.75)
+    assert found.cost == pytest.approx(gait.cost, rel=1e-6)
+    times = np.linspace(0.0, 1.4, 9)  # two steps
+    moved = shift[bravo7.model.actuator_joint]
+    np.testing.assert_allclose(found.position(times), gait.position(times) + moved, atol=1e-5)
+
+
+@pytest.mark.parametrize("asked", [{"step_length": 0.25}, {"speed": 0.4}], ids=str)
+def test_cost_of_a_free_step_is_that_of_the_step(bravo7: hs.Robot, asked: dict[str, Any]) -> None:
+    """Its cost per metre is what was least; what is told is ∫ΓᵀΓ dt all the same."""
+    gait = hs.optimize_gait(bravo7, **asked, starts=1)
+    assert abs(gait.step_length - 1.0) > 0.1  # no metre, which would be the same
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    times = 0.5 * gait.step_duration * (nodes + 1.0)
+    effort = [torque @ torque for torque in (instant(bravo7, gait, t).torque for t in times)]
+    assert gait.cost == pytest.approx(0.5 * gait.step_duration * (weights @ effort), rel=1e-6)
+
+
 def test_forces_at_all_times(walked: Walked) -> None:
     robot, gait = walked.robot, walked.gait
     x, z, moment = np.array([i.wrench for i in walked.instants]).T

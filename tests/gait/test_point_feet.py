@@ -10,6 +10,8 @@ import dataclasses
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,8 +20,10 @@ import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.contact.inverse_dynamics import ContactInverseDynamics
 from heelstrike.errors import GaitError, InfeasibleGaitError
-from heelstrike.gait.collocation import SETTINGS
+from heelstrike.gait import ClearanceProfile, collocation
+from heelstrike.gait.collocation import SETTINGS, CollocationProgram
 from heelstrike.gait.gauss import gauss_scheme
+from heelstrike.gait.program import Solution
 
 STEP = {"step_length": 0.25, "step_duration": 0.6, "clearance": 0.02, "friction": 0.6, "starts": 1}
 POINTS = 4  # Gauss points in every interval
@@ -248,6 +252,62 @@ def test_an_impossible_gait_is_told(rabbit: hs.Robot, monkeypatch: pytest.Monkey
     monkeypatch.setitem(SETTINGS["ipopt"], "max_iter", 30)  # more would only take longer
     with pytest.raises(InfeasibleGaitError, match="friction = 0 was found from 1 starting"):
         hs.optimize_gait(rabbit, **{**STEP, "friction": 0.0})
+
+
+def test_where_a_joint_counts_from_is_nothing_to_the_gait(
+    rabbit: hs.Robot, rabbit_gait: hs.PiecewiseGait
+) -> None:
+    """One knee's angle is zero elsewhere than the other's: the same walk in other numbers."""
+    shift = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0])
+    model = dataclasses.replace(
+        rabbit.model,
+        reference=rabbit.model.reference + shift,
+        lower=rabbit.model.lower + shift,
+        upper=rabbit.model.upper + shift,
+    )
+    gait = hs.optimize_gait(dataclasses.replace(rabbit, model=model), **STEP)
+    assert gait.cost == pytest.approx(rabbit_gait.cost, rel=1e-6)
+    times = np.linspace(0.0, 1.2, 9)  # two steps
+    moved = shift[rabbit.model.actuator_joint]
+    np.testing.assert_allclose(gait.position(times), rabbit_gait.position(times) + moved, atol=1e-5)
+
+
+def test_the_reserve_grows_where_a_constraint_fails_between_the_points(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """By 1.2 times what is missing, row by row, until nothing is; a failed solve ends it."""
+    excesses = iter([[1e-3, 0.0], [2e-3, 5e-10], [0.0, 0.0]])
+    reserves: list[np.ndarray] = []
+
+    def solve(guess: np.ndarray, reserve: np.ndarray) -> Solution:
+        reserves.append(reserve.copy())
+        return Solution(guess + 1.0, 0.0, converges, "", 1, np.zeros(0))
+
+    rows = SimpleNamespace(path_rows=[None, None])
+    program: Any = SimpleNamespace(transcription=rows, solve=solve)
+    monkeypatch.setattr(collocation, "_excess", lambda *_: np.array(next(excesses)))
+    start, converges = Solution(np.zeros(2), 0.0, True, "", 1, np.zeros(0)), True
+    found = collocation._held_between_nodes(program, start)
+    np.testing.assert_array_equal(found, [2.0, 2.0])
+    expected = collocation.RESERVE + np.array([[1.2e-3, 0.0], [3.6e-3, 0.0]])
+    np.testing.assert_allclose(reserves, expected, rtol=1e-12)
+    excesses, converges = iter([[1e-3, 0.0]]), False
+    assert collocation._held_between_nodes(program, start) is None
+
+
+def test_where_no_gait_keeps_above_the_parabola_the_smooth_hump_is_tried(
+    rabbit: hs.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = CollocationProgram.solve
+
+    def only_smooth(program: CollocationProgram, guess: np.ndarray, *others: Any) -> Solution:
+        if program.profile is ClearanceProfile.PARABOLA:
+            return Solution(guess, 0.0, False, "no", 0, np.zeros(0))
+        return solve(program, guess, *others)
+
+    monkeypatch.setattr(CollocationProgram, "solve", only_smooth)
+    gait = hs.optimize_gait(rabbit, **STEP)
+    assert gait.clearance_profile is ClearanceProfile.SMOOTH
 
 
 def test_a_robot_s_own_speed_limits_hold(rabbit: hs.Robot, rabbit_gait: hs.PiecewiseGait) -> None:

@@ -1,0 +1,77 @@
+"""Mutations that once passed unseen, by hand."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+from operators import Mutant
+
+# File, what stands there (once), and what is put there.
+KNOWN: tuple[tuple[str, str, str], ...] = (
+    ("sim/recording.py", "-memory.contacts.gap[contact])", "0.0)"),
+    ("sim/recording.py", "max(extreme[CONE], memory.residual[1])", "0.0"),
+    ("sim/recording.py", "max(extreme[CONE], memory.residual[1])", "memory.residual[1]"),
+    ("sim/simulation.py", "penetration=float(extreme[PENETRATION])", "penetration=0.0"),
+    ("sim/simulation.py", "cone=float(extreme[CONE])", "cone=0.0"),
+    ("analysis/summary.py", "slip_max_m=max_slip(run)", "slip_max_m=1e3 * max_slip(run)"),
+    ("analysis/summary.py", "UNKNOWN if tracking is None else tracking.rms",
+     "UNKNOWN if tracking is None else math.degrees(tracking.rms)"),
+    ("analysis/summary.py", "UNKNOWN if tracking is None else tracking.max",
+     "UNKNOWN if tracking is None else math.degrees(tracking.max)"),
+    ("analysis/summary.py", "zmp_margin_min_m=float(margin.min())",
+     "zmp_margin_min_m=100.0 * float(margin.min())"),
+    ("analysis/summary.py", "zmp_margin_min_m=float(margin.min())",
+     "zmp_margin_min_m=float(margin.max())"),
+    ("analysis/summary.py", 'm in {_number(s.duration_s, 4)} s "',
+     'm in {_number(s.duration_s, 4)} ms "'),
+    ("sim/dataset.py", '"m/s or rad/s"', '"m/s or deg/s"'),
+    ("sim/dataset.py", '"N m", "joint torques within their limits"',
+     '"N", "joint torques within their limits"'),
+    ("sim/dataset.py", '"window": ["start", "duration"]', '"window": ["start", "end"]'),
+    ("sim/dataset.py", '"component": ["normal", "tangent"]', '"component": ["tangent", "normal"]'),
+    ("sim/dataset.py", '"units": "N s"', '"units": "N"'),
+    ("sim/dataset.py", '"axis": ["x", "z"]', '"axis": ["z", "x"]'),
+    ("sim/time_stepping.py", "memory.slip[contact] = memory.velocity[2 * place + 1]",
+     "memory.slip[contact] = -memory.velocity[2 * place + 1]"),
+    ("sim/recording.py", "record.slip[row, i] = memory.slip[i]",
+     "record.slip[row, i] = -memory.slip[i]"),
+    ("sim/event_driven.py", "_, record.slip[row, contact] = contact_velocity(",
+     "record.slip[row, contact], _ = contact_velocity("),
+    ("sim/compliant_dynamics.py", "memory.slip[contact] = row_product(",
+     "memory.slip[contact] = -row_product("),
+    ("control/computed_torque.py", "        force[j] -= passive[j]\n", "        pass\n"),
+    ("control/point_feet.py", "        force[j] -= passive[j]\n", "        pass\n"),
+    ("gait/transcription.py", "            - model.contact_radius[i]\n", ""),
+    ("gait/point_support.py", "np.array([0.0, model.contact_radius[contact]])", "np.zeros(2)"),
+)  # fmt: skip
+
+
+def known_mutants(package: Path) -> list[Mutant]:
+    """Return those whose text is still there.
+
+    Raises
+    ------
+    ValueError
+        If a text is not there, or not only there.
+    """
+    mutants = []
+    for file, old, new in KNOWN:
+        text = (package / file).read_text()
+        if text.count(old) != 1:
+            raise ValueError(f"{file} has {text.count(old)} times {old!r}")
+        begin = text.index(old)
+        line = text.count("\n", 0, begin) + 1
+        inside = [
+            node
+            for node in ast.walk(ast.parse(text))
+            if isinstance(node, ast.FunctionDef) and node.lineno <= line <= (node.end_lineno or 0)
+        ]
+        function, scope = 0, ""
+        if inside:
+            innermost = max(inside, key=lambda node: node.lineno)
+            scope = innermost.name
+            function = min([innermost.lineno, *(d.lineno for d in innermost.decorator_list)])
+        end = begin + len(old)
+        mutants.append(Mutant(file, line, function, scope, begin, end, old, new, "known"))
+    return mutants
