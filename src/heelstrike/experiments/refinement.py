@@ -20,6 +20,7 @@ from heelstrike.experiments.walk import walk
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
 from heelstrike.sim import RunStatus, Scheme, TimeStepping, simulate
+from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 
@@ -129,12 +130,14 @@ def refine(
     walks = []
     for scheme in schemes:
         for step in time_steps:
-            run = walk(
-                robot,
-                gait,
-                steps=walking_steps,
-                method=TimeStepping(step=step, scheme=scheme),
-                ground=ground,
+            run = whole(
+                walk(
+                    robot,
+                    gait,
+                    steps=walking_steps,
+                    method=TimeStepping(step=step, scheme=scheme),
+                    ground=ground,
+                )
             )
             summary = summarize(run, gait=gait)
             walks.append(
@@ -182,14 +185,16 @@ def converge(
     def motion(step: float, scheme: Scheme) -> Floats:
         """Coordinates at the instant of comparison, a whole number of all steps."""
         instant = round(COMPARED_AT * gait.step_duration / coarsest) * coarsest
-        run = simulate(
-            robot,
-            ComputedTorque(robot, gait),
-            state=gait.initial_state,
-            duration=instant,
-            method=TimeStepping(step=step, scheme=scheme),
-            ground=ground,
-            record_every=round(instant / step),
+        run = whole(
+            simulate(
+                robot,
+                ComputedTorque(robot, gait),
+                state=gait.initial_state,
+                duration=instant,
+                method=TimeStepping(step=step, scheme=scheme),
+                ground=ground,
+                record_every=round(instant / step),
+            )
         )
         return np.asarray(run.position[-1])
 
