@@ -173,8 +173,9 @@ def test_ctrl_c_before_the_command_begins(
     def interrupted() -> None:
         raise KeyboardInterrupt
 
+    statuses: list[int] = []
     monkeypatch.setattr("heelstrike.cli.main.app", interrupted)
-    with pytest.raises(SystemExit) as end:
-        heelstrike_command()
-    assert end.value.code == 130
+    monkeypatch.setattr("heelstrike.cli.os._exit", statuses.append)
+    heelstrike_command()
+    assert statuses == [130]
     assert capsys.readouterr().err == "interrupted\n"

@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
+from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.terminal import (
-    INTERRUPTED,
     Debug,
     messages,
     output,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.terminal import (
     FAILED,
-    INTERRUPTED,
     Debug,
     messages,
     output,

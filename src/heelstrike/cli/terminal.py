@@ -27,6 +27,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from heelstrike.cli import INTERRUPTED
 from heelstrike.errors import HeelstrikeError
 from heelstrike.interruption import insistent_interrupts
 
@@ -35,9 +36,6 @@ FAILED = 1
 
 WRONG_INPUT = 2
 """Exit status when the request could not be carried out as it was made."""
-
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as a shell has it."""
 
 Debug = Annotated[
     bool, typer.Option("--debug", help="Show where in the program an error arose.", hidden=True)
