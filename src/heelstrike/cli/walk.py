@@ -134,6 +134,8 @@ def walk(
     # After Ctrl-C one wants to have what there is and go: the data, but no pictures of them.
     interrupted = run.status is RunStatus.INTERRUPTED
     kind = None if animation is Animation.NONE or interrupted else animation.value
+    if interrupted:
+        tell("interrupted: writing the data, which Ctrl-C would stop")
     with stage("writing results") as writing:
         try:
             saved = results.save_run(
@@ -141,6 +143,9 @@ def walk(
             )
         finally:
             wrote(*results.written[1:])
+    for each in saved:
+        if each.error is not None:
+            complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
     if interrupted:
         tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
         raise typer.Exit(INTERRUPTED)
@@ -151,9 +156,6 @@ def walk(
         output().print(summary)
         written = ", ".join(each.path.name for each in saved if each.error is None)
         tell(f"in {out}: gait.json, {written}")
-    for each in saved:
-        if each.error is not None:
-            complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
     walked = run.completed and summary.steps >= steps
     if not run.completed:
         complain(run.message)
