@@ -147,6 +147,8 @@ def walk(
         if each.error is not None:
             complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
     if interrupted:
+        if as_json:
+            typer.echo(run.summary(gait=planned).to_json())
         tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
         raise typer.Exit(INTERRUPTED)
     summary = run.summary(gait=planned)
