@@ -22,6 +22,7 @@ from heelstrike.compilation import compiled_for, kernel, uncompiled
 from heelstrike.contact.search import try_solvers
 from heelstrike.quick_compiling import quick_compiling
 from heelstrike.robot import load_robot
+from heelstrike.separate_kernel import SeparateKernel
 from heelstrike.sim.memory import allocate_memory
 
 SOURCE = Path(heelstrike.__file__).parent
@@ -302,6 +303,23 @@ def test_the_other_process_imports_what_this_one_does(tmp_path: Path) -> None:
     )
     assert told.stdout.split() == ["42", "10.5", "True", "1"]
     assert not (elsewhere / "imported").exists()
+
+
+def test_ctrl_c_ends_the_process_that_one_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import time; time.sleep(600)"
+    helper = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+    wait = helper.wait
+
+    def interrupted(timeout: float | None = None) -> int:
+        monkeypatch.setattr(helper, "wait", wait)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(helper, "wait", interrupted)
+    slow = SeparateKernel(lambda: None, lambda: None)
+    monkeypatch.setattr(slow, "_helper", helper)
+    with pytest.raises(KeyboardInterrupt):
+        slow.finish()
+    assert helper.poll() is not None
 
 
 def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:

@@ -21,6 +21,7 @@ import numba
 from numba import njit
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
@@ -177,7 +178,9 @@ def dissolved_kernel(function: Function) -> Function:
     return result
 
 
-def compiled_for(signature: Any, function: Function, *, address: bool = False) -> Function:
+def compiled_for(
+    signature: Any, function: Function, *, address: bool = False, boundscheck: bool = False
+) -> Function:
     """Compile a kernel at once for the given Numba signature, or load its machine code.
 
     Parameters
@@ -188,8 +191,10 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
         The kernel.
     address : bool
         Whether its address is needed, to pass it as an argument to other kernels.
+    boundscheck : bool
+        Whether an index beyond an array raises IndexError.
     """
-    compiled = _with_cache(function, address)
+    compiled = _with_cache(function, address, boundscheck)
     with quick_compiling():
         compiled.compile(signature)
     compiled.disable_compile()
@@ -200,8 +205,10 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     return result
 
 
-def _with_cache(function: Function, address: bool) -> Any:
+def _with_cache(function: Function, address: bool, boundscheck: bool = False) -> Any:
     options = _OPTIONS | {"no_cfunc_wrapper": not address}
+    if boundscheck:
+        options["boundscheck"] = True
     return _kept_on_disk(njit(**options)(function))
 
 
@@ -265,17 +272,25 @@ def uncompiled(function: Function, replace: Mapping[str, Any] | None = None) -> 
 
 
 def _twin(function: Any, replace: dict[str, Any], twins: dict[int, Any]) -> Any:
-    source = function.py_func if isinstance(function, Kernel) else function
+    source = function.py_func if _is_compiled(function) else function
     if id(source) in twins:
         return twins[id(source)]
     scope = dict(source.__globals__)
+    cells = [types.CellType(cell.cell_contents) for cell in source.__closure__ or ()]
     twin = types.FunctionType(
-        source.__code__, scope, source.__name__, source.__defaults__, source.__closure__
+        source.__code__, scope, source.__name__, source.__defaults__, tuple(cells)
     )
     twins[id(source)] = twin
     for name in source.__code__.co_names:
         if name in replace:
             scope[name] = replace[name]
-        elif isinstance(scope.get(name), Kernel):
+        elif _is_compiled(scope.get(name)):
             scope[name] = _twin(scope[name], replace, twins)
+    for cell in cells:
+        if _is_compiled(cell.cell_contents):
+            cell.cell_contents = _twin(cell.cell_contents, replace, twins)
     return twin
+
+
+def _is_compiled(value: Any) -> bool:
+    return isinstance(value, Kernel | Dispatcher)

@@ -194,3 +194,22 @@ def test_usable_arguments() -> None:
         hs.find_limit_cycle(robot, state, landing=[7])
     with pytest.raises(hs.SimulationError, match="mirror image"):
         hs.find_limit_cycle(mechanisms.block(), mechanisms.block().reference_state())
+
+
+def test_ctrl_c_ends_the_search() -> None:
+    """It is no step that was not completed, after which the search would go on elsewhere."""
+    calls = []
+
+    class Interrupted:
+        def torque(self, t: float, state: hs.State, contacts: object) -> NDArray[np.float64]:
+            calls.append(t)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=0.5, gravity=9.81),
+            wheel_state(0.08, 1.0),
+            Interrupted(),
+            ground=hs.Ground(friction=3.0, slope=-0.08),
+        )
+    assert len(calls) == 1

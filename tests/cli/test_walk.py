@@ -211,8 +211,8 @@ def test_interrupted_by_ctrl_c(
     monkeypatch.setattr("heelstrike.cli.terminal.Stage.reached", reached)
     monkeypatch.setattr("heelstrike.experiments.results.Results.save_run", lambda *_, **__: ())
     result = walk("--json")
-    assert result.exit_code == 1
-    assert "error: interrupted at t = " in result.stderr
+    assert result.exit_code == 130
+    assert "interrupted while walking, at t = " in result.stderr
     assert json.loads(result.stdout)["status"] == "interrupted"
 
 

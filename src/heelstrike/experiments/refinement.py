@@ -20,6 +20,7 @@ from heelstrike.experiments.walk import walk
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Run, RunStatus, Scheme, TimeStepping, simulate
+from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 
@@ -134,12 +135,14 @@ def refine(
     walks = []
     for scheme in schemes:
         for step in time_steps:
-            run = walk(
-                robot,
-                gait,
-                steps=walking_steps,
-                method=TimeStepping(step=step, scheme=scheme),
-                ground=ground,
+            run = whole(
+                walk(
+                    robot,
+                    gait,
+                    steps=walking_steps,
+                    method=TimeStepping(step=step, scheme=scheme),
+                    ground=ground,
+                )
             )
             summary = summarize(run, gait=gait)
             walks.append(
@@ -186,14 +189,16 @@ def converge(
 
     def motion(step: float, scheme: Scheme, record_every: int = 1) -> Run:
         """The run to the instant of comparison, a whole number of all steps."""
-        return simulate(
-            robot,
-            ComputedTorque(robot, gait),
-            state=gait.initial_state,
-            duration=instant,
-            method=TimeStepping(step=step, scheme=scheme),
-            ground=ground,
-            record_every=record_every,
+        return whole(
+            simulate(
+                robot,
+                ComputedTorque(robot, gait),
+                state=gait.initial_state,
+                duration=instant,
+                method=TimeStepping(step=step, scheme=scheme),
+                ground=ground,
+                record_every=record_every,
+            )
         )
 
     sole = list(robot.feet[gait.stance_foot].contacts)

@@ -15,6 +15,7 @@ from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import actuated_joints, fingerprint
 from heelstrike.gait.gauss import gauss_scheme
+from heelstrike.gait.ipopt import Ipopt
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.gait.point_starts import point_starts
@@ -170,7 +171,7 @@ class CollocationProgram:
         self._equations = int(exact.numel())
         constraints = casadi.vertcat(exact, touchdown, *along)
         problem = {"x": unknowns, "f": cost, "g": constraints}
-        self._solver = casadi.nlpsol("gait", "ipopt", problem, SETTINGS)
+        self._solver = Ipopt(problem, SETTINGS)
 
     def path_bounds(self, phases: Floats) -> tuple[Floats, Floats]:
         """Scaled bounds of the constraints along the path at phases, (rows, N) each."""
@@ -202,14 +203,13 @@ class CollocationProgram:
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         low[-2], high[-2] = self.request.duration_bounds
         low[-1], high[-1] = self.request.length_bounds
-        found = self._solver(
+        found, statistics = self._solver.solve(
             x0=np.clip(guess, low, high),
             lbx=low,
             ubx=high,
             lbg=np.concatenate(lower),
             ubg=np.concatenate(upper),
         )
-        statistics = self._solver.stats()
         return Solution(
             unknowns=np.array(found["x"]).ravel(),
             objective=float(found["f"]),

@@ -22,6 +22,7 @@ from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.asking import ask
 from heelstrike.sim.compliant_dynamics import (
     GAINS_LAST,
     CompliantWorkspace,
@@ -61,6 +62,7 @@ from heelstrike.sim.engine import (
     Setting,
     whole_steps,
 )
+from heelstrike.sim.guard import guarded
 from heelstrike.sim.memory import (
     CONE,
     PENETRATION,
@@ -456,14 +458,13 @@ def _advance(
             for contact in range(count):
                 memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
         if k % span[CONTROL_EVERY] == 0:
-            controller(
+            ask(
+                controller,
                 time,
                 memory.q,
                 memory.v,
-                memory.contacts,
                 model,
-                memory.tree,
-                memory.scratch,
+                memory,
                 parameters,
                 controller_memory,
                 memory.torque,
@@ -543,6 +544,7 @@ class _CompliantEngine:
         check_room(setting, "step", method.step)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
+        self.spare = guarded(())
         self._work = compliant_workspace(setting.robot.nv, setting.robot.nu, setting.robot.nc)
         numbers = np.zeros(NUMBERS)
         method.law.write(numbers)
@@ -569,6 +571,11 @@ class _CompliantEngine:
                 0,
             ]
         )
+
+    def _spare_for(self, controller_memory: Floats) -> Floats:
+        if self.spare.size != controller_memory.size:
+            self.spare = guarded(controller_memory)
+        return self.spare
 
     @property
     def time(self) -> float:
@@ -599,7 +606,7 @@ class _CompliantEngine:
                 self._laws,
                 parameters,
                 controller_memory,
-                np.empty_like(controller_memory),
+                self._spare_for(controller_memory),
                 setting.memory,
                 self._work,
                 record,
