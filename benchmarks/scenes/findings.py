@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -61,9 +61,17 @@ class Findings:
         if size > tolerance:
             where = names[place[1]] if broken.ndim == 2 and names else ""
             count = int(np.sum(broken > tolerance))
-            self.objections.append(
-                Objection(law, size, tolerance, float(time[place[0]]), where, count)
-            )
+            one = Objection(law, size, tolerance, float(time[place[0]]), where, count)
+            self._object(one)
+
+    def _object(self, new: Objection) -> None:
+        """Keep one objection a law: the worst, with all places counted."""
+        for i, old in enumerate(self.objections):
+            if old.law == new.law:
+                worse = new if new.size > old.size else old
+                self.objections[i] = replace(worse, count=old.count + new.count)
+                return
+        self.objections.append(new)
 
     def broken(self) -> tuple[str, ...]:
         """Names of the laws that were broken."""

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from scenes.findings import Findings
-from scenes.mechanics import Metric, Poses, Tree, across, generalised, rates
+from scenes.mechanics import Metric, Poses, Tree, generalised, rates
 from scenes.terrain import Terrain
 
 Array = NDArray[Any]
@@ -66,6 +67,10 @@ class Rows:
         self.low, self.high = self.measured.lowest_friction, self.measured.highest_friction
         self.contacts = tuple(run.robot.contact_names)
         self.joints = tuple(run.robot.joint_names)
+
+    def metric_of(self, some: slice) -> Metric:
+        """Sizes at some of the rows only."""
+        return Metric(self.matrix[some])
 
     def along(self, world: Array) -> Array:
         """Turn x and z of (T, nc, 2, ...) into normal and tangent."""
@@ -137,6 +142,3 @@ def friction_that_does_not_oppose(
     opposing = -np.sign(speed) * force[..., 1]
     lacks = np.maximum(np.maximum(low * normal - opposing, opposing - high * normal), 0.0)
     return np.minimum(np.abs(speed) / speed_unit, lacks / force_unit)
-
-
-__all__ = ["Rows", "across", "excess_over_cone", "friction_that_does_not_oppose"]

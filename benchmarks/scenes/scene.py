@@ -38,12 +38,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scenes.mechanics import Metric, Poses, Tree
-from scenes.terrain import Terrain
 
 import heelstrike as hs
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.sim import Push
+from scenes.mechanics import Poses, Tree
+from scenes.terrain import Terrain
 
 Array = NDArray[Any]
 Pair = tuple[float, float]

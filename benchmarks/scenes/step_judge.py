@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from heelstrike.sim import Scheme
 from scenes.findings import Findings
 from scenes.mechanics import Metric, generalised, rates
 from scenes.record import Rows, excess_over_cone, friction_that_does_not_oppose
-
-from heelstrike.sim import Scheme
 
 Array = NDArray[Any]
 

@@ -1,0 +1,174 @@
+"""Many scenes in worker processes, one result a line, resumable after any kill.
+
+A scene that takes more than LIMIT seconds of processor time hangs: its worker dies of it and another
+takes its place. (Where the system cannot count processor time, ten times as long on the clock.)
+Results are appended to a file as they come; what is in it is not run again.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import multiprocessing.connection
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from heelstrike.errors import HeelstrikeError
+from scenes.methods import Setting
+from scenes.scene import random_scene
+from scenes.twins import compare_twins
+
+LIMIT = 30.0
+"""Processor seconds after which a scene hangs."""
+WALL = 10.0
+"""How much longer it may take on the clock of a busy machine."""
+WARM = 1_000_000
+"""Seed of the scene with which a worker compiles a method before any clock runs."""
+
+
+def run_scene(method: str, seed: int, *, twins: bool = True) -> dict[str, Any]:
+    """Run, judge and compare one scene; everything in the result is numbers and text."""
+    begin = time.process_time()
+    scene = random_scene(seed)
+    setting = Setting.of(scene)
+    result: dict[str, Any] = {"method": method, "seed": seed, "kind": scene.kind}
+    try:
+        run = setting.run(method)
+    except HeelstrikeError as error:
+        return result | {"status": "refused", "message": str(error)}
+    result |= {"status": run.status.value, "message": run.message, "rows": len(run.time)}
+    result |= {"end": float(run.time[-1]) if len(run.time) else 0.0}
+    result["simulated_s"] = time.process_time() - begin
+    result |= setting.judge(method, run).as_dict()
+    if twins and run.completed:
+        result["twins"] = compare_twins(setting, method, run).as_dict()
+    result["seconds"] = time.process_time() - begin
+    return result
+
+
+def _limit_processor_time(seconds: float) -> None:
+    """Let the system end this process after so many more seconds of work, where it can."""
+    with suppress(ImportError, ValueError, OSError):
+        import resource
+
+        _, hard = resource.getrlimit(resource.RLIMIT_CPU)
+        soft = hard if seconds == float("inf") else int(time.process_time() + seconds + 1.0)
+        resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
+
+
+def _work(pipe: Any) -> None:
+    warnings.simplefilter("ignore")
+    warm: set[str] = set()
+    while True:
+        try:
+            job = pipe.recv()
+        except EOFError:
+            return
+        method, seed, twins = job
+        if method not in warm:
+            with suppress(HeelstrikeError):
+                Setting.of(random_scene(WARM)).run(method, duration=0.01)
+            warm.add(method)
+        pipe.send("begun")
+        _limit_processor_time(LIMIT)
+        result = run_scene(method, seed, twins=twins)
+        _limit_processor_time(float("inf"))
+        pipe.send(result)
+
+
+class _Worker:
+    """A process that runs one scene after the other."""
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_work, args=(theirs,), daemon=True)
+        self.process.start()
+        theirs.close()
+        self.job: tuple[str, int, bool] | None = None
+        self.deadline = float("inf")
+
+    def give(self, job: tuple[str, int, bool]) -> None:
+        self.job, self.deadline = job, float("inf")
+        self.pipe.send(job)
+
+    def answer(self) -> dict[str, Any] | None:
+        """Return the result of its job if there is one, or what became of it."""
+        assert self.job is not None
+        method, seed, _ = self.job
+        lost = {"method": method, "seed": seed, "kind": random_scene(seed).kind}
+        if self.pipe.poll():
+            try:
+                message = self.pipe.recv()
+            except EOFError:
+                self.process.join()
+                code = self.process.exitcode
+                hung = code == -24  # SIGXCPU
+                words = f"more than {LIMIT:g} s" if hung else f"the process ended with {code}"
+                return lost | {"status": "hang" if hung else "crashed", "message": words}
+            if message == "begun":
+                self.deadline = time.monotonic() + WALL * LIMIT
+                return None
+            return dict(message)
+        if time.monotonic() > self.deadline:
+            self.end()
+            return lost | {
+                "status": "hang",
+                "message": f"more than {WALL * LIMIT:g} s on the clock",
+            }
+        return None
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
+
+
+def results_in(path: Path) -> list[dict[str, Any]]:
+    """Read the results of a file; a last line cut short by a kill is left out."""
+    results = []
+    if path.exists():
+        for line in path.read_text().splitlines():
+            with suppress(json.JSONDecodeError):
+                results.append(json.loads(line))
+    return results
+
+
+def campaign(
+    path: Path, methods: Sequence[str], seeds: Sequence[int], *, workers: int = 1,
+    twins: bool = True,
+) -> Iterator[dict[str, Any]]:  # fmt: skip
+    """Run what is not in a file of results yet and append it; yield each result as it comes."""
+    known = {(one["method"], one["seed"]) for one in results_in(path)}
+    jobs = [(m, s, twins) for m in methods for s in seeds if (m, s) not in known]
+    jobs.reverse()
+    whole = not path.exists() or path.read_bytes()[-1:] in (b"\n", b"")
+    busy: list[_Worker] = []
+    with path.open("a") as file:
+        if not whole:
+            file.write("\n")
+        try:
+            while jobs or busy:
+                while jobs and len(busy) < workers:
+                    busy.append(_Worker())
+                    busy[-1].give(jobs.pop())
+                multiprocessing.connection.wait([one.pipe for one in busy], timeout=1.0)
+                for worker in list(busy):
+                    result = worker.answer()
+                    if result is None:
+                        continue
+                    file.write(json.dumps(result) + "\n")
+                    file.flush()
+                    yield result
+                    if jobs and worker.process.is_alive():
+                        worker.give(jobs.pop())
+                    else:
+                        busy.remove(worker)
+                        worker.end()
+        finally:
+            for worker in busy:
+                worker.end()
