@@ -44,6 +44,8 @@ LAW = 1e-6
 """Contact laws, relative to the size of their data."""
 TOUCH = 1e-8
 """Gap (m, rad) up to which a contact or stop is on its limit."""
+MOVING = 1e-9
+"""Speed (m/s, rad/s) below which nothing slides or leaves."""
 CLOSED, RESTING = 1e-13, 1e-10
 """Gap and speed up to which a point is held on the ground, and not in a bounce too small to see."""
 DEPTH = 1e-7
@@ -56,7 +58,7 @@ GAIN = 1e-8
 """Energy that an impact makes without saying so, relative to what there is."""
 TOGETHER = 5e-11
 """Gap (m) up to which a point takes part in an impact elsewhere."""
-INSTANT = 1e-11
+INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.PAINLEVE)
@@ -130,8 +132,9 @@ class _Events:
             cone = excess_over_cone(rows.force, rows.high) / (size / weight[..., 1])
             found.look("friction cone", cone, LAW, time, names)
             slip = rows.speed[..., 1]
+            slides = np.where(np.abs(slip) > MOVING, slip, 0.0)
             wrong = friction_that_does_not_oppose(
-                rows.force, slip, rows.low, rows.high, size / weight[..., 1], speed_unit[..., 1]
+                rows.force, slides, rows.low, rows.high, size / weight[..., 1], speed_unit[..., 1]
             )
             found.look("friction opposes", wrong, LAW, time, names)
             recorded = np.abs(rows.run.slip_velocity - slip) / speed_unit[..., 1]
@@ -186,6 +189,7 @@ class _Events:
         over = (np.abs(dry) - most) * weight / size
         found.look("dry friction: limit", over, LAW, time, names)
         lacks = np.abs(dry + most * np.sign(rows.v)) * weight / size
+        lacks = np.where(np.abs(rows.v) > MOVING, lacks, 0.0)
         found.look("dry friction: opposes", np.minimum(lacks, speed), LAW, time, names)
         slack = (most - np.abs(dry)) * weight / size
         loose = np.minimum(np.abs(self.acceleration) / (weight * size), slack)
@@ -272,7 +276,7 @@ class _Events:
             came = rates(rows.jacobian[one], before[None])
             went = rates(rows.jacobian[one], after[None])
             unit = size / weight
-            on = rows.gap[one] <= TOGETHER
+            on = (rows.gap[one] <= TOGETHER) & (came[..., 0] <= MOVING)
             bounce = rows.measured.restitution[one] * np.minimum(came[..., 0], 0.0)
             # Bounces too short to follow are plastic: their limit is computed instead.
             brief = np.abs(bounce) < 1e-2
@@ -418,12 +422,13 @@ def _weights(time: Array, begin: float, end: float, twice: bool) -> Array:
 
     Or in that of its integral, if it is to be integrated twice.
     """
-    span = end - begin
+    unit = max(end - begin, float(np.max(np.abs(time - begin))))
+    part = (end - begin) / unit
     powers = np.arange(len(time))
-    moments = span / (powers + 1.0)
+    moments = unit * part ** (powers + 1.0) / (powers + 1.0)
     if twice:
-        moments *= span / (powers + 2.0)
-    return np.linalg.solve(np.vander((time - begin) / span, increasing=True).T, moments)
+        moments *= unit * part / (powers + 2.0)
+    return np.linalg.solve(np.vander((time - begin) / unit, increasing=True).T, moments)
 
 
 def _integrate(

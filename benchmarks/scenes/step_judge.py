@@ -95,7 +95,7 @@ class _Steps:
         self.known = known
         size = self.metric.of_velocity
         self.size = size(self.before) + size(self.after) + self.h * self.metric.of_force(known)
-        self.size = np.maximum(self.size, 1e-300)
+        self.size = np.maximum(self.size, 1e-100)
         self.gap = rows.gap[:-1]
         self.asked_for = np.zeros(len(self.time))
         """Energy that the bounds b of the normal velocities ask for."""
