@@ -17,9 +17,9 @@ from pathlib import Path
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from scenes.campaign import campaign, results_in, run_scene
-from scenes.methods import METHODS
-from scenes.table import page
+from scenes.campaign import campaign, results_in, run_scene  # noqa: E402
+from scenes.methods import METHODS  # noqa: E402
+from scenes.table import page  # noqa: E402
 
 
 def _seeds(text: str) -> range:

@@ -1,7 +1,7 @@
 """Many scenes in worker processes, one result a line, resumable after any kill.
 
-A scene that takes more than LIMIT seconds of processor time hangs: its worker dies of it and another
-takes its place. (Where the system cannot count processor time, CLOCK seconds on the clock.)
+A scene that takes more than LIMIT seconds of processor time hangs: its worker dies of it and
+another takes its place. (Where the system cannot count processor time, CLOCK seconds on the clock.)
 Results are appended to a file as they come; what is in it is not run again.
 """
 
@@ -135,10 +135,8 @@ class _Worker:
             return dict(message)
         if time.monotonic() > self.deadline:
             self.end()
-            return lost | {
-                "status": "hang",
-                "message": f"more than {WALL * LIMIT:g} s on the clock",
-            }
+            words = f"more than {self.task.clock:g} s on the clock"
+            return lost | {"status": "hang", "message": words}
         return None
 
     def end(self) -> None:

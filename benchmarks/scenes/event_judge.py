@@ -263,11 +263,10 @@ class _Events:
             if k not in gains:
                 found.look("impact makes energy", np.array([gained / size**2]), GAIN, time)
             if most.get(k, 0) == 1 and b - a <= 1:
-                self.impact_law(found, one, p, s, before, after, size, k)
+                self.impact_law(found, one, p, s, before, after, size)
 
     def impact_law(
-        self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array,
-        size: float, k: int,
+        self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array, size: float,
     ) -> None:  # fmt: skip
         rows, time, names = self.rows, self.rows.time[one], self.rows.contacts
         metric = rows.metric_of(one)

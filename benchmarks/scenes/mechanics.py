@@ -134,7 +134,7 @@ class Poses:
         return matrix + (tree.turn.T * numbers.inertia) @ tree.turn + np.diag(numbers.armature)
 
     def bias_force(self, v: Array) -> Array:
-        """Centrifugal, Coriolis and gravitational forces H (T, n), which the mass matrix resists."""
+        """Centrifugal, Coriolis and gravitational forces H (T, n)."""
         numbers, tree = self.tree.numbers, self.tree
         links = np.arange(tree.size)
         pull = self.bias_acceleration(v, links, self.center) - numbers.gravity

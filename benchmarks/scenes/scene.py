@@ -28,7 +28,7 @@ One scene in ten is **degenerate on purpose** and says so in its `kind`: `twin p
 of one link a micron apart), `in a corner` (a disc that touches both sides of a concave corner),
 `on a corner` (a foot that rests on a convex corner), `flat fall` (a long sole of four points that
 falls without turning), `at a stop` (joints that begin at their stops), `light toe` (a last link of
-10 g), `wedged` (high friction under a steep leg that slides: Painlevé's region).
+10 g), `wedged` (a rod that slides on its end under high friction, where Painlevé's paradox is near).
 """
 
 from __future__ import annotations
@@ -225,8 +225,8 @@ def random_scene(seed: int) -> Scene:
         return _flat_fall(draw, seed)
     if kind == "wedged":
         return _wedged(draw, seed)
-    links = _tree(draw, floating, light=kind == "light toe")
-    contacts = _contacts(draw, links, floating, kind)
+    links = _tree(draw, light=kind == "light toe")
+    contacts = _contacts(draw, links, floating=floating, kind=kind)
     corners, friction, restitution = _ground(draw, kind)
     scene = Scene(seed, kind, floating, links, contacts, corners, friction, restitution)
     scene = _start(draw, scene)
@@ -242,7 +242,7 @@ def least_inertias(scene: Scene) -> dict[str, float]:
     return dict(zip(robot.joint_names, inertia.tolist(), strict=True))
 
 
-def _tree(draw: np.random.Generator, floating: bool, *, light: bool) -> tuple[Link, ...]:
+def _tree(draw: np.random.Generator, *, light: bool) -> tuple[Link, ...]:
     count = int(draw.integers(1, 15))
     if light:
         count = max(count, 3)
@@ -287,7 +287,7 @@ def _tree(draw: np.random.Generator, floating: bool, *, light: bool) -> tuple[Li
 
 
 def _contacts(
-    draw: np.random.Generator, links: tuple[Link, ...], floating: bool, kind: str
+    draw: np.random.Generator, links: tuple[Link, ...], *, floating: bool, kind: str
 ) -> tuple[Contact, ...]:
     carried = {link.parent for link in links}
     contacts: list[Contact] = []
@@ -396,18 +396,16 @@ def placed(scene: Scene, drop: float) -> Scene:
         goal = middle * (radius[last] / (terrain.normal[0] @ middle))
         if scene.kind == "on a corner":
             goal = middle / np.linalg.norm(middle) * radius[last]
-        center = center + [goal[0] - center[last, 0], 0.0]
-        q = scene.q | {
-            "root_x": scene.q["root_x"] + float(center[last, 0] - _x(poses, model, last))
-        }
-        scene = replace(scene, q=q)
+        aside = float(goal[0] - center[last, 0])
+        center = center + np.array([aside, 0.0])
+        scene = replace(scene, q=scene.q | {"root_x": scene.q["root_x"] + aside})
     height = 10.0 + float(np.max(np.abs(center)))
-    center = center + [0.0, height]
+    center = center + np.array([0.0, height])
     for _ in range(500):
         gap = float(np.min(terrain.measure(center).distance - radius))
         if abs(gap - drop) < 1e-13:
             break
-        center = center - [0.0, gap - drop]
+        center = center - np.array([0.0, gap - drop])
         height -= gap - drop
     height += 1e-12
     if scene.floating:
@@ -415,10 +413,6 @@ def placed(scene: Scene, drop: float) -> Scene:
     root = scene.links[0]
     root = replace(root, at=(root.at[0], root.at[1] + height))
     return replace(scene, links=(root, *scene.links[1:]))
-
-
-def _x(poses: Poses, model: Any, contact: int) -> float:
-    return float(poses.points(model.contact_link, model.contact_position)[0, contact, 0])
 
 
 def _joint_forces(draw: np.random.Generator, scene: Scene) -> Scene:
@@ -516,7 +510,8 @@ def _wedged(draw: np.random.Generator, seed: int) -> Scene:
     links = (Link("link0", -1, (0.0, 0.0), mass=1.0, inertia=length**2 / 12.0),)
     names = ("root_x", "root_z", "root_pitch")
     scene = Scene(
-        seed, "wedged", True, links, (Contact(0, (0.0, -length / 2)), Contact(0, (0.0, length / 2))),
+        seed, "wedged", True, links,
+        (Contact(0, (0.0, -length / 2)), Contact(0, (0.0, length / 2))),
         np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([draw.uniform(1.0, 3.0)]), np.array([0.0]),
         q=dict.fromkeys(names, 0.0) | {"root_pitch": lean},
         v=dict(zip(names, (float(draw.uniform(-2.0, 2.0)), 0.0, 0.0), strict=True)),

@@ -159,10 +159,10 @@ def compare_twins(original: Setting, name: str, run: Any) -> Findings:
             if other.completed and len(other.time):
                 end = twin.back(other.position[-1], other.velocity[-1])
                 apart = _difference(run, row, target, end, duration)
-            if apart > tolerance and name in STEPPING and other.completed:
-                if not twin.setting.judge(name, other).objections:
-                    several += 1
-                    continue
+            differs = apart > tolerance and name in STEPPING and other.completed
+            if differs and not twin.setting.judge(name, other).objections:
+                several += 1
+                continue
             found.look(law, np.array([apart]), tolerance, run.time[row:])
     found.figures["twins compared"] = compared
     found.figures["twins with another solution"] = several

@@ -91,7 +91,7 @@ def test_force_in_the_air() -> None:
     up = np.array([0.0, 0.01])
     run = dataclasses.replace(
         run,
-        position=run.position + [0.0, 0.01, 0.0],
+        position=run.position + np.array([0.0, 0.01, 0.0]),
         contact_point=run.contact_point + up,
         gap=run.gap + 0.01,
     )

@@ -107,9 +107,12 @@ def test_friction_of_an_impact() -> None:
 
 def test_impact_in_the_air() -> None:
     run = bouncing()
-    raised = run.position + [0.0, 0.01]
+    raised = run.position + np.array([0.0, 0.01])
     run = dataclasses.replace(
-        run, position=raised, contact_point=run.contact_point + [0.0, 0.01], gap=run.gap + 0.01
+        run,
+        position=raised,
+        contact_point=run.contact_point + np.array([0.0, 0.01]),
+        gap=run.gap + 0.01,
     )
     assert "impact: without touch" in broken(judge_events(run))
 

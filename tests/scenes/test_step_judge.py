@@ -204,7 +204,7 @@ def test_falling_through() -> None:
 def test_record_of_the_geometry(name: str) -> None:
     tilt = {
         "gap": lambda g: g + 1e-6,
-        "contact_point": lambda p: p + [1e-6, 0.0],
+        "contact_point": lambda p: p + np.array([1e-6, 0.0]),
         "contact_normal": lambda n: n @ np.array([[np.cos(1e-3), 0.001], [-0.001, np.cos(1e-3)]]),
     }[name]
     run = changed(sliding(), name, tilt, slice(5, 6))
