@@ -8,13 +8,15 @@ committed table. The modules, from the bottom up:
     written a second time in plain numpy, over all rows of a record at once.
 ``scene``
     What a scene is, and the random one of a seed.
-``findings``
-    Laws that were measured, and how badly each was broken where.
+``findings``, ``record``
+    Laws that were measured, and how badly each was broken where; the mechanics at a run's rows.
 ``step_judge``, ``event_judge``, ``compliant_judge``
     The laws of time stepping, of event-driven runs and of compliant ground, re-derived from the
     record alone. Nothing of :mod:`heelstrike.sim`, ``contact`` or ``dynamics`` takes part.
 ``twins``
     The same scene mirrored, with its links in another order, or begun again.
+``methods``, ``running``
+    The ways through time by name; one scene under one of them.
 ``campaign``, ``table``
     Many scenes in worker processes, resumable, and the page that sums them up.
 """

@@ -17,8 +17,9 @@ from pathlib import Path
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from scenes.campaign import campaign, results_in, run_scene  # noqa: E402
+from scenes.campaign import Task, campaign, results_in  # noqa: E402
 from scenes.methods import METHODS  # noqa: E402
+from scenes.running import prepare, run_scene  # noqa: E402
 from scenes.table import page  # noqa: E402
 
 
@@ -50,7 +51,12 @@ def main() -> None:
     if options.command == "run":
         twins = not options.without_twins
         for one in campaign(
-            options.out, options.methods, options.seeds, workers=options.workers, twins=twins
+            options.out,
+            options.methods,
+            options.seeds,
+            workers=options.workers,
+            task=Task(run_scene, prepare),
+            twins=twins,
         ):
             found = one.get("objections", []) + one.get("twins", {}).get("objections", [])
             words = "; ".join(f"{o['law']} {o['size']:.1e}" for o in found)

@@ -18,37 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from heelstrike.errors import HeelstrikeError
-from scenes.methods import Setting
-from scenes.scene import random_scene
-from scenes.twins import compare_twins
-
 LIMIT = 30.0
 """Processor seconds after which a scene hangs."""
-CLOCK = 300.0
+CLOCK = 3600.0
 """Seconds on the clock after which it does, however busy the machine."""
-WARM = 1_000_000
-"""Seed of the scene with which a worker compiles a method before any clock runs."""
-
-
-def run_scene(method: str, seed: int, *, twins: bool = True) -> dict[str, Any]:
-    """Run, judge and compare one scene; everything in the result is numbers and text."""
-    begin = time.process_time()
-    scene = random_scene(seed)
-    setting = Setting.of(scene)
-    result: dict[str, Any] = {"method": method, "seed": seed, "kind": scene.kind}
-    try:
-        run = setting.run(method)
-    except HeelstrikeError as error:
-        return result | {"status": "refused", "message": str(error)}
-    result |= {"status": run.status.value, "message": run.message, "rows": len(run.time)}
-    result |= {"end": float(run.time[-1]) if len(run.time) else 0.0}
-    result["simulated_s"] = time.process_time() - begin
-    result |= setting.judge(method, run).as_dict()
-    if twins and run.completed:
-        result["twins"] = compare_twins(setting, method, run).as_dict()
-    result["seconds"] = time.process_time() - begin
-    return result
 
 
 def _limit_processor_time(seconds: float) -> None:
@@ -61,18 +34,22 @@ def _limit_processor_time(seconds: float) -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
 
 
-def prepare(method: str) -> None:
-    """Compile a method, so that no scene has to wait for it."""
-    with suppress(HeelstrikeError):
-        Setting.of(random_scene(WARM)).run(method, duration=0.01)
-
-
 @dataclass(frozen=True)
 class Task:
-    """What workers do: tests put other work in the place of scenes."""
+    """What workers do with a method and a seed.
 
-    run: Callable[..., dict[str, Any]] = run_scene
-    prepare: Callable[[str], None] = prepare
+    Attributes
+    ----------
+    run : callable
+        Gets method and seed, and whether to compare twins; returns a result that JSON can hold.
+    prepare : callable
+        Gets a method before its first scene, with no clock running.
+    limit, clock : float
+        Seconds of processor time, and on the clock, after which a scene hangs.
+    """
+
+    run: Callable[..., dict[str, Any]]
+    prepare: Callable[[str], None]
     limit: float = LIMIT
     clock: float = CLOCK
 
@@ -117,7 +94,7 @@ class _Worker:
         """Return the result of its job if there is one, or what became of it."""
         assert self.job is not None
         method, seed, _ = self.job
-        lost = {"method": method, "seed": seed, "kind": random_scene(seed).kind}
+        lost = {"method": method, "seed": seed}
         if self.pipe.poll():
             try:
                 message = self.pipe.recv()
@@ -157,7 +134,7 @@ def results_in(path: Path) -> list[dict[str, Any]]:
 
 def campaign(
     path: Path, methods: Sequence[str], seeds: Sequence[int], *, workers: int = 1,
-    twins: bool = True, task: Task | None = None,
+    task: Task, twins: bool = True,
 ) -> Iterator[dict[str, Any]]:  # fmt: skip
     """Run what is not in a file of results yet and append it; yield each result as it comes."""
     known = {(one["method"], one["seed"]) for one in results_in(path)}
@@ -171,7 +148,7 @@ def campaign(
         try:
             while jobs or busy:
                 while jobs and len(busy) < workers:
-                    busy.append(_Worker(task or Task()))
+                    busy.append(_Worker(task))
                     busy[-1].give(jobs.pop())
                 multiprocessing.connection.wait([one.pipe for one in busy], timeout=1.0)
                 for worker in list(busy):

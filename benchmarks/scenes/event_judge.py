@@ -266,7 +266,8 @@ class _Events:
                 self.impact_law(found, one, p, s, before, after, size)
 
     def impact_law(
-        self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array, size: float,
+        self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array,
+        size: float,
     ) -> None:  # fmt: skip
         rows, time, names = self.rows, self.rows.time[one], self.rows.contacts
         metric = rows.metric_of(one)

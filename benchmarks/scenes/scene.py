@@ -28,7 +28,7 @@ One scene in ten is **degenerate on purpose** and says so in its `kind`: `twin p
 of one link a micron apart), `in a corner` (a disc that touches both sides of a concave corner),
 `on a corner` (a foot that rests on a convex corner), `flat fall` (a long sole of four points that
 falls without turning), `at a stop` (joints that begin at their stops), `light toe` (a last link of
-10 g), `wedged` (a rod that slides on its end under high friction, where Painlevé's paradox is near).
+10 g), `wedged` (a rod that slides on its end under high friction: near Painlevé's paradox).
 """
 
 from __future__ import annotations

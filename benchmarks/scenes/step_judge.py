@@ -9,8 +9,8 @@ One row a step is needed (``record_every=1``). With the recorded state (q, v), t
 - motion: ``q⁺ = q + h v⁺``; the explicit scheme moves with v, Moreau-Jean with the mean of the two.
 - contact: ``w_n ≥ b ⟂ λ_n ≥ 0`` with w = J v⁺ and b = −gap/h (gap linearised), b = 0 where
   gap ≤ activation (the paper's), b = −e w_n of before where the gap is foreseen to close
-  (Moreau-Jean); elsewhere λ = 0. The friction cone, and friction of μ λ_n against what slides. Stops are contacts
-  without friction, dry friction of joints a contact with a known normal force.
+  (Moreau-Jean); elsewhere λ = 0. The friction cone, and friction of μ λ_n against what slides.
+  Stops are contacts without friction, dry friction of joints a contact with a known normal force.
 - energy: the contact solve takes kinetic energy, but for what b > 0 asks for: λ_n b.
 
 All is measured in kinetic sizes (:class:`scenes.mechanics.Metric`) relative to the size of the
