@@ -80,8 +80,10 @@ class _Samples:
         pushes = np.array([one.force for one in run.pushes]).reshape(-1, 2)
         known = model.mass.sum() * model.gravity + self.share[:-1] @ pushes
         left = np.diff(p, axis=0) - self.h * (known + ground.sum(axis=1))
-        # Normals turn at corners within a sample.
+        # Normals turn at corners, where a disc may meet one side and the other within a sample.
         turned = np.linalg.norm(np.diff(rows.normal, axis=0), axis=-1)
+        turned[1:] = np.maximum(turned[1:], turned[:-1])
+        turned[:-1] = np.maximum(turned[:-1], turned[1:])
         vague = self.h * np.sum(turned * np.linalg.norm(rows.force[:-1], axis=-1), axis=1)
         unit = np.linalg.norm(p, axis=1).max() + self.h * model.mass.sum() * 9.81
         wrong = np.maximum(np.linalg.norm(left, axis=1) - 2.0 * vague, 0.0) / unit

@@ -16,9 +16,9 @@ jump between two rows of one time, by impulses that stand in the events. Promise
 - energy: the work of motors, dampers, pushes, friction and stops explains its change; an impact
   never makes any, except by Newton's restitution with friction, where the run has to say so.
 
-Velocities count in kinetic sizes relative to ``|v|``, forces relative to the size of the known
-forces. What happens within an interval in which a push begins or ends has no row; such intervals
-are left out and counted.
+Velocities count in kinetic sizes relative to ``|v|`` and what the known forces do in a millisecond,
+forces relative to the size of the known forces. What happens within an interval in which a push
+begins or ends has no row; such intervals are left out and counted.
 """
 
 from __future__ import annotations
@@ -58,6 +58,8 @@ GAIN = 1e-8
 """Energy that an impact makes without saying so, relative to what there is."""
 TOGETHER = 5e-11
 """Gap (m) up to which a point takes part in an impact elsewhere."""
+ROW = 1e-3
+"""What the known forces do in this time (s) is a velocity to reckon with, even at rest."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
 
@@ -95,7 +97,7 @@ class _Events:
         self.known = rows.smooth + self.pushed
         self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
         self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
-        self.speed_size = rows.metric.of_velocity(rows.v)
+        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -255,7 +257,7 @@ class _Events:
             found.look("teleport", leap[None], MOTION, time, rows.joints)
             one = slice(a, a + 1)
             matrix = rows.matrix[a]
-            size = _size(matrix, before) + _size(matrix, after) + 1e-9
+            size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
             unexplained = rows.metric_of(one).of_force(left[None]) / size
             found.look("balance of an impact", unexplained, JUMP, time)

@@ -25,10 +25,11 @@
   joint is beyond its stops.
 
 One scene in ten is **degenerate on purpose** and says so in its `kind`: `twin points` (two contacts
-of one link a micron apart), `in a corner` (a disc that touches both sides of a concave corner),
-`on a corner` (a foot that rests on a convex corner), `flat fall` (a long sole of four points that
-falls without turning), `at a stop` (joints that begin at their stops), `light toe` (a last link of
-10 g), `wedged` (a rod that slides on its end under high friction: near Painlevé's paradox).
+of one link a micron apart), `in a corner` (its only contact, a disc, touches both sides of a
+concave corner), `on a corner` (the same on a convex corner), `flat fall` (a long sole of four
+points that falls without turning), `at a stop` (joints that begin at their stops), `light toe` (a
+last link of 10 g), `wedged` (a rod that slides on its end under high friction: near Painlevé's
+paradox).
 """
 
 from __future__ import annotations
@@ -225,7 +226,7 @@ def random_scene(seed: int) -> Scene:
         return _flat_fall(draw, seed)
     if kind == "wedged":
         return _wedged(draw, seed)
-    links = _tree(draw, light=kind == "light toe")
+    links = _tree(draw, kind)
     contacts = _contacts(draw, links, floating=floating, kind=kind)
     corners, friction, restitution = _ground(draw, kind)
     scene = Scene(seed, kind, floating, links, contacts, corners, friction, restitution)
@@ -242,9 +243,9 @@ def least_inertias(scene: Scene) -> dict[str, float]:
     return dict(zip(robot.joint_names, inertia.tolist(), strict=True))
 
 
-def _tree(draw: np.random.Generator, *, light: bool) -> tuple[Link, ...]:
+def _tree(draw: np.random.Generator, kind: str) -> tuple[Link, ...]:
     count = int(draw.integers(1, 15))
-    if light:
+    if kind in ("light toe", "at a stop"):
         count = max(count, 3)
     links: list[Link] = []
     lengths: list[float] = []
@@ -252,7 +253,7 @@ def _tree(draw: np.random.Generator, *, light: bool) -> tuple[Link, ...]:
         parent = -1 if i == 0 else int(draw.integers(max(0, i - 3), i))
         length = float(draw.uniform(0.1, 0.45))
         mass = float(np.exp(draw.uniform(np.log(0.2), np.log(8.0))))
-        if light and i == count - 1:
+        if kind == "light toe" and i == count - 1:
             mass = 0.01
         gyration = draw.uniform(0.2, 0.4) * length
         at = (0.0, 0.0)
@@ -309,6 +310,8 @@ def _contacts(
             contacts.append(Contact(i, (x, z), radius))
             if kind == "twin points":
                 contacts.append(Contact(i, (x + 1e-6, z), radius))
+    if kind in ("in a corner", "on a corner"):  # nothing else shall touch first
+        return tuple(one for one in contacts if one.link == len(links) - 1)
     return tuple(contacts[:MOST_CONTACTS])
 
 
@@ -432,7 +435,7 @@ def _joint_forces(draw: np.random.Generator, scene: Scene) -> Scene:
             numbers["dry_friction"] = float(felt * draw.uniform(1.0, 60.0) * unit)
         if draw.random() < 0.4 or scene.kind == "at a stop":
             low, high = now - unit * draw.uniform(0.1, 1.5), now + unit * draw.uniform(0.1, 1.5)
-            if scene.kind == "at a stop" and draw.random() < 0.7:
+            if scene.kind == "at a stop" and (draw.random() < 0.7 or i == len(links) - 1):
                 low, high = (now, high) if draw.random() < 0.5 else (low, now)
             numbers["limits"] = (float(low), float(high))
         if draw.random() < 0.8:

@@ -27,7 +27,7 @@ def test_same_seed_same_scene() -> None:
     assert repr(random_scene(1)) != repr(random_scene(2))
 
 
-@pytest.mark.parametrize("seed", range(60))
+@pytest.mark.parametrize("seed", range(30))
 def test_starts_are_above_or_on_the_ground(seed: int) -> None:
     scene = random_scene(seed)
     robot, gap = first_gaps(scene)
@@ -38,11 +38,11 @@ def test_starts_are_above_or_on_the_ground(seed: int) -> None:
 
 
 def test_what_is_drawn() -> None:
-    """The words of the module, counted over four hundred seeds."""
-    scenes = [random_scene(seed) for seed in range(400)]
+    """The words of the module, counted over 240 seeds."""
+    scenes = [random_scene(seed) for seed in range(240)]
     kinds = Counter(scene.kind for scene in scenes)
     assert set(kinds) == {"ordinary", *DEGENERATE}
-    assert 0.85 < kinds["ordinary"] / 400 < 0.95
+    assert 0.85 < kinds["ordinary"] / 240 < 0.95
     sizes = Counter(len(scene.links) for scene in scenes)
     assert set(sizes) == set(range(1, 15))
     links = [link for scene in scenes for link in scene.links]
@@ -54,11 +54,11 @@ def test_what_is_drawn() -> None:
     assert any(one.radius > 0.0 for scene in scenes for one in scene.contacts)
     assert max(len(scene.contacts) for scene in scenes) == 10
     friction = np.array([scene.friction.max() for scene in scenes])
-    assert np.sum(friction == 0.0) > 20
-    assert np.sum(friction > 1.0) > 20
+    assert np.sum(friction == 0.0) > 10
+    assert np.sum(friction > 1.0) > 10
     assert any(len(set(scene.friction)) > 1 for scene in scenes)
-    assert 80 < sum(scene.restitution[0] > 0.0 for scene in scenes) < 180
-    assert 60 < sum(not scene.floating for scene in scenes) < 140
+    assert 50 < sum(scene.restitution[0] > 0.0 for scene in scenes) < 110
+    assert 30 < sum(not scene.floating for scene in scenes) < 85
     assert any(scene.shoves for scene in scenes)
     assert any(scene.kp for scene in scenes)
     assert any(scene.torque for scene in scenes)

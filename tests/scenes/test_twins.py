@@ -73,10 +73,13 @@ def test_a_run_that_its_twins_do_not_share(method: str) -> None:
     found = compare_twins(setting, method, run)
     assert not found.objections
     assert found.figures["twins compared"] >= 6
-    velocity = run.velocity + 0.01 * run.time[:, None]
-    drifted = dataclasses.replace(run, velocity=velocity)
-    broken = compare_twins(setting, method, drifted).broken()
-    assert {"twin: mirrored", "twin: renumbered", "twin: begun again"} <= set(broken)
+    velocity = run.velocity + run.time[:, None]
+    drifted = compare_twins(setting, method, dataclasses.replace(run, velocity=velocity))
+    if method == "event_driven":
+        names = {"twin: mirrored", "twin: renumbered", "twin: begun again"}
+        assert names <= set(drifted.broken())
+    else:  # the twins break no law, so that they count as other solutions; the run's judge objects
+        assert drifted.figures["twins with another solution"] > 10
 
 
 def test_a_wrong_mirror_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
