@@ -85,12 +85,44 @@ def test_twins_replace_names_in_all_that_they_call() -> None:
     assert not hasattr(uncompiled(inner), "py_func")
 
 
-def test_a_function_without_a_file_is_compiled_and_not_kept() -> None:
-    """As it is when somebody types a controller at Python's prompt."""
-    scope: dict[str, Any] = {}
-    exec("def double(x):\n    return 2.0 * x", scope)
-    compiled = compiled_for(types.float64(types.float64), scope["double"])
-    assert compiled(1.5) == 3.0
+@pytest.mark.filterwarnings("error")
+def test_a_function_without_a_module_is_compiled_every_time() -> None:
+    """As `exec` makes them: in the next process Numba would look for their module."""
+    for _ in range(2):
+        scope: dict[str, Any] = {}
+        exec("def double(x):\n    return 2.0 * x", scope)
+        compiled = compiled_for(types.float64(types.float64), scope["double"])
+        assert compiled(1.5) == 3.0
+        assert not compiled.stats.cache_hits
+
+
+TYPED = """
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def double(x):
+    return 2.0 * x
+
+compiled = compiled_for(types.float64(types.float64), double)
+print(compiled(1.5), sum(compiled.stats.cache_hits.values()))
+"""
+
+
+def test_a_function_typed_at_a_prompt_is_kept_for_the_next(tmp_path: Path) -> None:
+    def answer(text: str) -> str:
+        told = subprocess.run(
+            [sys.executable, "-"],
+            input=text,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer(TYPED) == "3.0 0"
+    assert answer(TYPED) == "3.0 1"
+    assert answer(TYPED.replace("2.0 * x", "3.0 * x")) == "4.5 0"
 
 
 def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:

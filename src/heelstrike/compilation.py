@@ -62,7 +62,9 @@ class _PackageCache(NullCache):
     def __init__(self, compiled: Any) -> None:
         function = compiled.py_func
         source = Path(function.__code__.co_filename)
-        self.places = directories(source if source.is_file() else None)
+        # To load machine code Numba imports the module by its name.
+        has_module = function.__module__ in sys.modules
+        self.places = directories(source if source.is_file() else None) if has_module else []
         self._made_of = made_of(function)
         self._options = sorted(compiled.targetoptions.items())
         self._is_ours = is_ours(function)
@@ -72,7 +74,7 @@ class _PackageCache(NullCache):
     @property
     def cache_path(self) -> str:
         """Where machine code is kept if that can be written."""
-        return str(self.places[0])
+        return str(self.places[0]) if self.places else ""
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Load machine code, if there is some.
@@ -86,7 +88,13 @@ class _PackageCache(NullCache):
         else:
             context.refresh()
         found = self.read(signature, context.codegen())
-        return None if found is None else CompileResult._rebuild(context, *pickle.loads(found))
+        if found is None:
+            return None
+        try:
+            parts = pickle.loads(found)
+        except (AttributeError, ImportError):  # it calls kernels of modules that are not here now
+            return None
+        return CompileResult._rebuild(context, *parts)
 
     def read(self, signature: Any, codegen: Any) -> bytes | None:
         """Return what is kept for a signature, if there is something."""

@@ -84,7 +84,7 @@ def read(places: Sequence[Path], name: str, key: bytes) -> bytes | None:
 
 
 def write(places: Sequence[Path], name: str, key: bytes, code: bytes) -> None:
-    """Keep code under a name, in the first place that takes it."""
+    """Keep code under a name, in the first place that takes it; nowhere if none is given."""
     content = key + code
     content = hashlib.sha256(content).digest() + content
 
@@ -116,7 +116,8 @@ def _anywhere(places: Sequence[Path], use: Callable[[Path], Any]) -> bool:
             failures.append(f"{place}: {error.strerror or error}")
         else:
             return True
-    _say_nowhere(failures)
+    if failures:
+        _say_nowhere(failures)
     return False
 
 
