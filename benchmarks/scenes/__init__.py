@@ -1,7 +1,7 @@
 """Random scenes for every way through time, and a judge of its own for what comes out.
 
 ``python benchmarks/scenes --help`` runs a campaign; ``baseline.md`` beside this file is its last
-committed table. The modules, from the bottom up:
+committed table, ``causes.md`` says what lies behind it. The modules, from the bottom up:
 
 ``mechanics``, ``terrain``
     Kinematics, mass matrix, bias force and Jacobians of a planar tree, and distances to a polyline,

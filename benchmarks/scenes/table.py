@@ -35,7 +35,7 @@ def page(results: Sequence[Result], command: str) -> str:
         "",
         *("    " + line for line in command.splitlines()),
         "",
-        "says of today's methods, failures included.",
+        "says of today's methods, failures included; [causes.md](causes.md) says why they are.",
         "",
         "## How the runs end",
         "",
