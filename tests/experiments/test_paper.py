@@ -103,6 +103,7 @@ def test_order_is_that_of_made_up_errors(
 
     def simulate(*_: object, method: hs.TimeStepping, **__: object) -> object:
         class Made:
+            status = RunStatus.COMPLETED
             position = np.array([[method.step**2]])
             contact_force = np.zeros((11, bravo7.nc, 2))
 

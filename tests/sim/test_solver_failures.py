@@ -58,7 +58,7 @@ def test_without_a_solution_the_run_ends_and_says_so(solver: str) -> None:
     )
     assert run.status is RunStatus.SOLVER_FAILED
     assert "no contact solver could certify a solution at t = 0 s" in run.message
-    assert (run.solver.solves, run.solver.fallbacks, run.solver.failures) == (1, 2, 1)
+    assert (run.solver.solves, run.solver.fallbacks, run.solver.failures) == (1, 3, 1)
     # What there was is kept; the step that could not be is not in it.
     assert run.steps == 0
     np.testing.assert_array_equal(run.position, [start.q])
