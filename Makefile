@@ -4,6 +4,7 @@
 #   make test    all tests
 #   make bench   speed beside other engines; table, JSON and figures in bench/
 #   make check   formatting, lint, types, layers
+#   make check-all   these and all tests, on every kind of machine that this one can play; long
 #   make docs    the documentation site, in site/
 #   make clean   forget everything that was built or installed
 
@@ -13,8 +14,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
+PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile
+BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
+SAMPLE := tests/test_plain_code.py tests/dynamics/test_straight_line.py tests/contact \
+	tests/sim/test_contact_geometry.py tests/experiments/test_paper.py
+
 .DEFAULT_GOAL := help
-.PHONY: help walk test bench check docs clean
+.PHONY: help walk test test-plain test-blas test-perturbed test-sample bench check check-all docs clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -23,7 +29,26 @@ walk: $(VENV)/installed
 	$(BIN)/heelstrike walk --out walk
 
 test: $(VENV)/installed-dev
-	$(BIN)/pytest -n $(WORKERS) --dist loadfile
+	$(PYTEST)
+
+# The same tests where numbers are rounded differently: without the instructions that only some
+# processors have, with other kernels of OpenBLAS than it chooses, with other last digits of gaits.
+test-plain: export HEELSTRIKE_PLAIN_CODE = 1
+test-plain: $(VENV)/installed-dev
+	$(PYTEST)
+
+test-blas: $(BLAS_KERNELS:%=test-blas-%)
+
+test-blas-%: $(VENV)/installed-dev
+	OPENBLAS_CORETYPE=$* $(PYTEST)
+
+test-perturbed: $(VENV)/installed-dev
+	$(PYTEST) --perturb-gaits 1e-12
+
+# What hangs on rounding most, in a few minutes.
+test-sample: export HEELSTRIKE_PLAIN_CODE = 1
+test-sample: $(VENV)/installed-dev
+	$(PYTEST) --perturb-gaits 1e-12 $(SAMPLE)
 
 bench: $(VENV)/installed
 	$(BIN)/heelstrike bench --out bench
@@ -33,6 +58,8 @@ check: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+check-all: check test test-plain test-blas test-perturbed
 
 docs: $(VENV)/installed-docs
 	$(BIN)/mkdocs build --strict

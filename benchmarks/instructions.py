@@ -88,6 +88,7 @@ def count(folder: Path, switch: Any) -> None:
     from heelstrike.separate_kernel import SeparateKernel
     from heelstrike.sim import CompiledController
     from heelstrike.sim.engine import PAUSED
+    from heelstrike.sim.guard import guarded
     from heelstrike.sim.simulation import compiled_form, prepared
 
     for file in sorted(folder.glob("scenario*.npz")):
@@ -113,8 +114,8 @@ def count(folder: Path, switch: Any) -> None:
             pushes=(),
         )
         loop.begin()
-        parameters = np.ascontiguousarray(controller.parameters)
-        memory = controller.memory.copy()
+        parameters = guarded(controller.parameters)
+        memory = guarded(controller.memory)
 
         def advance(
             steps: int,

@@ -7,7 +7,10 @@ import os
 # Matplotlib reads this when it is imported; processes that tests start inherit it.
 os.environ["MPLBACKEND"] = "Agg"
 
+import pytest
 from hypothesis import HealthCheck, settings
+
+import heelstrike  # noqa: F401, before NumPy: it may be asked for plain code
 
 # The first example of a property pays for compilation, so time limits mean nothing here.
 settings.register_profile(
@@ -16,3 +19,21 @@ settings.register_profile(
 # Continuous integration asks the same questions each time: a failure is the change's doing.
 settings.register_profile("ci", settings.get_profile("local"), derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "local")
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--perturb-gaits",
+        type=float,
+        default=0.0,
+        metavar="SIZE",
+        help="change the numbers of designed gaits at random, relative to their size (1e-12)",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    size = config.getoption("perturb_gaits")
+    if size:
+        from perturbed_gaits import perturb_gaits
+
+        perturb_gaits(size)

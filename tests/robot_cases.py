@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 
 import numpy as np
@@ -26,10 +26,15 @@ def builtin_xml(name: str) -> str:
 
 @dataclass(frozen=True)
 class RobotCase:
-    """A robot given by its MJCF text."""
+    """A robot given by its MJCF text, which is written when it is asked for."""
 
     name: str
-    xml: str
+    write: Callable[[], str]
+
+    @property
+    def xml(self) -> str:
+        """The text."""
+        return _written(self.name, self.write)
 
     def robot(self) -> Robot:
         """Read the robot."""
@@ -44,6 +49,11 @@ class RobotCase:
 
 
 @cache
+def _written(name: str, write: Callable[[], str]) -> str:
+    return write()
+
+
+@cache
 def _read(name: str, xml: str) -> Robot:
     with warnings.catch_warnings():
         # Random trees wear geoms that make no contact points; that is not what is tested here.
@@ -52,13 +62,14 @@ def _read(name: str, xml: str) -> Robot:
 
 
 NAMED = [
-    *(RobotCase(name, builtin_xml(name)) for name in builtin_robots()),
-    RobotCase("walker2d_v5", walker2d_xml()),
+    *(RobotCase(name, partial(builtin_xml, name)) for name in builtin_robots()),
+    RobotCase("walker2d_v5", walker2d_xml),
 ]
-RANDOM = [RobotCase(f"tree{seed}", random_tree(seed)) for seed in range(20)]
+RANDOM = [RobotCase(f"tree{seed}", partial(random_tree, seed)) for seed in range(20)]
 ROBOTS = [*NAMED, *RANDOM[:4]]
 
 # Trees of 2 to 30 joints, for checks that need few states of many robots.
 MANY = [
-    RobotCase(f"forest{k}", random_tree(1000 + k, bodies=2 + k * 14 // 200)) for k in range(200)
+    RobotCase(f"forest{k}", partial(random_tree, 1000 + k, bodies=2 + k * 14 // 200))
+    for k in range(200)
 ]

@@ -64,7 +64,7 @@ def make_run(
         events=tuple(events),
         certificates=Certificates(0.0, 0.0, 0.0, 0.0),
         solver=SolverCount("lemke", rows, 0, 0, 0),
-        steps=rows - 1,
+        steps=max(rows - 1, 0),
         saturations=0,
         timing=Timing(0.0, 0.1),
     )

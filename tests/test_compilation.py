@@ -22,6 +22,7 @@ from heelstrike.compilation import compiled_for, kernel, uncompiled
 from heelstrike.contact.search import try_solvers
 from heelstrike.quick_compiling import quick_compiling
 from heelstrike.robot import load_robot
+from heelstrike.separate_kernel import SeparateKernel
 from heelstrike.sim.memory import allocate_memory
 
 SOURCE = Path(heelstrike.__file__).parent
@@ -84,12 +85,44 @@ def test_twins_replace_names_in_all_that_they_call() -> None:
     assert not hasattr(uncompiled(inner), "py_func")
 
 
-def test_a_function_without_a_file_is_compiled_and_not_kept() -> None:
-    """As it is when somebody types a controller at Python's prompt."""
-    scope: dict[str, Any] = {}
-    exec("def double(x):\n    return 2.0 * x", scope)
-    compiled = compiled_for(types.float64(types.float64), scope["double"])
-    assert compiled(1.5) == 3.0
+@pytest.mark.filterwarnings("error")
+def test_a_function_without_a_module_is_compiled_every_time() -> None:
+    """As `exec` makes them: in the next process Numba would look for their module."""
+    for _ in range(2):
+        scope: dict[str, Any] = {}
+        exec("def double(x):\n    return 2.0 * x", scope)
+        compiled = compiled_for(types.float64(types.float64), scope["double"])
+        assert compiled(1.5) == 3.0
+        assert not compiled.stats.cache_hits
+
+
+TYPED = """
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def double(x):
+    return 2.0 * x
+
+compiled = compiled_for(types.float64(types.float64), double)
+print(compiled(1.5), sum(compiled.stats.cache_hits.values()))
+"""
+
+
+def test_a_function_typed_at_a_prompt_is_kept_for_the_next(tmp_path: Path) -> None:
+    def answer(text: str) -> str:
+        told = subprocess.run(
+            [sys.executable, "-"],
+            input=text,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer(TYPED) == "3.0 0"
+    assert answer(TYPED) == "3.0 1"
+    assert answer(TYPED.replace("2.0 * x", "3.0 * x")) == "4.5 0"
 
 
 def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:
@@ -151,6 +184,80 @@ def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path) -> Non
     assert answer(HELPER) == (7.0, 1)
     assert answer(HELPER.replace("3.0 * x", "5.0 * x")) == (11.0, 0)
     assert answer(HELPER.replace("SLOPE = 1.0", "SLOPE = 2.0")) == (11.0, 0)
+
+
+CHECKED = """
+import numpy as np
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def third(values):
+    return values[2]
+
+compiled = compiled_for(types.float64(types.float64[::1]), third, address=ADDRESS)
+try:
+    compiled(np.arange(3.0)[:2])
+    told = "read"
+except IndexError:
+    told = "refused"
+print(told, sum(compiled.stats.cache_hits.values()))
+"""
+
+
+def test_code_made_with_other_settings_is_not_taken(tmp_path: Path) -> None:
+    def answer(check: str, address: bool = False) -> str:
+        (tmp_path / "checked.py").write_text(CHECKED.replace("ADDRESS", str(address)))
+        told = subprocess.run(
+            [sys.executable, "-B", "checked.py"],
+            cwd=tmp_path,
+            env={
+                **os.environ,
+                "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+                "NUMBA_BOUNDSCHECK": check,
+            },
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer("1") == "refused 0"
+    assert answer("0") == "read 0"
+    assert answer("0") == "read 1"
+    assert answer("0", address=True) == "read 0"
+
+
+FACTORY = """
+from numba import types
+from heelstrike.compilation import compiled_for
+
+def scaling(factor):
+    def scale(x):
+        return factor * x
+    return scale
+
+compiled = [compiled_for(types.float64(types.float64), scaling(factor)) for factor in (2.0, 3.0)]
+print([one(1.0) for one in compiled], [sum(one.stats.cache_hits.values()) for one in compiled])
+"""
+
+
+def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path) -> None:
+    """Such as controllers that a function makes, with gains that it has been given."""
+    (tmp_path / "factory.py").write_text(FACTORY)
+
+    def answer() -> str:
+        told = subprocess.run(
+            [sys.executable, "-B", "factory.py"],
+            cwd=tmp_path,
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return told.stdout.strip()
+
+    assert answer() == "[2.0, 3.0] [0, 0]"
+    assert answer() == "[2.0, 3.0] [1, 1]"
 
 
 APART = """
@@ -228,6 +335,23 @@ def test_the_other_process_imports_what_this_one_does(tmp_path: Path) -> None:
     )
     assert told.stdout.split() == ["42", "10.5", "True", "1"]
     assert not (elsewhere / "imported").exists()
+
+
+def test_ctrl_c_ends_the_process_that_one_waits_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    code = "import time; time.sleep(600)"
+    helper = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+    wait = helper.wait
+
+    def interrupted(timeout: float | None = None) -> int:
+        monkeypatch.setattr(helper, "wait", wait)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(helper, "wait", interrupted)
+    slow = SeparateKernel(lambda: None, lambda: None)
+    monkeypatch.setattr(slow, "_helper", helper)
+    with pytest.raises(KeyboardInterrupt):
+        slow.finish()
+    assert helper.poll() is not None
 
 
 def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:

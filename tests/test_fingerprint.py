@@ -32,8 +32,8 @@ print(json.dumps({
     "loop": made_of(time_stepping._advance),
     "solvers": made_of(try_solvers._function),
     "kinematics": made_of(kernels.forward_kinematics.py_func),
-    "programs": machine_code._key(b"", programs.straight_line_programs),
-    "elimination": machine_code._key(b"", elimination.elimination_programs),
+    "programs": machine_code._key(b"", programs.straight_line_programs).hex(),
+    "elimination": machine_code._key(b"", elimination.elimination_programs).hex(),
 }))
 """
 

@@ -25,6 +25,11 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+import heelstrike.plain_code as _plain_code
+
+if _plain_code.is_asked_for():  # before anything else is imported
+    _plain_code.select()
+
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
@@ -47,6 +52,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
     from heelstrike.errors import ViewError as ViewError
+    from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PiecewiseGait as PiecewiseGait
@@ -108,6 +114,7 @@ _HOME = {
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "ViewError": "heelstrike.errors",
+    "WriteError": "heelstrike.errors",
     "builtin_robots": "heelstrike.robot",
     "compare": "heelstrike.experiments.comparison",
     "contact_forward_dynamics": "heelstrike.contact",

@@ -7,6 +7,9 @@ nothing and touches no Python object. The same source is compiled by Numba and, 
 
 from __future__ import annotations
 
+import hashlib
+import pickle
+import re
 import sys
 import types
 from collections.abc import Callable, Mapping
@@ -16,10 +19,14 @@ from typing import Any, TypeVar
 
 import numba
 from numba import njit
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
 from numba.core.runtime.nrt import rtsys
+from numba.core.serialize import dumps
 
 from heelstrike.fingerprint import fingerprint, is_ours
+from heelstrike.kept_code import can_write, directories, read, write
 from heelstrike.linking import InnerKernelCompiler
 from heelstrike.quick_compiling import load_numba, quick_compiling
 
@@ -34,42 +41,40 @@ _COMPILER = tuple(
 )
 """What shapes the machine code of every kernel."""
 
-
-def cache_directory() -> Path:
-    """Return the directory in which machine code is kept.
-
-    Raises
-    ------
-    RuntimeError
-        If there is no place to write.
-    """
-    return Path(FunctionCache(cache_directory).cache_path)
+_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
+"""Settings of Numba (``NUMBA_OPT`` and so on) that do so, too."""
 
 
 def made_of(function: Callable[..., Any]) -> str:
     """Return the fingerprint of a kernel and of what compiles it."""
-    return fingerprint(function, *_COMPILER)
+    settings = (str(getattr(numba.config, name, None)) for name in _SETTINGS)
+    return fingerprint(function, *settings, *_COMPILER)
 
 
-class _PackageCache(FunctionCache):
+class _PackageCache(NullCache):
     """Machine code on disk that is good for exactly what the kernel is made of.
 
-    Numba looks at the file of a kernel only: it would go on using yesterday's machine code of a
-    kernel whose callee in another file has changed, and compile anew for the sake of a comment.
+    Numba's own cache looks at the file of a kernel only: it would go on using yesterday's machine
+    code of a kernel whose callee in another file has changed, compile anew for the sake of a
+    comment, and take damaged files for good.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        super().__init__(function)
+    def __init__(self, compiled: Any) -> None:
+        function = compiled.py_func
+        source = Path(function.__code__.co_filename)
+        # To load machine code Numba imports the module by its name.
+        has_module = function.__module__ in sys.modules
+        self.places = directories(source if source.is_file() else None) if has_module else []
+        self._made_of = made_of(function)
+        self._options = sorted(compiled.targetoptions.items())
         self._is_ours = is_ours(function)
-        index = self._cache_file
-        if self._is_ours:
-            name = f"{function.__module__}.{function.__qualname__}".replace("<", "").replace(
-                ">", ""
-            )
-            name = f"{name}.{sys.implementation.cache_tag}"
-            self._cache_file = IndexDataCacheFile(self._cache_path, name, made_of(function))
-        else:
-            index._source_stamp = (made_of(function), index._source_stamp)
+        self._name = re.sub("[<>]", "", f"{function.__module__}.{function.__qualname__}")
+        self._twin = "" if self._is_ours else _twin_of(function)
+
+    @property
+    def cache_path(self) -> str:
+        """Where machine code is kept if that can be written."""
+        return str(self.places[0]) if self.places else ""
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Load machine code, if there is some.
@@ -80,20 +85,44 @@ class _PackageCache(FunctionCache):
         load_numba()
         if self._is_ours:
             rtsys.initialize(context)
-            with self._guard_against_spurious_io_errors():
-                found = self._load_overload(signature, context)
-            if found is not None:
-                return found
-        return super().load_overload(signature, context)
+        else:
+            context.refresh()
+        found = self.read(signature, context.codegen())
+        if found is None:
+            return None
+        try:
+            parts = pickle.loads(found)
+        except (AttributeError, ImportError):  # it calls kernels of modules that are not here now
+            return None
+        return CompileResult._rebuild(context, *parts)
+
+    def read(self, signature: Any, codegen: Any) -> bytes | None:
+        """Return what is kept for a signature, if there is something."""
+        return read(self.places, *self._name_and_key(signature, codegen))
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep machine code, unless it is good for this process only."""
+        if result.library.has_dynamic_globals or any(not loop.can_cache for loop in result.lifted):
+            return
+        name, key = self._name_and_key(signature, result.codegen)
+        write(self.places, name, key, dumps(result._reduce()))
+
+    def _name_and_key(self, signature: Any, codegen: Any) -> tuple[str, bytes]:
+        """Name of the file, which the next version of the kernel takes over, and what it is for."""
+        kind = repr((signature, self._options, codegen.magic_tuple(), self._twin))
+        place = hashlib.sha256(kind.encode()).hexdigest()[:16]
+        name = f"{self._name}.{place}.{sys.implementation.cache_tag}.machine_code"
+        return name, hashlib.sha256(f"{self._made_of} {kind}".encode()).digest()
+
+
+def _twin_of(function: Any) -> str:
+    """Tell functions of one name apart: where they stand, and what they enclose."""
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    return fingerprint(function.__code__.co_firstlineno, *cells)
 
 
 def _kept_on_disk(compiled: Any) -> Any:
-    try:
-        compiled._cache = _PackageCache(compiled.py_func)
-    except AttributeError:  # a Numba that keeps its books differently
-        compiled.enable_caching()
-    except RuntimeError:  # typed at a prompt, or no place to write: compiled anew every time
-        pass
+    compiled._cache = _PackageCache(compiled)
     return compiled
 
 
@@ -157,7 +186,9 @@ def dissolved_kernel(function: Function) -> Function:
     return result
 
 
-def compiled_for(signature: Any, function: Function, *, address: bool = False) -> Function:
+def compiled_for(
+    signature: Any, function: Function, *, address: bool = False, boundscheck: bool = False
+) -> Function:
     """Compile a kernel at once for the given Numba signature, or load its machine code.
 
     Parameters
@@ -168,8 +199,10 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
         The kernel.
     address : bool
         Whether its address is needed, to pass it as an argument to other kernels.
+    boundscheck : bool
+        Whether an index beyond an array raises IndexError.
     """
-    compiled = _with_cache(function, address)
+    compiled = _with_cache(function, address, boundscheck)
     with quick_compiling():
         compiled.compile(signature)
     compiled.disable_compile()
@@ -180,18 +213,19 @@ def compiled_for(signature: Any, function: Function, *, address: bool = False) -
     return result
 
 
-def _with_cache(function: Function, address: bool) -> Any:
+def _with_cache(function: Function, address: bool, boundscheck: bool = False) -> Any:
     options = _OPTIONS | {"no_cfunc_wrapper": not address}
+    if boundscheck:
+        options["boundscheck"] = True
     return _kept_on_disk(njit(**options)(function))
 
 
 def is_kept(signature: Any, function: Callable[..., Any], *, address: bool = False) -> bool:
     """Whether :func:`compiled_for` would find machine code on disk, or has no disk to look on."""
     compiled = _with_cache(function, address)
-    if not isinstance(compiled._cache, _PackageCache):
-        return True
-    key = compiled._cache._index_key(signature, compiled.targetctx.codegen())
-    return key in compiled._cache._cache_file._load_index()
+    cache: _PackageCache = compiled._cache
+    found = cache.read(signature, compiled.targetctx.codegen())
+    return found is not None or not can_write(cache.places)
 
 
 def loop_for(signature: Any, function: Function) -> Function:
@@ -246,17 +280,25 @@ def uncompiled(function: Function, replace: Mapping[str, Any] | None = None) -> 
 
 
 def _twin(function: Any, replace: dict[str, Any], twins: dict[int, Any]) -> Any:
-    source = function.py_func if isinstance(function, Kernel) else function
+    source = function.py_func if _is_compiled(function) else function
     if id(source) in twins:
         return twins[id(source)]
     scope = dict(source.__globals__)
+    cells = [types.CellType(cell.cell_contents) for cell in source.__closure__ or ()]
     twin = types.FunctionType(
-        source.__code__, scope, source.__name__, source.__defaults__, source.__closure__
+        source.__code__, scope, source.__name__, source.__defaults__, tuple(cells)
     )
     twins[id(source)] = twin
     for name in source.__code__.co_names:
         if name in replace:
             scope[name] = replace[name]
-        elif isinstance(scope.get(name), Kernel):
+        elif _is_compiled(scope.get(name)):
             scope[name] = _twin(scope[name], replace, twins)
+    for cell in cells:
+        if _is_compiled(cell.cell_contents):
+            cell.cell_contents = _twin(cell.cell_contents, replace, twins)
     return twin
+
+
+def _is_compiled(value: Any) -> bool:
+    return isinstance(value, Kernel | Dispatcher)

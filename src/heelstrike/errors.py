@@ -36,7 +36,11 @@ class LimitCycleError(HeelstrikeError, RuntimeError):
 
 
 class RunFileError(HeelstrikeError, ValueError):
-    """A saved run cannot be read."""
+    """A run cannot be saved, or a saved run cannot be read."""
+
+
+class WriteError(HeelstrikeError, OSError):
+    """A file cannot be written; an older one of its name is as it was."""
 
 
 class ViewError(HeelstrikeError, ValueError):

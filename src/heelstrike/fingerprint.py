@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import enum
 import hashlib
+import os
 import sys
 import types
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ _BY_VERSION = {"numpy", "numba", "llvmlite"} | sys.stdlib_module_names
 """Packages that count with their version, which is in every fingerprint."""
 
 _VERSIONS = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
-_PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic)
+_PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 
 
 def fingerprint(*parts: Any) -> str:
@@ -34,8 +35,8 @@ def fingerprint(*parts: Any) -> str:
     Parameters
     ----------
     *parts : kernel, function, constant, module or Path
-        A function of this package counts as a kernel does, one of a user with its file besides. A
-        module counts with its text and all that it names, a file with its text.
+        A function counts as a kernel does, a module with its text and all that it names, a file
+        with its text.
     """
     account = _Account()
     for part in parts:
@@ -43,7 +44,7 @@ def fingerprint(*parts: Any) -> str:
             account.add_module(part.__name__)
         elif isinstance(part, Path):
             account.add(_text(str(part)))
-        elif isinstance(part, types.FunctionType) and is_ours(part):
+        elif isinstance(part, types.FunctionType):
             account.add_function(part)
         else:
             account.add(part)
@@ -92,8 +93,8 @@ class _Account:
             self.add_module(value.__module__ or "")
         else:  # a class, an intrinsic, an object: what it does stands in its module
             home = getattr(value, "__module__", None) or type(value).__module__
-            name = getattr(value, "__qualname__", None) or type(value).__qualname__
-            self._write(home, name)
+            named = (getattr(value, name, None) for name in ("__qualname__", "__name__"))
+            self._write(home, type(value).__qualname__, *map(str, named))
             self.add_module(home)
 
     def add_module(self, name: str) -> None:
@@ -164,9 +165,9 @@ def _root(module: str) -> str:
     return module.split(".")[0]
 
 
-@lru_cache
+@cache
 def _text(file: str) -> bytes:
     try:
         return Path(file).read_bytes()
-    except OSError:  # nothing that has a text
-        return b""
+    except OSError:  # typed at a prompt, or in no language that could be read
+        return os.urandom(16)  # good for this process only

@@ -15,6 +15,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.types.functions import BaseFunction
 from numba.np import linalg
 
+from heelstrike.interruption import kept_interrupts
+
 _PLAIN = (types.Number, types.Boolean, types.Array, types.SliceType, types.NoneType)
 
 
@@ -39,6 +41,8 @@ _WITHOUT_VARIABLES = (str, int, bool, type(None), ir.Loc)
 def quick_compiling() -> Iterator[None]:
     """Compile quicker while the context lasts."""
     with ExitStack() as stack:
+        # Machine code is handed over in a callback of LLVM's, which swallows what Ctrl-C raises.
+        stack.enter_context(kept_interrupts())
         stack.enter_context(global_compiler_lock)  # one thread at a time, as Numba compiles anyway
         stack.enter_context(_remembered_typings())
         stack.enter_context(_arrays_as_they_are())

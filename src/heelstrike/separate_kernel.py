@@ -12,7 +12,9 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -25,6 +27,20 @@ from heelstrike.compilation import compiled_for, is_kept
 
 LONGEST_WAIT = 300.0
 """How long to wait for another process to compile a kernel, in s."""
+
+
+LOOK_EVERY = 0.1
+"""Seconds between two looks at a helper; Windows lets nobody interrupt a longer wait."""
+
+# What a helper process does. Ctrl-C is for its parent to decide about; and when nobody holds the
+# other end of its standard input any more, its parent is gone and so is its purpose.
+_HELPER = """
+import os, signal, threading
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+threading.Thread(target=lambda: (os.read(0, 1), os._exit(1)), daemon=True).start()
+from {module} import {name}
+{name}.finish()
+"""
 
 
 class SeparateKernel:
@@ -74,10 +90,7 @@ class SeparateKernel:
                 return self._compiled
             if self._helper:
                 # Whether it succeeded shows in what it left on disk.
-                try:
-                    self._helper.wait(LONGEST_WAIT)
-                except subprocess.TimeoutExpired:  # somebody stopped it
-                    self._helper.kill()
+                _wait_for(self._helper)
                 self._helper = None
             signature = self._signature()
             compiled: Any = compiled_for(signature, self._function, address=True)
@@ -98,9 +111,9 @@ class SeparateKernel:
         try:
             return subprocess.Popen(
                 # -P: what lies in the current directory is imported only if it is here, too.
-                [sys.executable, "-P", "-c", f"from {module} import {name}; {name}.finish()"],
+                [sys.executable, "-P", "-c", _HELPER.format(module=module, name=name)],
                 env=os.environ | {"PYTHONPATH": os.pathsep.join(path or "." for path in sys.path)},
-                stdin=subprocess.DEVNULL,
+                stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
                 creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
@@ -114,6 +127,21 @@ def separate_kernel(
 ) -> Callable[[Callable[..., Any]], SeparateKernel]:
     """Turn a function into a :class:`SeparateKernel` of the given Numba signature."""
     return lambda function: SeparateKernel(function, signature)
+
+
+def _wait_for(helper: subprocess.Popen[bytes]) -> None:
+    """Wait until a helper has ended, and end it if that takes too long or Ctrl-C comes."""
+    end = monotonic() + LONGEST_WAIT
+    try:
+        while helper.poll() is None and monotonic() < end:
+            with suppress(subprocess.TimeoutExpired):
+                helper.wait(LOOK_EVERY)
+    finally:
+        if helper.poll() is None:
+            helper.kill()
+            helper.wait()
+        if helper.stdin is not None:
+            helper.stdin.close()
 
 
 def _can_start_python() -> bool:

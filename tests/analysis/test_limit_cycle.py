@@ -216,3 +216,22 @@ def test_a_newton_step_is_halved_until_the_walk_goes_on() -> None:
     limit = 0.0
     shortest = 0.8 * 0.5**HALVINGS
     assert _moved_on(step, chart, np.array([0.8])) == pytest.approx(shortest)  # type: ignore[arg-type]
+
+
+def test_ctrl_c_ends_the_search() -> None:
+    """It is no step that was not completed, after which the search would go on elsewhere."""
+    calls = []
+
+    class Interrupted:
+        def torque(self, t: float, state: hs.State, contacts: object) -> NDArray[np.float64]:
+            calls.append(t)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=0.5, gravity=9.81),
+            wheel_state(0.08, 1.0),
+            Interrupted(),
+            ground=hs.Ground(friction=3.0, slope=-0.08),
+        )
+    assert len(calls) == 1

@@ -13,6 +13,7 @@ import typer
 from typer.testing import CliRunner
 
 import heelstrike
+from heelstrike.cli import run as heelstrike_command
 from heelstrike.cli.main import app
 from heelstrike.cli.terminal import Debug, spoken, stage
 from heelstrike.errors import GaitError
@@ -157,6 +158,24 @@ def test_stages_speak_on_a_terminal(
     assert "walked 20 steps" in captured.err
 
 
-def test_installed_command_is_the_app() -> None:
+def test_installed_command_is_the_app(monkeypatch: pytest.MonkeyPatch) -> None:
     text = (Path(__file__).resolve().parents[2] / "pyproject.toml").read_text(encoding="utf-8")
-    assert 'heelstrike = "heelstrike.cli.main:app"' in text
+    assert 'heelstrike = "heelstrike.cli:run"' in text
+    called = []
+    monkeypatch.setattr("heelstrike.cli.main.app", lambda: called.append(True))
+    heelstrike_command()
+    assert called
+
+
+def test_ctrl_c_before_the_command_begins(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    statuses: list[int] = []
+    monkeypatch.setattr("heelstrike.cli.main.app", interrupted)
+    monkeypatch.setattr("heelstrike.cli.os._exit", statuses.append)
+    heelstrike_command()
+    assert statuses == [130]
+    assert capsys.readouterr().err == "interrupted\n"

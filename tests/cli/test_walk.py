@@ -111,7 +111,9 @@ def test_gif_replaces_the_film_of_an_earlier_walk(walk: Callable[..., Any], tmp_
     assert (out / "notes.txt").read_text(encoding="utf-8") == "of yesterday"
 
 
-def test_a_gait_walks_from_its_own_directory(walked: tuple[Path, Any], tmp_path: Path) -> None:
+def test_a_gait_walks_from_its_own_directory(
+    walked: tuple[Path, Any], walk: Callable[..., Any], tmp_path: Path
+) -> None:
     gait = tmp_path / "gait.json"
     text = (walked[0] / "gait.json").read_text(encoding="utf-8")
     gait.write_text(text, encoding="utf-8")
@@ -209,8 +211,8 @@ def test_interrupted_by_ctrl_c(
     monkeypatch.setattr("heelstrike.cli.terminal.Stage.reached", reached)
     monkeypatch.setattr("heelstrike.experiments.results.Results.save_run", lambda *_, **__: ())
     result = walk("--json")
-    assert result.exit_code == 1
-    assert "error: interrupted at t = " in result.stderr
+    assert result.exit_code == 130
+    assert "interrupted while walking, at t = " in result.stderr
     assert json.loads(result.stdout)["status"] == "interrupted"
 
 

@@ -6,6 +6,7 @@ Nothing here is shared with the solvers or their certificates.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -102,9 +103,21 @@ def residual(delassus: Floats, free: Floats, friction: Floats, impulse: Floats) 
 
 
 def solutions(delassus: Floats, free: Floats, friction: Floats) -> list[Floats]:
-    """All velocities that solve the problem, one for each that differs from the others.
+    """All velocities that solve the problem, one for each that differs from the others."""
+    found: list[Floats] = []
+    unit = np.abs(free).max() or 1.0
+    for impulse in enumerated(delassus, free, friction):
+        velocity = delassus @ impulse + free
+        if not any(np.allclose(velocity, other, atol=1e-7 * unit) for other in found):
+            found.append(velocity)
+    return found
 
-    Every combination of contact modes is a linear feasibility problem.
+
+def enumerated(delassus: Floats, free: Floats, friction: Floats) -> Iterator[Floats]:
+    """Impulses that solve the problem, by force: one for each combination of modes that has some.
+
+    Every combination is a linear program, feasible to 1e-10 of the data's velocities. The equations
+    among its conditions are then met by least squares as sharply as they can be.
     """
     count = friction.size
     diagonal = np.diag(delassus)
@@ -112,7 +125,6 @@ def solutions(delassus: Floats, free: Floats, friction: Floats) -> list[Floats]:
     G = scale[:, None] * delassus * scale
     size = np.abs(scale * free).max() or 1.0
     b = scale * free / size
-    found: list[Floats] = []
     for modes in itertools.product(range(4), repeat=count):
         equal, inequal, offset_equal, offset_inequal = [], [], [], []
 
@@ -149,8 +161,6 @@ def solutions(delassus: Floats, free: Floats, friction: Floats) -> list[Floats]:
             options={"primal_feasibility_tolerance": 1e-10},
         )
         if result.status == 0:
-            velocity = (G @ result.x + b) * size / scale
-            unit = np.abs(free).max() or 1.0
-            if not any(np.allclose(velocity, other, atol=1e-7 * unit) for other in found):
-                found.append(velocity)
-    return found
+            equations, right = np.array(equal), np.array(offset_equal)
+            rest = np.linalg.lstsq(equations, right - equations @ result.x)[0]
+            yield scale * (result.x + rest) * size

@@ -16,11 +16,8 @@ from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel, solver_order
 from heelstrike.contact.search import contact_workspace
 from heelstrike.contact.workspace import SHORTCUTS
-from heelstrike.dynamics.machine_code import can_fuse
 from heelstrike.dynamics.straight_line import play
 from heelstrike.robot.model import Floats
-
-pytestmark = pytest.mark.skipif(not can_fuse(), reason="no straight-line code on this processor")
 
 
 @njit

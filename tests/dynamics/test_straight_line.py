@@ -15,19 +15,14 @@ from llvmlite import ir
 from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike.compilation import kernel
-from heelstrike.dynamics import machine_code
+from heelstrike.dynamics import machine_code, trigonometry
 from heelstrike.dynamics.straight_line import Recording, add_function, play
 from heelstrike.dynamics.tape import Tape, Value
-from heelstrike.dynamics.trigonometry import sine_and_cosine
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs, usual_points
 
 # Both sides do the same few hundred operations in another order, with products and sums fused.
 ROUNDING = 1e-11
-
-fused = pytest.mark.skipif(
-    not machine_code.can_fuse(), reason="the processor has no fused multiply-add"
-)
 
 
 @numba.njit
@@ -67,7 +62,6 @@ def results(arguments: list[tuple[Any, ...]]) -> dict[str, Any]:
     }  # fmt: skip
 
 
-@fused
 @pytest.mark.parametrize("case", [*NAMED, *RANDOM[:6]], ids=lambda case: case.name)
 def test_equals_the_kernels(case: RobotCase) -> None:
     programs = straight_line_programs(case.robot().model, usual_points(case.robot()))
@@ -89,7 +83,6 @@ def test_equals_the_kernels(case: RobotCase) -> None:
             np.testing.assert_allclose(found[name], value, atol=ROUNDING * size, err_msg=name)
 
 
-@fused
 def test_robots_that_differ_in_numbers_share_their_code() -> None:
     model, points = NAMED[0].robot().model, usual_points(NAMED[0].robot())
     heavier = dataclasses.replace(model, mass=1.5 * model.mass)
@@ -98,19 +91,22 @@ def test_robots_that_differ_in_numbers_share_their_code() -> None:
     )
 
 
-@fused
-def test_sine_and_cosine_to_the_last_digits() -> None:
+@pytest.mark.parametrize("fused", [False, True], ids=["rounded twice", "fused"])
+def test_sine_and_cosine_to_the_last_digits(fused: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if fused and not machine_code.can_fuse():
+        pytest.skip("the processor has no fused multiply-add")
+    monkeypatch.setattr(trigonometry, "can_fuse", lambda: fused)
     lanes = 8
     vector = ir.VectorType(ir.DoubleType(), lanes)
     module = ir.Module("trigonometry")
     pointers = [vector.as_pointer()] * 3
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), pointers), "both")
     builder = ir.IRBuilder(function.append_basic_block())
-    values = sine_and_cosine(builder, builder.load(function.args[0], align=8))
+    values = trigonometry.sine_and_cosine(builder, builder.load(function.args[0], align=8))
     for value, place in zip(values, function.args[1:], strict=True):
         builder.store(value, place, align=8)
     builder.ret_void()
-    (address,) = machine_code.addresses(["both"], b"test of trigonometry", lambda: module)
+    (address,) = machine_code.addresses(["both"], b"trigonometry %d" % fused, lambda: module)
 
     rng = np.random.default_rng(0)
     quarters = np.arange(-400, 400) * (np.pi / 4.0)
@@ -158,7 +154,6 @@ def exchange(x: np.ndarray, y: np.ndarray) -> None:
     y[0] = first
 
 
-@fused
 def test_everything_is_read_before_anything_is_written() -> None:
     x, y = np.array([1.0, 2.0]), np.array([3.0])
     module = ir.Module("exchange")
@@ -183,7 +178,7 @@ def test_threads_that_ask_at_once_get_one_engine(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The engine holds the code: a second one in its place would free what others are to call."""
-    monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
+    monkeypatch.setattr(machine_code, "directories", lambda _: [tmp_path])
     written = []
 
     def write() -> ir.Module:
@@ -198,36 +193,21 @@ def test_threads_that_ask_at_once_get_one_engine(
     assert len(written) == 1
 
 
-def test_spoilt_files_and_no_place_for_files_cost_time_only(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    """A file may be cut short by a loss of power; LLVM would crash on it."""
-    monkeypatch.setattr(machine_code, "cache_directory", lambda: tmp_path)
-    described = b"test of spoilt files"
-    key = machine_code._key(described, constant)
-    file = machine_code._file(key)
+def test_code_is_kept_for_the_next_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(machine_code, "directories", lambda _: [tmp_path])
 
-    def loaded(number: float) -> float:
-        machine_code._loaded.pop(key, None)
+    def loaded(described: bytes, number: float) -> float:
+        machine_code._loaded.clear()
         (address,) = machine_code.addresses(["constant"], described, lambda: constant(number))
         result = np.zeros(1)
         called(address, result)
         return float(result[0])
 
-    assert loaded(1.0) == 1.0
-    kept = file.read_bytes()
-    assert loaded(2.0) == 1.0  # from the file
-    for spoilt in (b"", kept[: len(kept) // 2], kept[:-1], bytes(len(kept))):
-        file.write_bytes(spoilt)
-        assert loaded(3.0) == 3.0
-        assert len(file.read_bytes()) == len(kept)
-    assert [path.name for path in tmp_path.iterdir()] == [file.name]
-
-    def nowhere() -> Path:
-        raise RuntimeError("no locator available")
-
-    monkeypatch.setattr(machine_code, "cache_directory", nowhere)
-    assert loaded(4.0) == 4.0
+    monkeypatch.setattr(machine_code, "_loaded", {})
+    assert loaded(b"one", 1.0) == 1.0
+    assert loaded(b"one", 2.0) == 1.0  # from the file
+    assert loaded(b"two", 2.0) == 2.0
+    assert len(list(tmp_path.iterdir())) == 2
 
 
 def test_arrays_with_gaps_are_refused() -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import pytest
+import walking
 
 import heelstrike as hs
 
 
 @pytest.fixture(scope="session")
 def bravo7() -> hs.Robot:
-    return hs.load_robot("bravo7")
+    return walking.bravo7()
 
 
 @pytest.fixture(scope="session")
-def gait(bravo7: hs.Robot) -> hs.Gait:
-    return hs.optimize_gait(bravo7, step_length=0.30, step_duration=0.70, friction=0.75)
+def gait() -> hs.Gait:
+    return walking.gait()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +20,8 @@ FLAT = ("human7", "geyer7", "spring_flamingo", "walker2d")
 POINTS = ("rabbit", "rabbit_optimtraj")
 # What the optimiser finds by itself after the parabola has failed, without the time that takes.
 PROFILE = {"spring_flamingo": "smooth"}
-STEPS = 5
+STEPS = 20
+FEW = 5
 GROUND = hs.Ground(friction=0.75)
 
 
@@ -60,13 +63,27 @@ def test_the_gait_keeps_its_limits(name: str) -> None:
     assert (why_unstable(gait) is None) == (name in FLAT)
 
 
-def walked(name: str, method: Method) -> Summary:
+def test_the_page_tells_the_steps_and_costs() -> None:
+    """docs/gaits.md says what the optimiser finds, to the digits that it prints."""
+    page = Path(__file__).parents[2] / "docs" / "gaits.md"
+    row = re.compile(r"^\| (\w+)[^|]*\| ([\d.]+) m in ([\d.]+) s \| ([\d.]+) \|", re.MULTILINE)
+    told = {name: numbers for name, *numbers in row.findall(page.read_text(encoding="utf-8"))}
+    assert told.keys() == {"bravo7", *FLAT, *POINTS}
+    for name in (*FLAT, *POINTS):
+        gait = designed(name).gait
+        found = (gait.step_length, gait.step_duration, gait.cost)
+        for number, text in zip(found, told[name], strict=True):
+            digit = 10.0 ** -len(text.partition(".")[2])
+            assert number == pytest.approx(float(text), abs=0.6 * digit), name
+
+
+def walked(name: str, method: Method, steps: int = STEPS) -> Summary:
     robot, gait = designed(name).robot, designed(name).gait
-    run = walk(robot, gait, steps=STEPS, method=method, ground=GROUND)
+    run = walk(robot, gait, steps=steps, method=method, ground=GROUND)
     assert run.completed, run.message
     summary = run.summary(gait=gait)
-    assert summary.steps == STEPS
-    assert summary.distance_m / gait.step_length == pytest.approx(STEPS, abs=0.3)
+    assert summary.steps == steps
+    assert summary.distance_m / gait.step_length == pytest.approx(steps, abs=0.3)
     assert summary.penetration_max_m <= 1e-9
     assert summary.solver.failures == 0
     assert summary.zmp_margin_min_m > 0.0
@@ -90,10 +107,11 @@ def test_robots_with_soles_walk_by_time_stepping(name: str) -> None:
     need not vanish with h: where a touchdown falls into two time steps, the toe may slide under the
     first part of the impulse (geyer7), which the impact of all points at once does not know.
     """
-    coarse, fine = (walked(name, hs.TimeStepping(step=h)) for h in (1e-3, 5e-4))
+    assert walked(name, hs.TimeStepping(step=1e-3)).tracking_rms_rad <= 2e-3
+    coarse, fine = (walked(name, hs.TimeStepping(step=h), FEW) for h in (1e-3, 5e-4))
     assert coarse.tracking_rms_rad <= 2e-3
     assert fine.tracking_rms_rad < coarse.tracking_rms_rad
-    assert coarse.slip_max_m <= STEPS * 1.4e-3
+    assert coarse.slip_max_m <= FEW * 1.4e-3
     assert fine.slip_max_m <= 0.6 * coarse.slip_max_m + 1e-12
 
 

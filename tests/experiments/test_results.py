@@ -49,7 +49,10 @@ def test_every_file_on_its_own(
     assert fractions[-1] == 1.0
 
 
-def test_summary_is_the_run_s(tmp_path: Path, run: hs.Run, gait: hs.Gait) -> None:
+def test_summary_is_the_run_s(
+    tmp_path: Path, run: hs.Run, gait: hs.Gait, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(hs.Run, "plot", lambda *_, **__: None)  # figures take most of the time
     Results(tmp_path).save_run(run, gait, animation=None)
     saved = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert saved == run.summary(gait=gait).to_dict()

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import random
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from damage import damaged_bytes, damaged_json
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from stored_files import SAVED
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
@@ -162,7 +165,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes, message: str) -
 
 def test_a_place_that_cannot_be_written_is_named(gait: hs.Gait, tmp_path: Path) -> None:
     for path in (tmp_path / "missing" / "gait.json", tmp_path):
-        with pytest.raises(GaitError, match="the gait cannot be written: "):
+        with pytest.raises(GaitError, match="cannot write "):
             gait.save(path)
 
 
@@ -192,3 +195,48 @@ def test_mutated_files_load_or_are_refused_in_words(saved: Path, data: st.DataOb
         message = str(path)
         assert np.all(np.isfinite(loaded.coefficients))
     assert str(path) in message
+
+
+@pytest.mark.parametrize("damage", [damaged_bytes, damaged_json])
+def test_damaged_files_are_refused_in_words_or_still_gaits(
+    damage: Callable[[bytes, random.Random], bytes], bravo7: hs.Robot, tmp_path: Path
+) -> None:
+    content = (SAVED / "gait.json").read_bytes()
+    path = tmp_path / "gait.json"
+    refused = []
+    for seed in range(150):
+        path.write_bytes(damage(content, random.Random(seed)))
+        for robot in (None, bravo7):
+            try:
+                gait = hs.load_gait(path, robot)
+            except GaitError as error:
+                refused.append(str(error))
+            else:
+                assert np.all(np.isfinite(gait.coefficients)), seed
+    assert len(refused) > 100
+    assert all(str(path) in words and len(words) < 2000 for words in refused)
+
+
+def test_files_of_version_0_1_still_load(bravo7: hs.Robot, tmp_path: Path) -> None:
+    gait = hs.load_gait(SAVED / "gait.json", bravo7)
+    assert (gait.step_length, gait.step_duration) == (0.3, 0.7)
+    gait.save(tmp_path / "again.json")
+    again, before = (
+        json.loads(path.read_text(encoding="utf-8"))
+        for path in (tmp_path / "again.json", SAVED / "gait.json")
+    )
+    del again["sha256"]  # which files did not have then
+    assert again == before
+
+
+def test_one_digit_that_is_another(saved: Path) -> None:
+    text = saved.read_text(encoding="utf-8")
+    place = text.index("start_velocity_rad_per_s") + 30
+    digit = next(i for i in range(place, len(text)) if text[i] in "12345678")
+    saved.write_text(f"{text[:digit]}9{text[digit + 1 :]}", encoding="utf-8")
+    with pytest.raises(GaitError, match=r"gait\.json: damaged: .* remove the entry \"sha256\""):
+        hs.load_gait(saved)
+    data = json.loads(saved.read_text(encoding="utf-8"))
+    del data["sha256"]
+    saved.write_text(json.dumps(data), encoding="utf-8")
+    hs.load_gait(saved)

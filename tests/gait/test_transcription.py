@@ -18,7 +18,7 @@ RADIUS = 0.02
 STEP = {"step_length": 0.25, "step_duration": 0.6}
 UNASKED: dict[str, Any] = {
     "speed": None, "clearance_profile": None, "zmp_margin": None, "force_margin": None,
-    "impact": True, "intervals": None, "starts": 1,
+    "impact": True, "intervals": None, "starts": 1, "joint_ranges": None,
 }  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from robot_cases import NAMED, RANDOM, RobotCase
 from heelstrike import dynamics
 
 TOLERANCE = 1e-10
-STATES = 1000
+STATES = 200
 
 
 def relative(ours: np.ndarray, theirs: np.ndarray) -> float:

@@ -102,7 +102,10 @@ def test_queries(case: RobotCase) -> None:
         check("angular momentum", dynamics.angular_momentum(robot, q, v), planar[2])
 
         rotors = 0.5 * float(robot.model.armature @ v**2)
+        # Some versions of Pinocchio count the motors' rotors, others do not.
+        model.armature[:] = 0.0
         pin.computeKineticEnergy(model, data, at, v)
+        model.armature = robot.model.armature.copy()
         check("kinetic energy", dynamics.kinetic_energy(robot, q, v) - rotors, data.kinetic_energy)
         pin.computePotentialEnergy(model, data, at)
         springs = 0.5 * float(robot.model.stiffness @ (q - robot.model.rest) ** 2)

@@ -262,7 +262,7 @@ def test_another_ending(tmp_path: Path) -> None:
 
 
 def test_a_place_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match="cannot be written"):
+    with pytest.raises(RobotError, match="cannot write"):
         load_robot("rabbit").save(tmp_path / "nowhere" / "rabbit.xml")
 
 

@@ -8,9 +8,9 @@ the robot shows it.
 
 from __future__ import annotations
 
+import os
 import random
 import re
-import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -24,7 +24,7 @@ from robot_file_truth import differences
 from heelstrike.errors import RobotError
 from heelstrike.robot import Robot, RobotWarning, builtin_robots, inspect_robot, load_robot
 
-LONGEST = 5.0  # seconds
+LONGEST = 5.0  # seconds of processor time
 EACH = 28  # files of each robot and format: 9 * 2 * 28 = 504
 
 NUMBERS = ("nan", "inf", "-inf", "-1", "0", "1e308", "1e400", "-0", "", "abc", "9" * 400)
@@ -283,9 +283,14 @@ def _scaled(text: str, factors: dict[str, float]) -> str:
     return _text(root)
 
 
+def seconds_spent() -> float:
+    """Computing time of this process and those it started: what others do is not in it."""
+    return sum(os.times()[:4])
+
+
 def outcome(path: Path) -> tuple[Robot | None, list[str], float]:
-    """Robot if there is one, warnings, and the seconds it took."""
-    began = time.perf_counter()
+    """Robot if there is one, warnings, and the seconds of computing it took."""
+    began = seconds_spent()
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
@@ -293,7 +298,7 @@ def outcome(path: Path) -> tuple[Robot | None, list[str], float]:
         except RobotError:
             robot = None
     assert all(one.category is RobotWarning for one in caught), [str(one) for one in caught]
-    return robot, [str(one.message) for one in caught], time.perf_counter() - began
+    return robot, [str(one.message) for one in caught], seconds_spent() - began
 
 
 def same(robot: Robot, other: Robot) -> bool:
@@ -327,7 +332,8 @@ def test_spoilt_files(name: str, ending: str, tmp_path: Path) -> None:
         assert seconds < LONGEST, case
         refused += robot is None
         if slip in MALICE:
-            assert robot is None or (slip is hostile_path and said), case
+            left_out = slip is hostile_path and robot is not None and (said or same(robot, sound))
+            assert robot is None or left_out, case
         if robot is None:
             continue
         assert robot.total_mass > 0.0, case
@@ -366,7 +372,7 @@ def test_spoilt_files_on_other_ways_in(way: str, ending: str, tmp_path: Path) ->
     accepted = 0
     for slip in (*HAND, *HAND, *MALICE):
         path.write_text(slip(text, draw), encoding="utf-8", errors="surrogatepass")
-        began = time.perf_counter()
+        began = seconds_spent()
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             warnings.simplefilter("ignore", RobotWarning)
@@ -375,7 +381,7 @@ def test_spoilt_files_on_other_ways_in(way: str, ending: str, tmp_path: Path) ->
             except RobotError:
                 continue
             finally:
-                assert time.perf_counter() - began < LONGEST, slip.__name__
+                assert seconds_spent() - began < LONGEST, slip.__name__
         accepted += 1
     assert accepted > 0
 

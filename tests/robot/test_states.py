@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import json
+import random
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from damage import damaged_bytes, damaged_json
+from stored_files import SAVED
 
 from heelstrike import dynamics
 from heelstrike.errors import RobotError
-from heelstrike.robot import Robot, State, builtin_robots, load_robot
+from heelstrike.robot import Robot, RobotBuilder, State, builtin_robots, load_robot
 
 
 @pytest.fixture
@@ -194,6 +198,7 @@ def test_joints_of_a_file_are_found_by_name(robot: Robot, tmp_path: Path) -> Non
     data = json.loads(path.read_text())
     for key in ("joints", "position_rad_or_m", "velocity_rad_or_m_per_s"):
         data[key].reverse()
+    del data["sha256"]
     path.write_text(json.dumps(data))
     assert_same(robot.load_state(path), state)
 
@@ -205,8 +210,8 @@ def test_joints_of_a_file_are_found_by_name(robot: Robot, tmp_path: Path) -> Non
         ({"version": 2}, "version 2 of the format is not known here, only 1"),
         ({"version": True}, "version True"),
         ({"joints": ["hip"]}, "with the joints hip; robot 'bravo7' has root_x"),
-        ({"joints": None}, "with the joints None"),
-        ({"joints": [["root_x"]]}, "with the joints"),
+        ({"joints": None}, "must be a list of names, got None"),
+        ({"joints": [["root_x"]]}, "must be a list of names"),
         ({"position_rad_or_m": [1.0]}, '"position_rad_or_m" must be a list of 9 finite numbers'),
         ({"velocity_rad_or_m_per_s": ["1"] * 9}, "must be a list of 9 finite numbers"),
         ({"velocity_rad_or_m_per_s": [True] * 9}, "must be a list of 9 finite numbers"),
@@ -247,7 +252,56 @@ def test_what_is_no_json(robot: Robot, tmp_path: Path, content: bytes, words: st
 def test_where_no_file_can_be(robot: Robot, tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="no such file"):
         robot.load_state(tmp_path / "gone.json")
-    with pytest.raises(RobotError, match="cannot be written"):
+    with pytest.raises(RobotError, match="cannot write"):
         robot.save_state(robot.reference_state(), tmp_path / "no" / "folder" / "s.json")
     with pytest.raises(RobotError):
         robot.load_state("a\0b")
+
+
+@pytest.mark.parametrize("damage", [damaged_bytes, damaged_json])
+def test_damaged_files_are_refused_in_words_or_still_states(
+    damage: Callable[[bytes, random.Random], bytes], robot: Robot, tmp_path: Path
+) -> None:
+    content = (SAVED / "state.json").read_bytes()
+    path = tmp_path / "state.json"
+    refused = []
+    for seed in range(150):
+        path.write_bytes(damage(content, random.Random(seed)))
+        try:
+            state = robot.load_state(path)
+        except RobotError as error:
+            refused.append(str(error))
+        else:
+            assert np.all(np.isfinite((*state.q, *state.v))), seed
+    assert len(refused) > 50
+    assert all(str(path) in words and len(words) < 2000 for words in refused)
+
+
+def test_joints_that_only_look_like_the_names(tmp_path: Path) -> None:
+    builder = RobotBuilder("numbered")
+    builder.hinge("1", None, mass=1.0, inertia=0.1)
+    robot = builder.build()
+    path = robot.save_state(robot.reference_state(), tmp_path / "s.json")
+    path.write_text(path.read_text().replace('"1"', "1"))
+    with pytest.raises(RobotError, match="must be a list of names"):
+        robot.load_state(path)
+
+
+def test_files_of_version_0_1_still_load(robot: Robot) -> None:
+    state = robot.load_state(SAVED / "state.json")
+    expected = robot.reference_state()
+    expected.q[1] += 2e-3
+    np.testing.assert_array_equal(state.q, expected.q)
+
+
+def test_one_digit_that_is_another(robot: Robot, tmp_path: Path) -> None:
+    state = robot.reference_state()
+    state.q[3] = 0.125
+    path = robot.save_state(state, tmp_path / "s.json")
+    path.write_text(path.read_text().replace("0.125", "0.135"))
+    with pytest.raises(RobotError, match=r"s\.json: damaged: .* remove the entry \"sha256\""):
+        robot.load_state(path)
+    data = json.loads(path.read_text())
+    del data["sha256"]
+    path.write_text(json.dumps(data, indent=1))
+    assert robot.load_state(path).q[3] == 0.135

@@ -218,6 +218,70 @@ def test_ctrl_c_returns_what_there_is() -> None:
         batch.run(39)
 
 
+def test_progress_that_raises_ends_all_runs_and_they_say_so() -> None:
+    def progress(done: int, total: int) -> None:
+        if done >= 1:
+            raise OSError("the terminal is gone")
+
+    durations = np.full(40, 7.0)
+    durations[0] = 0.01
+    batch = hs.simulate_batch(
+        walking.bravo7(), controller(), state=walking.gait().initial_state, duration=durations,
+        threads=2, progress=progress,
+    )  # fmt: skip
+    assert batch.status[0] is RunStatus.COMPLETED
+    assert batch.status[-1] is RunStatus.INTERRUPTED
+    assert "progress raised OSError: the terminal is gone" in batch.message[-1]
+
+
+def test_progress_that_raises_when_all_is_done_is_only_told() -> None:
+    def progress(done: int, total: int) -> None:
+        if done == total:
+            raise OSError("the terminal is gone")
+
+    with pytest.warns(UserWarning, match="the terminal is gone"):
+        batch = hs.simulate_batch(
+            walking.bravo7(), controller(), state=walking.gait().initial_state, duration=0.01,
+            progress=progress,
+        )  # fmt: skip
+    assert batch.completed.all()
+
+
+@controller_kernel
+def failing(
+    t: float,
+    q: Floats,
+    v: Floats,
+    contacts: Contacts,
+    model: Model,
+    tree: Any,
+    scratch: Any,
+    parameters: Floats,
+    memory: Floats,
+    torque: Floats,
+) -> None:
+    """A controller of which some raise, and some write beyond their arrays."""
+    if t >= parameters[1]:
+        torque[int(parameters[0])] = 1.0
+
+
+def test_a_controller_that_fails_ends_its_own_run_only() -> None:
+    numbers = np.array([[0.0, 0.05], [7.0, 0.05], [0.0, 0.05], [7.0, 0.02]])
+    batch = hs.simulate_batch(
+        walking.bravo7(),
+        CompiledController(failing, numbers[0], np.zeros(0)),
+        state=walking.gait().initial_state,
+        duration=0.1,
+        parameters=numbers,
+        threads=1,
+    )
+    failed = RunStatus.CONTROLLER_FAILED
+    assert batch.status == (RunStatus.COMPLETED, failed, RunStatus.COMPLETED, failed)
+    assert "'failing' raised IndexError" in batch.message[1]
+    np.testing.assert_allclose(batch.time, [0.1, 0.05, 0.1, 0.02])
+    np.testing.assert_array_equal(batch.position[0], batch.position[2])
+
+
 def test_progress_counts_and_a_pipe_stays_quiet(capfd: pytest.CaptureFixture[str]) -> None:
     seen = []
     start = walking.gait().initial_state

@@ -29,7 +29,7 @@ ROUNDING = 1e-10
 
 def without_programs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Make new simulations run on the loops alone."""
-    monkeypatch.setattr(programs, "can_fuse", lambda: False)
+    monkeypatch.setattr(programs, "MOST_COORDINATES", 0)
     monkeypatch.setattr(programs, "_known", WeakKeyDictionary())
 
 

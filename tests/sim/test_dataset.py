@@ -19,7 +19,8 @@ from synthetic_runs import box, make_run, pendulum
 import heelstrike as hs
 from heelstrike.robot import Robot, read_mjcf
 from heelstrike.sim import Event, EventKind, RunStatus, Scheme
-from heelstrike.sim.dataset import load_run, save, to_dataset
+from heelstrike.sim.dataset import to_dataset
+from heelstrike.sim.run_file import load_run, save
 
 
 def same(a: Any, b: Any) -> bool:
@@ -246,7 +247,7 @@ def _last_set(value: float) -> Any:
     [
         (None, _drop("torque"), "'torque' is missing"),
         (None, _drop("ground_friction"), "'ground_friction' is missing"),
-        (None, _replaced("gap", lambda v: v.astype(str)), "not numbers"),
+        (None, _replaced("gap", lambda v: v.astype(str)), "holds no numbers"),
         (None, lambda d: d.drop_dims("contact"), "'contact_point' is missing"),
         (None, lambda d: d.isel(coordinate=slice(0, 4)), "has shape 51 × 4 instead of 51 × 9"),
         (None, _replaced("ground_friction", lambda v: v - 9.0), "friction"),
@@ -339,7 +340,7 @@ def test_a_failed_write_leaves_the_old_file(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(xarray.Dataset, "to_netcdf", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     with pytest.raises(hs.RunFileError, match="No space left"):
         walking.walk(steps=2).save(path)
     assert path.read_bytes() == before

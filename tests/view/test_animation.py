@@ -138,7 +138,7 @@ def test_without_ffmpeg_the_way_out_is_named(
     def missing() -> str:
         raise RuntimeError("No ffmpeg exe could be found")
 
-    monkeypatch.setattr("imageio_ffmpeg._io.get_ffmpeg_exe", missing)
+    monkeypatch.setattr("imageio_ffmpeg.get_ffmpeg_exe", missing)
     with pytest.raises(ViewError, match=r"\.gif needs none"):
         animate(walking.walk(steps=1), tmp_path / "walk.mp4")
     assert not list(tmp_path.iterdir())

@@ -29,6 +29,7 @@ from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate
 from heelstrike.sim.status import EventKind
+from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -260,13 +261,15 @@ class PoincareMap:
         Steps take about as long as the one before; where that is too short, they get the longest.
         """
         for duration in (min(SLACK * self._expected, self._longest), self._longest):
-            run = simulate(
-                self._section.robot,
-                self._controller,
-                state=state,
-                duration=duration,
-                method=self._method,
-                ground=self._section.ground,
+            run = whole(
+                simulate(
+                    self._section.robot,
+                    self._controller,
+                    state=state,
+                    duration=duration,
+                    method=self._method,
+                    ground=self._section.ground,
+                )
             )
             down: set[int] = set()
             for event in run.events:

@@ -10,7 +10,17 @@ from typing import Annotated
 
 import typer
 
-from heelstrike.cli.terminal import Debug, messages, output, spoken, stage, tell
+from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.terminal import (
+    Debug,
+    messages,
+    output,
+    spoken,
+    stage,
+    tell,
+    tell_interruption,
+    wrote,
+)
 
 
 class Part(StrEnum):
@@ -53,8 +63,12 @@ def bench(
             tell(f"{NOT_INSTALLED}, so not compared with: {', '.join(missing)}")
         benchmark = run_benchmark(quick=quick, parts=part, progress=current.doing)
         files = benchmark.save(out)
+        wrote(*files)
     if as_json:
         typer.echo(json.dumps(benchmark.to_dict(), indent=2))
     else:
         output().print(benchmark)
+    if benchmark.interrupted:
+        tell_interruption(f"measuring {benchmark.interrupted}")
+        raise typer.Exit(INTERRUPTED)
     messages().print(f"in {out}: {', '.join(file.name for file in files)}")

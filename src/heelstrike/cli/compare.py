@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from heelstrike.cli.terminal import FAILED, Debug, messages, output, spoken, stage
+from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.terminal import (
+    FAILED,
+    Debug,
+    messages,
+    output,
+    spoken,
+    stage,
+    tell_interruption,
+    wrote,
+)
 
 if TYPE_CHECKING:
     from heelstrike.sim.engine import Method
@@ -68,6 +78,7 @@ def compare(
     from heelstrike.experiments.comparison import compare as compare_methods
     from heelstrike.experiments.walk import typical_step
     from heelstrike.view.style import save_figure
+    from heelstrike.whole_file import write_whole
 
     loaded = hs.load_robot(robot)
     ways = method or ALL
@@ -99,11 +110,16 @@ def compare(
             ground=ground,
         )
     out.mkdir(parents=True, exist_ok=True)
-    (out / "compare.json").write_text(json.dumps(comparison.to_dict(), indent=2) + "\n")
+    write_whole(out / "compare.json", json.dumps(comparison.to_dict(), indent=2) + "\n")
+    wrote(out / "compare.json")
     if as_json:
         typer.echo(json.dumps(comparison.to_dict(), indent=2))
     else:
         output().print(comparison)
+    if comparison.interrupted:
+        # No figure of what somebody did not wait for.
+        tell_interruption(f"walking {steps} steps by {len(chosen)} methods")
+        raise typer.Exit(INTERRUPTED)
     save_figure(comparison.plot(), out / "compare.png")
     messages().print(f"in {out}: compare.json, compare.png")
     if not all(run.completed for run in comparison.runs.values()):

@@ -12,6 +12,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any, ParamSpec, TypeVar
 
 import typer
@@ -26,7 +27,9 @@ from rich.progress import (
 )
 from rich.text import Text
 
+from heelstrike.cli import INTERRUPTED
 from heelstrike.errors import HeelstrikeError
+from heelstrike.interruption import insistent_interrupts
 
 FAILED = 1
 """Exit status when the work was done but did not come out well: the robot fell, say."""
@@ -78,28 +81,59 @@ def _print_labelled(label: str, style: str, message: str) -> None:
 def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
     """Make a command tell its errors and warnings in words, without a traceback.
 
-    The command takes ``debug``, which lets errors through as they are.
+    After Ctrl-C it tells what was going on and which files there are (:func:`wrote`). The command
+    takes ``debug``, which lets errors through as they are.
     """
 
     @functools.wraps(function)
     def command(*args: _Parameters.args, **options: _Parameters.kwargs) -> _Result:
-        with warnings.catch_warnings():
-            if not options.get("debug"):
-                warnings.showwarning = lambda message, *_, **__: warn(str(message))
+        _written.clear()
+        with insistent_interrupts() as interrupts, warnings.catch_warnings():
+            if options.get("debug"):
+                return function(*args, **options)
+            warnings.showwarning = lambda message, *_, **__: warn(str(message))
             try:
                 return function(*args, **options)
-            except HeelstrikeError as error:
-                if options.get("debug"):
+            except KeyboardInterrupt as error:
+                interrupts.acknowledge()
+                tell_interruption(getattr(error, "doing", ""))
+                raise typer.Exit(INTERRUPTED) from None
+            except typer.Exit:
+                raise
+            except Exception as error:
+                if interrupts.came:  # an import that Ctrl-C breaks off can say that it failed
+                    tell_interruption()
+                    raise typer.Exit(INTERRUPTED) from None
+                if isinstance(error, HeelstrikeError):
+                    complain(str(error))
+                elif isinstance(error, OSError):
+                    complain(_file_trouble(error))
+                else:
                     raise
-                complain(str(error))
-                raise typer.Exit(WRONG_INPUT) from None
-            except OSError as error:
-                if options.get("debug"):
-                    raise
-                complain(_file_trouble(error))
                 raise typer.Exit(WRONG_INPUT) from None
 
     return command
+
+
+_written: list[Path] = []
+
+
+def wrote(*files: Path) -> None:
+    """Remember files that a command has written, for the case of Ctrl-C."""
+    _written.extend(files)
+
+
+def tell_interruption(doing: str = "") -> None:
+    """Say what Ctrl-C ended and what is kept."""
+    names = ", ".join(str(path) for path in _written)
+    messages().print(
+        Text.assemble(
+            ("interrupted", "yellow"),
+            f" while {doing}" if doing else "",
+            f"; kept: {names}" if names else "; nothing was written",
+        ),
+        soft_wrap=True,
+    )
 
 
 def _file_trouble(error: OSError) -> str:
@@ -110,7 +144,9 @@ def _file_trouble(error: OSError) -> str:
 class Stage:
     """A piece of work in progress."""
 
-    def __init__(self, progress: Progress | None = None, task: Any = None) -> None:
+    def __init__(self, what: str, progress: Progress | None = None, task: Any = None) -> None:
+        self.what = what
+        """What is being done."""
         self._progress = progress
         self._task = task
         self.outcome = ""
@@ -123,6 +159,7 @@ class Stage:
 
     def doing(self, what: str, fraction: float) -> None:
         """Show what is being done now, and how much of that is done."""
+        self.what = what
         if self._progress is not None:
             self._progress.update(self._task, description=what)
             self.reached(fraction)
@@ -131,6 +168,8 @@ class Stage:
 @contextmanager
 def stage(doing: str, *, when_slow: str = "") -> Iterator[Stage]:
     """Show a piece of work while it lasts, on a terminal; say its outcome when it is over.
+
+    A KeyboardInterrupt that ends it learns what was being done: its ``doing``.
 
     Parameters
     ----------
@@ -141,7 +180,8 @@ def stage(doing: str, *, when_slow: str = "") -> Iterator[Stage]:
     """
     console = messages()
     if not console.is_terminal:
-        yield Stage()
+        with _named_interrupt(Stage(doing)) as current:
+            yield current
         return
     progress = Progress(
         SpinnerColumn(),
@@ -152,10 +192,20 @@ def stage(doing: str, *, when_slow: str = "") -> Iterator[Stage]:
         transient=True,
     )
     with progress:
-        current = Stage(progress, progress.add_task(doing, total=None))
-        yield current
+        current = Stage(doing, progress, progress.add_task(doing, total=None))
+        with _named_interrupt(current):
+            yield current
     if current.outcome:
         console.print(current.outcome)
+
+
+@contextmanager
+def _named_interrupt(current: Stage) -> Iterator[Stage]:
+    try:
+        yield current
+    except KeyboardInterrupt as error:
+        error.doing = current.what  # type: ignore[attr-defined]
+        raise
 
 
 class _Doing(ProgressColumn):

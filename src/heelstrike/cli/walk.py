@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from heelstrike.cli.terminal import FAILED, Debug, complain, output, spoken, stage, tell
+from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.terminal import (
+    FAILED,
+    Debug,
+    complain,
+    output,
+    spoken,
+    stage,
+    tell,
+    tell_interruption,
+    wrote,
+)
 
 if TYPE_CHECKING:
     from heelstrike.gait import Gait
@@ -94,13 +105,15 @@ def walk(
 
     Writes gait.json, run.nc, summary.json, a PNG for every figure and walk.mp4 (or .gif). The exit
     status is 0 if the robot walked all steps, 1 if it did not or a result could not be written
-    (everything else is written all the same), 2 if the request was wrong.
+    (everything else is written all the same), 2 if the request was wrong, 130 after Ctrl-C, which
+    keeps the gait and the data of the walk so far.
     """
     with stage("loading"):
         from heelstrike.contact.ground import Ground
         from heelstrike.experiments.results import Results
         from heelstrike.experiments.walk import walk, why_unstable
         from heelstrike.robot import load_robot
+        from heelstrike.sim import RunStatus
 
         # All that is cheap to refuse is refused before anything that takes long.
         time_method = _time_method(method, step, scheme)
@@ -108,7 +121,7 @@ def walk(
         machine = load_robot(robot)
         results = Results(out)
     planned = _gait(machine, gait, step_length, step_duration, clearance, friction)
-    results.save_gait(planned)
+    wrote(results.save_gait(planned))
     with stage(f"walking {steps} steps", when_slow=FIRST_TIME) as walking:
         run = walk(
             machine,
@@ -118,9 +131,26 @@ def walk(
             ground=ground,
             progress=walking.reached,
         )
+    # After Ctrl-C one wants to have what there is and go: the data, but no pictures of them.
+    interrupted = run.status is RunStatus.INTERRUPTED
+    kind = None if animation is Animation.NONE or interrupted else animation.value
+    if interrupted:
+        tell("interrupted: writing the data, which Ctrl-C would stop")
     with stage("writing results") as writing:
-        kind = None if animation is Animation.NONE else animation.value
-        saved = results.save_run(run, planned, animation=kind, progress=writing.reached)
+        try:
+            saved = results.save_run(
+                run, planned, figures=not interrupted, animation=kind, progress=writing.reached
+            )
+        finally:
+            wrote(*results.written[1:])
+    for each in saved:
+        if each.error is not None:
+            complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
+    if interrupted:
+        if as_json:
+            typer.echo(run.summary(gait=planned).to_json())
+        tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
+        raise typer.Exit(INTERRUPTED)
     summary = run.summary(gait=planned)
     if as_json:
         typer.echo(summary.to_json())
@@ -128,9 +158,6 @@ def walk(
         output().print(summary)
         written = ", ".join(each.path.name for each in saved if each.error is None)
         tell(f"in {out}: gait.json, {written}")
-    for each in saved:
-        if each.error is not None:
-            complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
     walked = run.completed and summary.steps >= steps
     if not run.completed:
         complain(run.message)

@@ -27,12 +27,12 @@ from heelstrike.contact.workspace import (
     PIVOT_ROW,
     POINT,
     RESIDUAL,
-    REST_TOLERANCE,
+    REST,
+    ROOT,
     ROUNDING,
     ROW_LABEL,
     SCALE,
     SETTINGS,
-    SIZE,
     SKEWED,
     SLOPE,
     SOURCE,
@@ -283,18 +283,19 @@ def label(count: int, velocity: Floats, mode: Integers, work: ContactWorkspace) 
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
     impulse in its cone. Only with all of these admitted is the least-norm split unique. The
-    velocity is judged on the scale that the last certificate left in ``SIZE``.
+    velocity is judged by what the last certificate left in ``REST``.
     """
-    size, tangent = work.vectors[SIZE], work.labels[TANGENT]
+    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
+    tangent = work.labels[TANGENT]
     changed = False
     for contact in range(count):
         row = 2 * contact
         name = STICK
-        if velocity[row] > REST_TOLERANCE * size[row]:
+        if velocity[row] > rest * root[row]:
             name = OPEN
-        elif velocity[row + 1] > REST_TOLERANCE * size[row + 1]:
+        elif velocity[row + 1] > rest * root[row + 1]:
             name = SLIP_FORWARD
-        elif velocity[row + 1] < -REST_TOLERANCE * size[row + 1]:
+        elif velocity[row + 1] < -rest * root[row + 1]:
             name = SLIP_BACKWARD
         if tangent[contact] >= 0:
             changed = changed or name != mode[contact]

@@ -18,16 +18,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from heelstrike.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
 from heelstrike.contact.workspace import (
     EFFORT,
     FLOOR,
+    REST,
+    REST_TOLERANCE,
     ROOT,
     ROUNDING,
     SETTINGS,
-    SIZE,
     SKEWED,
     SLOPE,
     UNIT,
@@ -124,8 +127,8 @@ def certify(
     is returned includes rounding. ``SLOPE`` is not zero where a contact is prescribed to slide; its
     friction then lies on the given edge and its tangential velocity is not constrained.
 
-    Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` and ``SIZE`` of every row,
-    ``ROUNDING``, ``EFFORT`` and ``UNIT``.
+    Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` of every row, ``ROUNDING``,
+    ``EFFORT``, ``UNIT`` and ``REST``.
     """
     settings, root, slope = work.vectors[SETTINGS], work.vectors[ROOT], work.vectors[SLOPE]
     unit = weigh(count, delassus, free, impulse, work)
@@ -136,8 +139,7 @@ def certify(
         rounding = sum_velocities_sharply(count, delassus, free, impulse, velocity, unit, work)
     settings[ROUNDING] = rounding
     settings[UNIT] = unit
-    for i in range(2 * count):
-        work.vectors[SIZE, i] = root[i] * unit * (1.0 + settings[EFFORT])
+    settings[REST] = REST_TOLERANCE * unit * (1.0 + settings[EFFORT])
     inverse = 1.0 / unit if unit > 0.0 else 0.0
 
     complementarity = 0.0
@@ -271,3 +273,36 @@ def sum_velocities_sharply(
     if settings[EFFORT] < math.inf:
         settings[EFFORT] = effort
     return rounding
+
+
+def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Floats:
+    """How far the velocities just certified may be from a solution's; see :class:`Certificate`.
+
+    To make the answer exact, let every residual vanish. Velocities that are no larger than the
+    worst residual r become zero by moving the free ones. Impulses outside their cones, or without a
+    right to be there, move by at most r in units of the data; and friction by mu g_t / g_n times
+    that where the normal impulse that holds it vanishes. A row feels such a unit of impulse by at
+    most its own unit of velocity, which moves its free velocity once more.
+
+    Parameters
+    ----------
+    worst : float
+        Largest residual, rounding included.
+    friction : (nc,) float
+        Friction coefficients.
+    work : ContactWorkspace
+        As :func:`certify` left it.
+
+    Returns
+    -------
+    (nc, 2) float
+        In the unit of the free velocity.
+    """
+    root = work.vectors[ROOT, : 2 * friction.size]
+    lever = np.zeros(friction.size)
+    np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
+    if not worst < math.inf:
+        return np.full((friction.size, 2), math.inf)
+    moved = worst * (1.0 + np.sum(2.0 + lever))
+    bound: Floats = (moved * work.vectors[SETTINGS, UNIT] * root).reshape(friction.size, 2)
+    return bound

@@ -9,7 +9,7 @@ from llvmlite import ir
 from numpy.typing import NDArray
 
 from heelstrike.compilation import kernel
-from heelstrike.dynamics.machine_code import addresses, can_fuse
+from heelstrike.dynamics.machine_code import addresses
 from heelstrike.dynamics.straight_line import Recording, add_function
 from heelstrike.robot.model import Floats
 
@@ -70,8 +70,7 @@ def elimination_programs() -> NDArray[np.int64]:
     Read-only: all workspaces share them.
     """
     programs = np.zeros(LARGEST + 1, dtype=np.int64)
-    if can_fuse():
-        programs[1:] = _programs()
+    programs[1:] = _programs()
     programs.flags.writeable = False
     return programs
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.compilation import kernel
-from heelstrike.contact.certificate import Certificate, certify
+from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
 from heelstrike.contact.repetition import repeat
 from heelstrike.contact.search import CLEAN, contact_workspace
@@ -21,7 +21,6 @@ from heelstrike.contact.workspace import (
     FLOOR,
     ITERATIONS,
     LAST_FALLBACKS,
-    ROOT,
     ROUNDING,
     SETTINGS,
     SHORTCUTS,
@@ -30,7 +29,6 @@ from heelstrike.contact.workspace import (
     SOLVES,
     SUCCEEDED,
     TOLERANCE,
-    UNIT,
     ContactWorkspace,
     Floats,
     Integers,
@@ -263,30 +261,9 @@ def run_solvers(
         penetration=float(residual[2]),
         rounding=float(work.vectors[SETTINGS, ROUNDING]),
         tolerance=float(tolerance),
-        velocity_error=_velocity_error(worst, friction, work),
+        velocity_error=velocity_error(worst, friction, work),
     )
     return impulse, velocity, certificate
-
-
-def _velocity_error(
-    worst: float,
-    friction: Floats,
-    work: ContactWorkspace,
-) -> Floats:
-    """How far the velocities may be from a solution's; see :class:`Certificate`.
-
-    To make the answer exact, let every residual vanish: velocities below the worst residual r
-    become zero by moving b; impulses outside their cones or without right to be there move by at
-    most r in units of the data, and by μ g_t / g_n times that where a normal impulse vanishes that
-    holds friction. A row feels an impulse of one such unit by at most its own unit of velocity.
-    """
-    count = friction.size
-    root = work.vectors[ROOT, : 2 * count]
-    lever = np.zeros(count)
-    np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
-    moved = worst * (1.0 + np.sum(2.0 + lever))
-    unit = work.vectors[SETTINGS, UNIT]
-    return (moved * unit * root).reshape(count, 2)
 
 
 def _may_be_semidefinite(matrix: Floats) -> bool:

@@ -19,9 +19,10 @@ from heelstrike.contact.workspace import (
     ORDER,
     PIVOT_ROW,
     POINT,
-    REST_TOLERANCE,
+    REST,
+    ROOT,
+    SETTINGS,
     SHARERS,
-    SIZE,
     SPAN,
     SPEED,
     STEP,
@@ -333,16 +334,16 @@ def moves_as_named(
 
     A contact without friction takes the name of its velocity.
     """
-    size = work.vectors[SIZE]
+    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
     for contact in range(count):
         normal = 2 * contact
         tangent = normal + 1
-        departs = velocity[normal] > REST_TOLERANCE * size[normal]
+        departs = velocity[normal] > rest * root[normal]
         if departs != (mode[contact] == OPEN):
             return False
         if departs:
             continue
-        if abs(velocity[tangent]) > REST_TOLERANCE * size[tangent]:
+        if abs(velocity[tangent]) > rest * root[tangent]:
             if friction[contact] > 0.0:
                 return False
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD

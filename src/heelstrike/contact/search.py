@@ -309,7 +309,7 @@ def try_solvers(
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         counters[FAILURES] += 1
-        if doubtful or nearly_singular(unknowns, delassus, work):
+        if doubtful or (with_fallbacks and nearly_singular(unknowns, delassus, work)):
             status = UNDECIDABLE
     elif attempt < 0:
         counters[SHORTCUTS] += 1

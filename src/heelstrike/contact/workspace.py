@@ -29,6 +29,7 @@ FLOOR = 2
 ROUNDING = 3  # written by the certificate: what rounding may hide from it
 EFFORT = 4  # written by the certificate: the velocities that cancel, in units of the data's
 UNIT = 5  # written by the certificate: the size of the data
+REST = 6  # written by the certificate: velocities below this times ``ROOT`` count as zero
 
 # Rows of ``ContactWorkspace.labels``, by what they are indexed with.
 NORMAL = 0  # contact: its normal unknown
@@ -62,15 +63,14 @@ STEP = 11  # unknown or equation: a correction
 SPEED = 12  # unknown or equation: scaled velocity
 EQUATIONS = 13  # unknown: what the iterate leaves of the equations
 PROGRESS = 14  # an iterative solver's own numbers
-SIZE = 15  # row of the data: the velocities that cancel in it, the yardstick of what is at rest
+ROOT = 15  # row of the data: root of its diagonal, velocity per unit of scaled impulse
 SETTINGS = 16  # TOLERANCE and SKEWED, which the caller may choose, and what goes with them
 SHARERS = 17  # equation: how many rows share it
-ROOT = 18  # row of the data: square root of its diagonal, velocity per unit of scaled impulse
-BEFORE = 19  # equation: its unknown before the last refinement
-VECTORS = 20
+BEFORE = 18  # equation: its unknown before the last refinement
+VECTORS = 19
 
 REST_TOLERANCE = 1e-10
-"""Velocities below this, relative to what they are summed from, count as zero."""
+"""Velocities below this, relative to the data and to what cancels in them, count as zero."""
 
 # Matrices of ``ContactWorkspace.squares``.
 MATRIX = 0  # the scaled problem

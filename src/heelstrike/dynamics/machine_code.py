@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import sys
-import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -16,13 +14,13 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import config
 
-from heelstrike.compilation import cache_directory
+from heelstrike import kept_code
 from heelstrike.fingerprint import fingerprint
+from heelstrike.kept_code import directories
 
-_DIGEST = 32  # bytes
 _OPTIMISATION = 1  # more costs time and gains nothing on straight-line code
 
-_loaded: dict[str, Any] = {}
+_loaded: dict[bytes, Any] = {}
 """Engines by key. They hold the code, and live as long as the process."""
 
 _loading = threading.Lock()
@@ -65,21 +63,22 @@ def addresses(
     key = _key(described, write)
     with _loading:
         if key not in _loaded:
-            _loaded[key] = _engine(key, write)
+            _loaded[key] = _engine(_name(described), key, write)
         return tuple(_loaded[key].get_function_address(name) for name in names)
 
 
-def _engine(key: str, write: Callable[[], ir.Module]) -> Any:
+def _engine(name: str, key: bytes, write: Callable[[], ir.Module]) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     cpu, features = _processor()
     machine = llvm.Target.from_default_triple().create_target_machine(
         cpu=cpu, features=features, opt=_OPTIMISATION, jit=True
     )
-    code = _read(key)
+    places = directories(Path(__file__))
+    code = kept_code.read(places, name, key)
     if code is None:
         code = _compiled(write(), machine)
-        _keep(key, code)
+        kept_code.write(places, name, key, code)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -97,45 +96,21 @@ def _compiled(module: ir.Module, machine: Any) -> bytes:
     return code
 
 
-def _key(described: bytes, write: Callable[[], ir.Module]) -> str:
+def _name(described: bytes) -> str:
+    """Name of the file, which the next version of the sources takes over."""
+    digest = hashlib.sha256(described + repr(_processor()).encode())
+    return f"straight_line.{digest.hexdigest()[:32]}.machine_code"
+
+
+def _key(described: bytes, write: Callable[[], ir.Module]) -> bytes:
+    """What the code is for."""
     digest = hashlib.sha256(described)
-    made_of = _made_of(write.__module__)
-    for part in (made_of, *_processor(), str(llvm.llvm_version_info)):
+    for part in (_made_of(write.__module__), *_processor(), str(llvm.llvm_version_info)):
         digest.update(b"\0" + part.encode())
-    return digest.hexdigest()
+    return digest.digest()
 
 
 @lru_cache
 def _made_of(module: str) -> str:
     """Fingerprint of a module that writes, and of this one that compiles."""
     return fingerprint(sys.modules[module], sys.modules[__name__])
-
-
-def _file(key: str) -> Path:
-    return cache_directory() / f"straight_line.{key[:32]}.o"
-
-
-def _read(key: str) -> bytes | None:
-    """Code that was kept, if it is whole: LLVM would crash on half of it."""
-    try:
-        kept = _file(key).read_bytes()
-    except (OSError, RuntimeError):
-        return None
-    digest, code = kept[:_DIGEST], kept[_DIGEST:]
-    return code if hashlib.sha256(code).digest() == digest else None
-
-
-def _keep(key: str, code: bytes) -> None:
-    """Write code and its digest to a file; without a place to write, do without."""
-    try:
-        directory = cache_directory()
-        directory.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=directory)
-    except (OSError, RuntimeError):
-        return
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(hashlib.sha256(code).digest() + code)
-        Path(name).replace(_file(key))
-    except OSError:  # no space left; on Windows, somebody is reading the file
-        Path(name).unlink(missing_ok=True)

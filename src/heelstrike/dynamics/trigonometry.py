@@ -1,9 +1,10 @@
 """Sine and cosine of many angles at once, as LLVM instructions.
 
-The quadrant is taken off by a multiple of π/2 in three parts (Cody and Waite 1980), exact through
-fused multiply-add; the rest, within ±π/4, goes through the polynomials of the Freely Distributable
-Math Library (fdlibm, Sun Microsystems 1993, ``k_sin.c`` and ``k_cos.c``). Errors stay within one
-unit in the last place for angles up to a million radians.
+The quadrant is taken off by a multiple of π/2 in parts (Cody and Waite 1980), exact through fused
+multiply-add; or, on processors without it, through parts so short that their multiples are exact,
+with the rounding of the differences made good (Knuth 1969). The rest, within ±π/4, goes through the
+polynomials of the Freely Distributable Math Library (fdlibm, Sun Microsystems 1993, ``k_sin.c`` and
+``k_cos.c``). Errors stay within two units in the last place for angles up to a million radians.
 """
 
 from __future__ import annotations
@@ -13,10 +14,20 @@ from typing import Any
 
 from llvmlite import ir
 
+from heelstrike.dynamics.machine_code import can_fuse
+
 _PARTS = tuple(
     map(float.fromhex, ("0x1.921fb54442d18p+0", "0x1.1a62633145c07p-54", "-0x1.f1976b7ed8fbcp-110"))
 )
 """π/2 in three parts, to 160 bits."""
+
+_SHORT_PARTS = tuple(
+    map(
+        float.fromhex,
+        ("0x1.921fb544p+0", "0x1.0b4611a6p-34", "0x1.3198a2e0p-69", "0x1.b839a252049c1p-104"),
+    )
+)
+"""π/2 in parts of 33 bits and a rest: a million times one of them is a double."""
 
 _ROUNDER = 1.5 * 2.0**52
 """Added to a double, it pushes all bits below one out and the integer into the low bits."""
@@ -50,20 +61,28 @@ def sine_and_cosine(builder: ir.IRBuilder, angle: Any) -> tuple[Any, Any]:
     def whole(value: int) -> Any:
         return ir.Constant(integers, [value] * lanes)
 
-    name = f"llvm.fma.v{lanes}f64"
-    fused = builder.module.globals.get(name) or ir.Function(
-        builder.module, ir.FunctionType(angle.type, [angle.type] * 3), name
-    )
-
     def fma(a: Any, b: Any, c: Any) -> Any:
+        if not can_fuse():
+            return builder.fadd(builder.fmul(a, b), c)
+        name = f"llvm.fma.v{lanes}f64"
+        kind = ir.FunctionType(angle.type, [angle.type] * 3)
+        fused = builder.module.globals.get(name) or ir.Function(builder.module, kind, name)
         return builder.call(fused, (a, b, c))
 
     shifted = fma(angle, constant(2.0 / math.pi), constant(_ROUNDER))
     quadrant = builder.bitcast(shifted, integers)
     turns = builder.fsub(shifted, constant(_ROUNDER))
     rest = angle
-    for part in _PARTS:
-        rest = fma(turns, constant(-part), rest)
+    if can_fuse():
+        for part in _PARTS:
+            rest = fma(turns, constant(-part), rest)
+    else:
+        *exact, last = (builder.fmul(turns, constant(part)) for part in _SHORT_PARTS)
+        lost = builder.fneg(last)
+        for part in exact:
+            rest, rounding = _difference(builder, rest, part)
+            lost = builder.fadd(lost, rounding)
+        rest = builder.fadd(rest, lost)
 
     square = builder.fmul(rest, rest)
     sine = constant(_SINE[0])
@@ -89,3 +108,11 @@ def sine_and_cosine(builder: ir.IRBuilder, angle: Any) -> tuple[Any, Any]:
         signed(builder.select(odd, cosine, sine), sine_sign),
         signed(builder.select(odd, sine, cosine), cosine_sign),
     )
+
+
+def _difference(builder: ir.IRBuilder, a: Any, b: Any) -> tuple[Any, Any]:
+    """Emit a - b, rounded, and what the rounding has lost."""
+    rounded = builder.fsub(a, b)
+    virtual = builder.fsub(rounded, a)
+    lost = builder.fsub(builder.fsub(a, builder.fsub(rounded, virtual)), builder.fadd(b, virtual))
+    return rounded, lost

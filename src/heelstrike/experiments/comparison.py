@@ -20,9 +20,11 @@ from heelstrike.analysis import (
 from heelstrike.analysis.intervals import IMPULSIVE, impulses_in_events
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
+from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
 from heelstrike.sim import CompiledController, Controller, Run, simulate
 from heelstrike.sim.engine import Method
+from heelstrike.sim.status import RunStatus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,6 +33,9 @@ Floats = NDArray[np.float64]
 
 GRID = 1e-3
 """Time between the instants at which runs are compared, in s."""
+
+INTERRUPTED = "interrupted before it began"
+"""Why a method is left out after Ctrl-C."""
 
 LANDING = 0.02
 """Impulses are added up over this time from a touchdown, in s: compliant ground needs it."""
@@ -101,6 +106,12 @@ class Comparison:
     reference: str
     differences: tuple[Difference, ...]
     left_out: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended it before all methods were through."""
+        cut = any(run.status is RunStatus.INTERRUPTED for run in self.runs.values())
+        return cut or INTERRUPTED in self.left_out.values()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the differences as plain numbers, NaN as None."""
@@ -181,13 +192,16 @@ def compare(
     Comparison
         Methods that refuse the ground, the state or the controller's period are left out with
         their reasons: a compliant law has a restitution of its own, for one, and takes none from
-        the ground.
+        the ground. So are those that had not begun when Ctrl-C came; the one under way is there
+        as far as it came.
 
     Raises
     ------
     SimulationError
         If no method is given, two have the same name, the reference is none of them, or the
         reference is left out.
+    KeyboardInterrupt
+        At Ctrl-C before the reference has begun.
     """
     named = _named(methods)
     first = next(iter(named)) if reference is None else reference
@@ -195,9 +209,13 @@ def compare(
         raise SimulationError(f"the reference {first!r} is none of the methods: {', '.join(named)}")
     runs: dict[str, Run] = {}
     left_out: dict[str, str] = {}
+    interrupted = False
     for name, method in named.items():
+        if interrupted:
+            left_out[name] = INTERRUPTED
+            continue
         try:
-            runs[name] = simulate(
+            run = simulate(
                 robot,
                 controller,
                 state=state,
@@ -210,6 +228,15 @@ def compare(
             if name == first:
                 raise
             left_out[name] = str(error)
+        except KeyboardInterrupt as interrupt:  # while compiling
+            acknowledge(interrupt)
+            interrupted = True
+            left_out[name] = INTERRUPTED
+        else:
+            runs[name] = run
+            interrupted = run.status is RunStatus.INTERRUPTED
+    if first not in runs:
+        raise KeyboardInterrupt
     differences = tuple(_difference(name, run, runs[first]) for name, run in runs.items())
     return Comparison(runs, first, differences, left_out)
 

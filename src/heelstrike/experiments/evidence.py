@@ -14,6 +14,7 @@ from heelstrike.experiments.walk import design, walk
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
 from heelstrike.sim import Run, TimeStepping, simulate
+from heelstrike.sim.whole_run import whole
 
 FRICTION = 0.75
 """The paper's coefficient of friction."""
@@ -78,22 +79,26 @@ def gather(progress: Callable[[str, float], None]) -> Evidence:
     )
     ground = Ground(friction=FRICTION)
     method = TimeStepping(step=TIME_STEP)
-    run = walk(
-        robot,
-        gait,
-        steps=STEPS,
-        method=method,
-        ground=ground,
-        progress=lambda part: progress("walking", part),
+    run = whole(
+        walk(
+            robot,
+            gait,
+            steps=STEPS,
+            method=method,
+            ground=ground,
+            progress=lambda part: progress("walking", part),
+        )
     )
-    estimated = walk(
-        robot,
-        gait,
-        steps=STEPS,
-        method=TimeStepping(step=ENCODER.period),
-        ground=ground,
-        controller=ComputedTorque(robot, gait, encoder=ENCODER),
-        progress=lambda part: progress("walking on estimated velocities", part),
+    estimated = whole(
+        walk(
+            robot,
+            gait,
+            steps=STEPS,
+            method=TimeStepping(step=ENCODER.period),
+            ground=ground,
+            controller=ComputedTorque(robot, gait, encoder=ENCODER),
+            progress=lambda part: progress("walking on estimated velocities", part),
+        )
     )
     refinement = refine(
         robot, gait, ground=ground, progress=lambda part: progress("comparing time steps", part)
@@ -118,17 +123,19 @@ def _drop(robot: Robot, ground: Ground, method: TimeStepping) -> Run:
     q = np.array(robot.model.reference)
     q[1] += 0.03
     q[2] += 0.1
-    return simulate(
-        robot,
-        state=State(q, np.zeros(robot.nv)),
-        duration=0.4,
-        method=method,
-        ground=ground,
-        stop_when_fallen=False,
+    return whole(
+        simulate(
+            robot,
+            state=State(q, np.zeros(robot.nv)),
+            duration=0.4,
+            method=method,
+            ground=ground,
+            stop_when_fallen=False,
+        )
     )
 
 
 def _other_robot() -> Run:
     robot = load_robot("spring_flamingo")
     gait = design(robot, friction=FRICTION)
-    return walk(robot, gait, steps=STEPS, ground=Ground(friction=FRICTION))
+    return whole(walk(robot, gait, steps=STEPS, ground=Ground(friction=FRICTION)))

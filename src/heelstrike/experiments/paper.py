@@ -51,10 +51,14 @@ def reproduce_paper(
     ------
     OSError
         If the directory cannot be written to.
+    KeyboardInterrupt
+        At Ctrl-C. Nothing is written before all simulations are done.
     """
     report = progress or _silent
     directory.mkdir(parents=True, exist_ok=True)
     evidence = gather(report)
+    # The page goes first and comes last: while it is there, it is about the files beside it.
+    (directory / "report.md").unlink(missing_ok=True)
     evidence.gait.save(directory / "gait.json")
     report("writing the run", 0.0)
     evidence.run.save(directory / "run.nc")

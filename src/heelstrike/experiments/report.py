@@ -11,6 +11,7 @@ from heelstrike.analysis import summarize
 from heelstrike.experiments.claims import Claim, Verdict, scheme_name
 from heelstrike.experiments.evidence import STEPS, TIME_STEP, Evidence
 from heelstrike.experiments.refinement import EXACT_STEP, Convergence, RefinedWalk
+from heelstrike.whole_file import write_whole
 
 CITATION = (
     "D. A. Bravo M. and C. F. Rengifo Rodas, *Design of a Dynamic Simulator for a Biped Robot*, "
@@ -60,9 +61,7 @@ def page(evidence: Evidence, claims: Sequence[Claim]) -> str:
 
 def save_page(evidence: Evidence, claims: Sequence[Claim], directory: Path) -> Path:
     """Write report.md."""
-    path = directory / "report.md"
-    path.write_text(page(evidence, claims), encoding="utf-8")
-    return path
+    return write_whole(directory / "report.md", page(evidence, claims))
 
 
 def _setting(evidence: Evidence) -> str:
@@ -130,9 +129,14 @@ def _refinement(rows: Sequence[RefinedWalk]) -> str:
 def _convergence(found: Sequence[Convergence]) -> str:
     steps = found[0].steps if found else ()
     return _table(
-        ("scheme", *(f"{1e3 * step:g} ms" for step in steps), "order"),
+        ("scheme", *(f"{1e3 * step:g} ms" for step in steps), "order", "off the ground"),
         [
-            (scheme_name(each.scheme), *map(_number, each.errors), f"{each.order:.2f}")
+            (
+                scheme_name(each.scheme),
+                *map(_number, each.errors),
+                "–" if each.lost else f"{each.order:.2f}",
+                f"{100.0 * each.lost:.2g} %",
+            )
             for each in found
         ],
     )

@@ -13,6 +13,7 @@ from pathlib import Path
 from heelstrike.gait import Gait
 from heelstrike.sim import Run
 from heelstrike.view.figures import FIGURES
+from heelstrike.whole_file import write_whole
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,13 @@ class Results:
     def __init__(self, directory: Path) -> None:
         directory.mkdir(parents=True, exist_ok=True)
         self.directory = directory
+        self.saved: list[Saved] = []
+        """Every file tried so far, the last one last."""
+
+    @property
+    def written(self) -> tuple[Path, ...]:
+        """Files that are there, whole."""
+        return tuple(each.path for each in self.saved if each.error is None)
 
     def save_gait(self, gait: Gait) -> Path:
         """Write gait.json, and remove the results of an earlier walk, which belong to another."""
@@ -57,6 +65,7 @@ class Results:
             (self.directory / stale).unlink(missing_ok=True)
         for stale in ("walk.mp4", "walk.gif"):
             (self.directory / stale).unlink(missing_ok=True)
+        self.saved.append(Saved(path))
         return path
 
     def save_run(
@@ -64,6 +73,7 @@ class Results:
         run: Run,
         gait: Gait,
         *,
+        figures: bool = True,
         animation: str | None = "mp4",
         progress: Callable[[float], None] | None = None,
     ) -> tuple[Saved, ...]:
@@ -75,6 +85,8 @@ class Results:
             The run.
         gait : Gait
             The gait it followed.
+        figures : bool
+            Whether to draw figures.
         animation : str, optional
             Kind of animation, "mp4" or "gif"; None for none.
         progress : callable, optional
@@ -87,20 +99,18 @@ class Results:
         """
         tasks: dict[str, Callable[[Path], object]] = {
             "run.nc": run.save,
-            "summary.json": lambda path: path.write_text(
-                run.summary(gait=gait).to_json() + "\n", encoding="utf-8"
-            ),
+            "summary.json": lambda path: write_whole(path, run.summary(gait=gait).to_json() + "\n"),
         }
-        for figure in FIGURES:
+        for figure in FIGURES if figures else ():
             tasks[f"{figure}.png"] = _drawing(run, gait, figure)
         if animation is not None:
             tasks[f"walk.{animation}"] = run.animate
-        saved = []
+        first = len(self.saved)
         for done, (name, write) in enumerate(tasks.items(), start=1):
-            saved.append(_attempt(self.directory / name, write))
+            self.saved.append(_attempt(self.directory / name, write))
             if progress is not None:
                 progress(done / len(tasks))
-        return tuple(saved)
+        return tuple(self.saved[first:])
 
 
 def _drawing(run: Run, gait: Gait, figure: str) -> Callable[[Path], object]:

@@ -15,6 +15,7 @@ from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import actuated_joints, fingerprint
 from heelstrike.gait.gauss import gauss_scheme
+from heelstrike.gait.ipopt import Ipopt
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.gait.point_starts import point_starts
@@ -35,7 +36,7 @@ RESERVE = 1e-7
 ROUNDS = 6
 """Times that the reserve is enlarged where a constraint fails between the Gauss points."""
 FINER = 8
-"""Places in every interval at which the constraints are checked afterwards."""
+"""Parts of every interval at whose ends, and at peaks between, constraints are checked."""
 FEASIBLE = 1e-9
 """Scaled violations below this are rounding."""
 
@@ -170,7 +171,7 @@ class CollocationProgram:
         self._equations = int(exact.numel())
         constraints = casadi.vertcat(exact, touchdown, *along)
         problem = {"x": unknowns, "f": cost, "g": constraints}
-        self._solver = casadi.nlpsol("gait", "ipopt", problem, SETTINGS)
+        self._solver = Ipopt(problem, SETTINGS)
 
     def path_bounds(self, phases: Floats) -> tuple[Floats, Floats]:
         """Scaled bounds of the constraints along the path at phases, (rows, N) each."""
@@ -202,14 +203,13 @@ class CollocationProgram:
         low, high = np.full(self.size, -np.inf), np.full(self.size, np.inf)
         low[-2], high[-2] = self.request.duration_bounds
         low[-1], high[-1] = self.request.length_bounds
-        found = self._solver(
+        found, statistics = self._solver.solve(
             x0=np.clip(guess, low, high),
             lbx=low,
             ubx=high,
             lbg=np.concatenate(lower),
             ubg=np.concatenate(upper),
         )
-        statistics = self._solver.stats()
         return Solution(
             unknowns=np.array(found["x"]).ravel(),
             objective=float(found["f"]),
@@ -259,8 +259,11 @@ def _held_between_nodes(program: CollocationProgram, solution: Solution) -> Floa
 def fine_motion(
     program: CollocationProgram, unknowns: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Phases of a fine grid, and positions, velocities and accelerations there, (n, N) each."""
-    local = np.linspace(0.0, 1.0, FINER, endpoint=False) + 0.5 / FINER
+    """Phases of a fine grid, and positions, velocities and accelerations there, (n, N) each.
+
+    Every interval has both its ends in the grid: accelerations jump from one to the next.
+    """
+    local = np.linspace(0.0, 1.0, FINER + 1)
     h = float(unknowns[-2]) / program.intervals
     pieces = program.pieces(unknowns)
     degree = np.arange(pieces.shape[1])
@@ -279,14 +282,27 @@ def fine_motion(
 
 
 def _excess(program: CollocationProgram, unknowns: Floats) -> Floats:
-    """Largest scaled violation of every inequality along the path, on a fine grid."""
+    """Largest scaled violation of every inequality along the path, (rows,)."""
     phases, q, v, a = fine_motion(program, unknowns)
     _, values = program.transcription.path.map(phases.size)(q, v, a)
     lower, upper = program.path_bounds(phases)
-    excess = np.maximum(lower - np.array(values), np.array(values) - upper).max(axis=1)
+    excess = np.maximum(lower - np.array(values), np.array(values) - upper)
+    highest = _highest(excess.reshape(-1, program.intervals, FINER + 1))
     exact = np.array([row.lower == row.upper for row in program.transcription.path_rows])
-    result: Floats = np.where(exact, 0.0, excess)
+    result: Floats = np.where(exact, 0.0, highest)
     return result
+
+
+def _highest(values: Floats) -> Floats:
+    """Greatest of values on the grid and of the parabolas through three neighbours, by rows."""
+    before, here, after = values[..., :-2], values[..., 1:-1], values[..., 2:]
+    inside = np.isfinite(before) & np.isfinite(after) & (here > before) & (here > after)
+    rise, bend = np.zeros_like(here), np.ones_like(here)
+    np.subtract(after, before, out=rise, where=inside)
+    np.subtract(2.0 * here, before + after, out=bend, where=inside)
+    peaks = here + rise**2 / (8.0 * bend)
+    highest: Floats = np.maximum(values.max(axis=(1, 2)), peaks.max(axis=(1, 2)))
+    return highest
 
 
 def _designed(program: CollocationProgram, unknowns: Floats) -> PiecewiseGait:
@@ -361,7 +377,7 @@ def _margins(program: CollocationProgram, unknowns: Floats) -> Margins:
     limits = np.minimum(
         model.torque_upper[actuator, None] - torque, torque - model.torque_lower[actuator, None]
     )
-    ranges = np.minimum(model.upper[3:, None] - q[1:], q[1:] - model.lower[3:, None])
+    ranges = np.minimum(request.upper[3:, None] - q[1:], q[1:] - request.lower[3:, None])
     position, velocity, _, _, length = program.parts(casadi.DM(unknowns))
     start, start_speed = np.array(position[:, 0]).ravel(), np.array(velocity[:, 0]).ravel()
     end, end_speed = position[:, -1], velocity[:, -1]

@@ -16,13 +16,16 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.errors import GaitError
+from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait, fingerprint
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.piecewise import PiecewiseGait
+from heelstrike.json_checksum import KEY as CHECKSUM
+from heelstrike.json_checksum import is_changed, with_checksum
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.whole_file import write_whole
 
 FORMAT = "heelstrike gait"
 VERSION = 1
@@ -72,7 +75,7 @@ assert set(_MARGINS.values()) == {field.name for field in fields(Margins)}
 
 
 def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
-    """Write a gait to a JSON file."""
+    """Write a gait to a JSON file, which appears whole or not at all."""
     data: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -95,12 +98,12 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     }
     if isinstance(gait, PiecewiseGait):
         data |= {key: getattr(gait, name).tolist() for key, name in _PIECES.items()}
+    data = with_checksum(data)
     lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     try:
-        Path(path).write_text(f"{{\n{lines}\n}}\n", encoding="utf-8")
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise GaitError(f"{path}: the gait cannot be written: {reason}.") from error
+        write_whole(path, f"{{\n{lines}\n}}\n")
+    except WriteError as error:
+        raise GaitError(str(error)) from error
 
 
 def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
@@ -121,14 +124,19 @@ def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
     Raises
     ------
     GaitError
-        If there is no such file, it is not a gait, its numbers are missing, of the wrong number or
-        not finite, or the gait belongs to another robot.
+        If there is no such file, it is not a gait, its numbers are missing, of the wrong number,
+        not finite or not those that were saved, or the gait belongs to another robot.
     """
     path = Path(path)
     reader = _Reader(path, _parsed(path))
     gait = reader.gait()
     if robot is not None:
         _check_robot(gait, robot, path)
+    if is_changed(reader.data):
+        raise GaitError(
+            f"{path}: damaged: its numbers are not those that were saved. If you changed them, "
+            f'remove the entry "{CHECKSUM}".'
+        )
     return gait
 
 
@@ -171,8 +179,8 @@ class _Reader:
             raise self.error(f'not a gait file: it must be a JSON object with "format": "{FORMAT}"')
         if data.get("version") != VERSION or isinstance(data["version"], bool):
             raise self.error(
-                f"version {data.get('version')!r} of the format is not known here, only {VERSION}; "
-                "was it written by a newer heelstrike?"
+                f"version {_shown(data.get('version'))} of the format is not known here, only "
+                f"{VERSION}; was it written by a newer heelstrike?"
             )
         self.data = data
 
@@ -299,8 +307,8 @@ def _shown(value: Any) -> str:
 def _check_robot(gait: Gait, robot: Robot, path: Path) -> None:
     if gait.robot != robot.name:
         raise GaitError(
-            f"{path}: is a gait of robot {gait.robot!r}, not of {robot.name!r}. Load that robot, "
-            "or design a gait for this one with optimize_gait."
+            f"{path}: is a gait of robot {_shown(gait.robot)}, not of {robot.name!r}. Load that "
+            "robot, or design a gait for this one with optimize_gait."
         )
     try:
         gait.check_joints(robot)

@@ -20,8 +20,8 @@ class Margins:
     clearance : float
         Least height of the swing foot's contact points above the clearance profile, in m.
     joint_range : float
-        Least distance of a joint from the end of its range, in rad (m for a slide); infinite if
-        no joint has one.
+        Least distance of a joint from the end of its range, the robot's or a narrower one that was
+        asked for, in rad (m for a slide); infinite if no joint has one.
     torque : float
         Least distance of a torque from its limit, in N m (N for a slide); infinite if there are
         no limits.

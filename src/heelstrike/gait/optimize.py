@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.joint_ranges import JointRanges
 from heelstrike.gait.request import checked_request
 from heelstrike.robot.robot import Robot
 
@@ -30,6 +31,7 @@ def optimize_gait(
     zmp_margin: float | None = None,
     force_margin: float | None = None,
     joint_speed_limit: float = math.inf,
+    joint_ranges: JointRanges | None = None,
     impact: bool = True,
     intervals: int | None = None,
     starts: int = 3,
@@ -81,6 +83,10 @@ def optimize_gait(
         Least normal force on the stance foot (N). A tenth of the weight by default.
     joint_speed_limit : float
         Largest joint speed (rad/s).
+    joint_ranges : mapping of str to (float, float), optional
+        Lowest and highest position of joints by name (rad, m for a slide), where it should be
+        narrower than the robot's own range. It holds for the joint's counterpart on the other
+        side, too: ``{"right_knee": (0.1, 1.5)}`` keeps both knees bent.
     impact : bool
         Whether the swing foot may land with velocity: the landing is then a plastic impact, whose
         impulse is unilateral, inside the friction cone and the sole, and leaves the rear foot free
@@ -125,6 +131,7 @@ def optimize_gait(
         zmp_margin=zmp_margin,
         force_margin=force_margin,
         joint_speed_limit=joint_speed_limit,
+        joint_ranges=joint_ranges,
         impact=impact,
         intervals=intervals,
         starts=starts,

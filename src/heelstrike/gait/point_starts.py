@@ -72,7 +72,7 @@ def _posture(
     places = casadi.vertcat(*feet[0], *feet[1], *dynamics.work.origin[2], dynamics.work.angle[2])
     function = casadi.Function("places", [q], [places, casadi.jacobian(places, q)])
     target = np.array([0.0, radius, swing[0], swing[1] + radius, *trunk])
-    now = np.clip(model.reference, model.lower, model.upper)
+    now = np.clip(model.reference, request.lower, request.upper)
     for foot in (request.stance, request.swing):
         # The joints of a leg but its first: the knees.
         link = foot.link
@@ -80,7 +80,7 @@ def _posture(
             if model.axis[link, 0] != 0.0:
                 now[link] += bend * BENT * model.axis[link, 0]
             link = int(model.parent[link])
-    now = np.clip(now, model.lower, model.upper)
+    now = np.clip(now, request.lower, request.upper)
     for _ in range(SWEEPS):
         value, jacobian = (np.array(part) for part in function(now))
         missing = target - value.ravel()
@@ -89,5 +89,5 @@ def _posture(
         normal = jacobian.T @ jacobian + DAMPING * np.eye(now.size)
         step = np.linalg.solve(normal, jacobian.T @ missing)
         step /= max(1.0, float(np.abs(step).max()) / BENT)
-        now = np.clip(now + step, model.lower, model.upper)
+        now = np.clip(now + step, request.lower, request.upper)
     return now

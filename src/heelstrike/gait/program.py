@@ -10,6 +10,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.ipopt import Ipopt
 from heelstrike.gait.transcription import Group, Transcription
 
 Floats = NDArray[np.float64]
@@ -158,7 +159,7 @@ class Program:
             np.concatenate([[row.upper for row in touchdown], (upper - reserve).ravel(order="F")]),
         )
 
-    def _build(self) -> casadi.Function:
+    def _build(self) -> Ipopt:
         path, touchdown = self.transcription.path, self.transcription.touchdown
         count, size = len(self.phases), self.transcription.size
         at_touchdown = len(touchdown.rows)
@@ -213,9 +214,7 @@ class Program:
                 ["hess_gamma_x_x"],
             ),
         }
-        return casadi.nlpsol(
-            "gait", "ipopt", {"x": unknowns, "f": f, "g": g}, {**SETTINGS, **derivatives}
-        )
+        return Ipopt({"x": unknowns, "f": f, "g": g}, {**SETTINGS, **derivatives})
 
     def solve(self, guess: Floats) -> Solution:
         """Solve from a guess of the unknowns.
@@ -233,8 +232,9 @@ class Program:
             start = np.concatenate([start, np.maximum(missing, 0.0), np.maximum(-missing, 0.0)])
             lower = np.concatenate([lower, np.zeros(2 * missing.size)])
             upper = np.concatenate([upper, np.full(2 * missing.size, np.inf)])
-        found = self._solver(x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper)
-        statistics = self._solver.stats()
+        found, statistics = self._solver.solve(
+            x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
+        )
         return Solution(
             unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),

@@ -6,9 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.joint_ranges import JointRanges, ranges_kept
 from heelstrike.gait.sole import Sole, point_sole, sole
 from heelstrike.robot.robot import Robot
 
@@ -46,6 +48,8 @@ class Request:
         What is prescribed. The speed is None if it follows from the other two.
     friction, clearance, zmp_margin, force_margin, joint_speed_limit : float
         Options, with their defaults filled in.
+    lower, upper : (nv,) arrays
+        Ends of the ranges that the joints keep to (rad, m for a slide).
     profiles : tuple of ClearanceProfile
         Shapes of the swing foot's clearance, to be tried in this order.
     impact : bool
@@ -67,6 +71,8 @@ class Request:
     zmp_margin: float
     force_margin: float
     joint_speed_limit: float
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
     profiles: tuple[ClearanceProfile, ...]
     impact: bool
     intervals: int
@@ -126,6 +132,7 @@ def checked_request(
     zmp_margin: float | None,
     force_margin: float | None,
     joint_speed_limit: float,
+    joint_ranges: JointRanges | None,
     impact: bool,
     intervals: int | None,
     starts: int,
@@ -140,6 +147,7 @@ def checked_request(
         If the step is longer than the legs reach.
     """
     _check_robot(robot)
+    lower, upper = ranges_kept(robot, joint_ranges)
     points = all(len(foot.contacts) == 1 for foot in robot.feet)
     find = point_sole if points else sole
     stance, swing = find(robot, STANCE_FOOT), find(robot, 1 - STANCE_FOOT)
@@ -189,7 +197,7 @@ def checked_request(
         stance=stance,
         swing=swing,
         height=height,
-        reach=_reach(robot, stance, swing),
+        reach=_reach(robot, stance, swing, lower, upper),
         step_length=None if step_length is None else float(step_length),
         step_duration=None if step_duration is None else float(step_duration),
         speed=None if speed is None else float(speed),
@@ -198,6 +206,8 @@ def checked_request(
         zmp_margin=float(zmp_margin),
         force_margin=float(force_margin),
         joint_speed_limit=float(joint_speed_limit),
+        lower=lower,
+        upper=upper,
         profiles=_profiles(clearance_profile, impact),
         impact=bool(impact),
         intervals=int(intervals),
@@ -315,7 +325,13 @@ def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
     return np.array([c * vector[0] + s * vector[1], c * vector[1] - s * vector[0]])
 
 
-def _reach(robot: Robot, stance: Sole, swing: Sole) -> float:
+def _reach(
+    robot: Robot,
+    stance: Sole,
+    swing: Sole,
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+) -> float:
     """Distance of the feet with both legs in one line, an upper bound of any step (m)."""
     model = robot.model
     chains = []
@@ -339,6 +355,6 @@ def _reach(robot: Robot, stance: Sole, swing: Sole) -> float:
             else:
                 total += float(np.hypot(*model.offset[link]))
             if model.axis[link, 0] == 0.0:
-                span = np.abs([model.lower[link], model.upper[link]] - model.reference[link])
+                span = np.abs([lower[link], upper[link]] - model.reference[link])
                 total += float(span.max())
     return total + float(np.hypot(*(hips[0] - hips[1])))

@@ -77,7 +77,7 @@ def _margins(program: Program, unknowns: Floats) -> Margins:
     limits = np.minimum(
         model.torque_upper[actuator, None] - torque, torque - model.torque_lower[actuator, None]
     )
-    ranges = np.minimum(model.upper[3:, None] - position, position - model.lower[3:, None])
+    ranges = np.minimum(request.upper[3:, None] - position, position - request.lower[3:, None])
     profile = program.clearance(fine)
     off_ground = np.isfinite(profile)
     impulse, landing, lift = (np.array(part).ravel() for part in transcription.landing(unknowns))

@@ -92,7 +92,7 @@ class _Kinematics:
         self._places = casadi.Function(
             "places", [q], [places_vector, casadi.jacobian(places_vector, q)]
         )
-        self._lower, self._upper = robot.model.lower, robot.model.upper
+        self._lower, self._upper = request.lower, request.upper
         self._inside = [*_inside(request, request.stance), *_inside(request, request.swing)]
 
     @property

@@ -362,7 +362,7 @@ def add_joint_limits(
     actuator = np.argsort(model.actuator_joint)
     for k in range(robot.nv - 3):
         name, j = robot.joint_names[k + 3], k + 3
-        lower, upper = float(model.lower[j]), float(model.upper[j])
+        lower, upper = float(request.lower[j]), float(request.upper[j])
         if np.isfinite([lower, upper]).any():
             constraints.add(Group.JOINT_RANGE, position[k], subject=name, lower=lower, upper=upper)
         lower = float(model.torque_lower[actuator[k]])

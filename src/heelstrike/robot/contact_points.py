@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -15,6 +16,8 @@ from heelstrike.robot.warning import warn
 SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
 SMALLEST_RADIUS = 1e-9  # metres; a smaller sphere is a point, which MJCF cannot say otherwise
 ALIGNED = 1e-6  # sine of the angle within which a direction counts as that of y
+
+MOST_POINTS = 2000
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJoCo's mjtGeom
 
@@ -64,6 +67,11 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     -------
     list of ContactPoint
         Ordered by link and, on a link, from back to front. Coinciding points are merged.
+
+    Raises
+    ------
+    RobotError
+        If they are more than `MOST_POINTS`.
     """
     points: list[ContactPoint] = []
     skipped: list[str] = []
@@ -99,7 +107,14 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
             f"edge: {', '.join(meshes)}. Where that is not the sole, replace them by boxes, "
             "capsules or spheres."
         )
-    return in_order(points)
+    points = in_order(points)
+    if len(points) > MOST_POINTS:
+        raise file.error(
+            f"the robot has {len(points)} contact points, and heelstrike takes up to "
+            f'{MOST_POINTS}. Let fewer of its geoms collide: give the others contype="0" and '
+            'conaffinity="0".'
+        )
+    return points
 
 
 def _vertices(file: MujocoFile, geom: int) -> NDArray[np.float64]:
@@ -131,19 +146,23 @@ def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:
     ground = [g for g in able if not moving[g]]
     _mention_terrain(file, ground)
 
-    def touches(geom: int, other: int) -> bool:
-        if frozenset((geom, other)) in pairs:
-            return True
-        bodies = sorted(int(model.geom_bodyid[g]) for g in (geom, other))
-        return (bodies[0], bodies[1]) not in excluded and bool(
-            model.geom_contype[geom] & model.geom_conaffinity[other]
-            or model.geom_contype[other] & model.geom_conaffinity[geom]
-        )
-
     candidates = [g for g in able if moving[g]]
     if not ground:
         return candidates
-    return [g for g in candidates if any(touches(g, other) for other in ground)]
+    met = {geom for pair in pairs if not pair.isdisjoint(ground) for geom in pair}
+    return [g for g in candidates if g in met or _touches(file, g, np.array(ground), excluded)]
+
+
+def _touches(
+    file: MujocoFile, geom: int, ground: NDArray[np.int64], excluded: set[tuple[int, int]]
+) -> bool:
+    """Whether the file lets a geom collide with any of the ground."""
+    model = file.model
+    types, affinities = model.geom_contype, model.geom_conaffinity
+    able = (types[geom] & affinities[ground]) | (types[ground] & affinities[geom])
+    bodies = set(np.asarray(model.geom_bodyid)[ground[able != 0]].tolist())
+    own = int(model.geom_bodyid[geom])
+    return any((min(own, body), max(own, body)) not in excluded for body in bodies)
 
 
 def _mention_terrain(file: MujocoFile, ground: Iterable[int]) -> None:
@@ -210,17 +229,20 @@ def _sole(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _merged(points: Iterable[ContactPoint]) -> list[ContactPoint]:
     """Points without repetition; of two that coincide the first stays, the rougher friction too."""
-    kept: dict[int, list[ContactPoint]] = {}
+    kept: list[ContactPoint] = []
+    near: dict[tuple[int, float], list[int]] = {}  # by link and x in steps of `SAME_PLACE`
     for point in points:
-        there = kept.setdefault(point.link, [])
-        for i, other in enumerate(there):
-            apart = np.hypot(point.x - other.x, point.z - other.z)
+        step = point.x / SAME_PLACE // 1.0
+        for i in sorted(i for k in (-1, 0, 1) for i in near.get((point.link, step + k), ())):
+            other = kept[i]
+            apart = math.hypot(point.x - other.x, point.z - other.z)
             if max(apart, abs(point.radius - other.radius)) < SAME_PLACE:
-                there[i] = replace(other, friction=max(other.friction, point.friction))
+                kept[i] = replace(other, friction=max(other.friction, point.friction))
                 break
         else:
-            there.append(point)
-    return [point for there in kept.values() for point in there]
+            near.setdefault((point.link, step), []).append(len(kept))
+            kept.append(point)
+    return kept
 
 
 def in_order(points: Iterable[ContactPoint]) -> list[ContactPoint]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import UNLIKELY, link_origins
+from heelstrike.robot.inclusion import is_readable
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.mjcf import read_mjcf
@@ -21,7 +22,6 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.saving import body_links
-from heelstrike.robot.screening import is_readable
 from heelstrike.robot.urdf import MASSLESS
 from heelstrike.robot.warning import RobotWarning
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,10 +17,13 @@ from numpy.typing import NDArray
 from heelstrike.errors import RobotError
 from heelstrike.robot.flattening import float_in_plane, project
 from heelstrike.robot.plausibility import is_possible
-from heelstrike.robot.screening import screen
+from heelstrike.robot.screening import Screened, screen
+from heelstrike.robot.trial import try_apart
 from heelstrike.robot.urdf import let_massless_links_pass, prepare_urdf, urdf_text
-from heelstrike.robot.urdf_check import check_urdf
+from heelstrike.robot.urdf_check import check_urdf, check_urdf_tree
 from heelstrike.robot.warning import warn
+
+LONGEST_REASON = 600  # letters of MuJoCo's own words in a message
 
 
 @dataclass(frozen=True)
@@ -33,15 +37,18 @@ class MujocoFile:
     pose : mujoco.MjData
         World poses of joints, bodies and geoms in the reference configuration (``qpos0``).
     xml : Element
-        The file as it is written.
+        The file as it is written, included ones in place, without what plays no part in motion.
     source : str
         What to call the file in messages.
+    flexible : bool
+        Whether it had flexible bodies, which are left out.
     """
 
     model: Any
     pose: Any
     xml: Element
     source: str
+    flexible: bool = False
 
     @property
     def is_urdf(self) -> bool:
@@ -102,7 +109,8 @@ def parse(
         If the file cannot be read or MuJoCo's parser refuses it; the message is the parser's.
     """
     label = str(source) if isinstance(source, Path) else "XML string"
-    xml = screen(source, label)
+    file = screen(source, label)
+    xml = file.xml
     import mujoco
 
     remarks: list[str] = []
@@ -112,7 +120,7 @@ def parse(
             if urdf and not lenient:
                 check_urdf(xml, label)
             if urdf or floating or projected or lenient:
-                spec = _parsed(source, xml, label)
+                spec = _parsed(source, file, label)
                 if lenient:
                     spec.compiler.balanceinertia = True
                     let_massless_links_pass(spec)
@@ -121,10 +129,10 @@ def parse(
                 if projected:
                     project(spec, label)
                 model = compiled(spec, remarks)
-            elif isinstance(source, Path):
-                model = mujoco.MjModel.from_xml_path(str(source))
             else:
-                model = mujoco.MjModel.from_xml_string(source)
+                if file.delicate:
+                    try_apart(file.text, file.models, label)
+                model = mujoco.MjModel.from_xml_string(file.text, file.models)
             pose = mujoco.MjData(model)
             mujoco.mj_kinematics(model, pose)
     except RobotError:
@@ -134,8 +142,8 @@ def parse(
     for remark in remarks:
         warn(f"{label}: {remark}")
     if not lenient:
-        _warn_of_mended_inertias(source, xml, label)
-    return MujocoFile(model, pose, xml, label)
+        _warn_of_mended_inertias(source, file, label)
+    return MujocoFile(model, pose, xml, label, file.flexible)
 
 
 def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
@@ -151,11 +159,11 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
     import mujoco
 
     label = str(path)
-    xml = screen(path, label)
+    file = screen(path, label)
     try:
         with _warnings_into([]), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            spec = _parsed(path, xml, label)
+            spec = _parsed(path, file, label)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
     return _stated(spec)
@@ -176,13 +184,14 @@ def _stated(spec: Any) -> list[tuple[str, float, NDArray[np.float64]]]:
     return result
 
 
-def _warn_of_mended_inertias(source: Path | str, xml: Element, label: str) -> None:
+def _warn_of_mended_inertias(source: Path | str, file: Screened, label: str) -> None:
     """Warn of inertias that MuJoCo changed because the file says ``balanceinertia="true"``."""
-    if not any(compiler.get("balanceinertia") == "true" for compiler in xml.iter("compiler")):
+    compilers = file.xml.iter("compiler")
+    if not any(compiler.get("balanceinertia") == "true" for compiler in compilers):
         return
     with _warnings_into([]), warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        stated = _stated(_parsed(source, xml, label))
+        stated = _stated(_parsed(source, file, label))
     mended = [name for name, _, tensor in stated if not is_possible(tensor)]
     if mended:
         warn(
@@ -192,7 +201,7 @@ def _warn_of_mended_inertias(source: Path | str, xml: Element, label: str) -> No
 
 
 def _unreadable(label: str, error: Exception) -> RobotError:
-    reason = " ".join(str(error).split())
+    reason = textwrap.shorten(" ".join(str(error).split()), LONGEST_REASON)
     return RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}")
 
 
@@ -205,18 +214,21 @@ def compiled(spec: Any, remarks: list[str]) -> Any:
     return model
 
 
-def _parsed(source: Path | str, xml: Element, label: str) -> Any:
+def _parsed(source: Path | str, file: Screened, label: str) -> Any:
     """Return a file as MuJoCo understands it, not yet compiled."""
     import mujoco
 
-    if xml.tag == "robot":
+    text = file.text
+    if file.xml.tag == "robot":
+        check_urdf_tree(file.xml, label)
         directory = source.parent if isinstance(source, Path) else Path()
-        spec = mujoco.MjSpec.from_string(urdf_text(xml, directory, label))
+        text = urdf_text(file.xml, directory, label)
+    if file.delicate:
+        try_apart(text, file.models, label)
+    spec = mujoco.MjSpec.from_string(text, include=file.models)
+    if file.xml.tag == "robot":
         prepare_urdf(spec)
-        return spec
-    if isinstance(source, Path):
-        return mujoco.MjSpec.from_file(str(source))
-    return mujoco.MjSpec.from_string(source)
+    return spec
 
 
 @contextmanager

@@ -10,12 +10,13 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from heelstrike.errors import RobotError
+from heelstrike.errors import RobotError, WriteError
 from heelstrike.robot.assembly import LARGEST_NUMBER, link_origins
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.speed_limits import SPEED_LIMIT
 from heelstrike.robot.warning import warn
+from heelstrike.whole_file import write_whole
 
 # What the formats want to be positive, where ours is zero.
 POINT_RADIUS = 1e-12
@@ -47,10 +48,9 @@ def save_robot(robot: Robot, path: str | os.PathLike[str]) -> Path:
             f"{file}: a name of robot {robot.name!r} has a character that XML cannot hold."
         ) from None
     try:
-        file.write_text(text, encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise RobotError(f"{file}: the robot cannot be written: {error}.") from error
-    return file
+        return write_whole(file, text)
+    except WriteError as error:
+        raise RobotError(str(error)) from error
 
 
 def mjcf(robot: Robot) -> Element:

@@ -30,16 +30,17 @@ def read_speed_limits(file: MujocoFile) -> Floats:
         If a limit is not a number, or negative.
     """
     names = [file.given_name("joint", joint) for joint in range(file.model.njnt)]
+    index = {name: joint for joint, name in reversed(list(enumerate(names)))}
     limits = np.full(len(names), math.inf)
     for joint, limit in _written(file):
-        if joint not in names:
+        if joint not in index:
             if not file.is_urdf:  # whose fixed joints may have limits too
                 warn(f"{file.source}: {SPEED_LIMIT}{joint}: there is no joint of that name.")
             continue
         if not limit >= 0.0:
             raise file.error(f"the speed limit of joint {joint!r} is {limit}, not a number >= 0.")
         # Exporters write 0 for what nobody told them.
-        limits[names.index(joint)] = limit if 0.0 < limit < LARGEST_SPEED else math.inf
+        limits[index[joint]] = limit if 0.0 < limit < LARGEST_SPEED else math.inf
     return limits
 
 

@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
-from heelstrike.errors import RobotError
+from heelstrike.errors import RobotError, WriteError
+from heelstrike.json_checksum import KEY as CHECKSUM
+from heelstrike.json_checksum import is_changed, with_checksum
 from heelstrike.robot.coordinates import checked
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
+from heelstrike.whole_file import write_whole
 
 if TYPE_CHECKING:
     from heelstrike.robot.robot import Robot
@@ -41,12 +44,11 @@ def save_state(robot: Robot, state: State, path: str | os.PathLike[str]) -> Path
         _VECTORS[0]: state.q.tolist(),
         _VECTORS[1]: state.v.tolist(),
     }
-    file = Path(path)
     try:
-        file.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    except (OSError, ValueError) as error:
-        raise RobotError(f"{file}: the state cannot be written: {error}.") from error
-    return file
+        text = json.dumps(with_checksum(data), indent=2, ensure_ascii=False)
+        return write_whole(path, text + "\n")
+    except WriteError as error:
+        raise RobotError(str(error)) from error
 
 
 def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:
@@ -59,19 +61,30 @@ def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:
         )
     if data.get("version") != VERSION or isinstance(data["version"], bool):
         raise RobotError(
-            f"{file}: version {data.get('version')!r} of the format is not known here, only "
-            f"{VERSION}; was it written by a newer heelstrike?"
+            f"{file}: version {_shown(repr(data.get('version')))} of the format is not known here, "
+            f"only {VERSION}; was it written by a newer heelstrike?"
         )
     joints = data.get("joints")
-    if not isinstance(joints, list) or sorted(map(str, joints)) != sorted(robot.joint_names):
-        has = ", ".join(map(str, joints)) if isinstance(joints, list) else repr(joints)
+    if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
+        raise RobotError(f'{file}: "joints" must be a list of names, got {_shown(repr(joints))}.')
+    if sorted(joints) != sorted(robot.joint_names):
+        has = ", ".join(joints)
         raise RobotError(
-            f"{file}: this is a state of robot {data.get('robot')!r} with the joints {has}; robot "
-            f"{robot.name!r} has {', '.join(robot.joint_names)}."
+            f"{file}: this is a state of robot {_shown(repr(data.get('robot')))} with the joints "
+            f"{_shown(has)}; robot {robot.name!r} has {', '.join(robot.joint_names)}."
         )
     order = [joints.index(name) for name in robot.joint_names]
     q, v = (_numbers(file, data, key, len(joints))[order] for key in _VECTORS)
+    if is_changed(data):
+        raise RobotError(
+            f"{file}: damaged: its numbers are not those that were saved. If you changed them, "
+            f'remove the entry "{CHECKSUM}".'
+        )
     return State(q, v)
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= 300 else text[:297] + "…"
 
 
 def _numbers(file: Path, data: dict[str, Any], key: str, size: int) -> Floats:

@@ -30,7 +30,7 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
         "air (density, viscosity, wind)": bool(
             model.opt.density or model.opt.viscosity or np.any(model.opt.wind)
         ),
-        "flexible bodies": getattr(model, "nflex", 0) > 0,
+        "flexible bodies": file.flexible,
         "moving platforms (mocap bodies)": model.nmocap > 0,
         "plugins": model.nplugin > 0,
     }

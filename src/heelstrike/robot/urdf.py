@@ -8,10 +8,13 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
+from heelstrike.errors import RobotError
 from heelstrike.robot.flattening import mend_planar_root
+from heelstrike.robot.mesh_files import refuse_large_meshes
 from heelstrike.robot.warning import warn
 
 MASSLESS = 1e-14  # kg; no link that is meant to weigh anything weighs less
+DEEPEST_FOLDER = 40  # most folders in the path of a mesh
 _SMALLEST = 2e-15  # what MuJoCo takes for a massless link, just above its own limit
 
 
@@ -20,10 +23,16 @@ def urdf_text(xml: Element, directory: Path, label: str) -> str:
 
     Visual shapes play no part in mechanics, and their files are often missing. A collision mesh
     whose file cannot be found is left out with a warning, if its link has an inertia of its own.
+
+    Raises
+    ------
+    RobotError
+        If it has none, or if the meshes are too large.
     """
     root = deepcopy(xml)
     missing: list[str] = []
     weighed: list[str] = []
+    size = 0
     for link in root.iterfind("link"):
         for visual in link.findall("visual"):
             link.remove(visual)
@@ -37,9 +46,20 @@ def urdf_text(xml: Element, directory: Path, label: str) -> str:
             file = _found(mesh.get("filename", ""), directory)
             if file is not None:
                 mesh.set("filename", str(file))
+                size += file.stat().st_size
             elif has_inertia:
                 link.remove(collision)
                 missing.append(link.get("name", ""))
+            else:
+                raise RobotError(
+                    f"{label}: the collision mesh of link {link.get('name')!r}, "
+                    f"{mesh.get('filename', '')[:200]!r}, is not where the file says, and the link "
+                    "has no <inertial>. Give it one, or the mesh file beside the URDF."
+                )
+    refuse_large_meshes(size, label)
+    for extension in root.findall("mujoco"):  # requests for memory, which play no part here
+        for request in extension.findall("size"):
+            extension.remove(request)
     _keep_paths(root)
     if missing:
         warn(
@@ -83,6 +103,8 @@ def _found(name: str, directory: Path) -> Path | None:
     """File of a mesh, sought where ROS packages and MuJoCo have it."""
     plain = name.split("://", 1)[-1]
     parts = Path(plain).parts
+    if len(parts) > DEEPEST_FOLDER:
+        return None
     for first in range(len(parts)):
         candidate = directory.joinpath(*parts[first:])
         try:

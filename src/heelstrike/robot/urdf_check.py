@@ -66,7 +66,11 @@ _OTHER_MATTERS = {
     "geometry": "",
     "joint": "mimic calibration safety_controller gazebo physics hardwareInterface sensor drake",
 }
+DEEPEST_LINK = 1000
+"""Most joints in a chain; MuJoCo's time grows with the square of their number."""
+
 SHOWN = 6  # how many oddities a message lists before it counts the rest
+LONGEST_GUESS = 40  # letters of a word that may be a misspelling
 _BOUNDED = ("revolute", "prismatic")
 
 
@@ -113,6 +117,56 @@ def check_urdf(root: Element, label: str) -> None:
         warn(f"{label}: this URDF may not say what is meant: {shown}{more}.")
 
 
+def check_urdf_tree(root: Element, label: str) -> None:
+    """Refuse a URDF whose joints do not make a tree, or one too deep for a parser.
+
+    Raises
+    ------
+    RobotError
+        With the joint or link that does not fit.
+    """
+    names = {link.get("name", "") for link in root.iterfind("link")}
+    parents: dict[str, str] = {}
+    for joint in root.iterfind("joint"):
+        ends = {kind: joint.find(kind) for kind in ("parent", "child")}
+        above, below = (
+            "" if end is None else end.get("link", "") for end in (ends["parent"], ends["child"])
+        )
+        what = f"{label}: joint {joint.get('name', '')!r}"
+        for kind, link in (("parent", above), ("child", below)):
+            if link not in names:
+                raise RobotError(
+                    f"{what} has the {kind} {link[:60]!r}, but there is no link of that name."
+                )
+        if below in parents:
+            raise RobotError(
+                f"{what} is the second that moves link {below!r}. Links of a URDF make a tree, in "
+                "which each has one joint above it: remove one of the two."
+            )
+        parents[below] = above
+    depths: dict[str, int] = dict.fromkeys(names - parents.keys(), 0)
+    for start in parents:
+        way: list[str] = []
+        link = start
+        while link not in depths:
+            way.append(link)
+            if len(way) > len(parents):
+                raise RobotError(
+                    f"{label}: link {link!r} hangs on itself, through a circle of joints. Links of "
+                    "a URDF make a tree: remove one of these joints."
+                )
+            link = parents[link]
+        depth = depths[link]
+        for below in reversed(way):
+            depth += 1
+            depths[below] = depth
+    if max(depths.values(), default=0) > DEEPEST_LINK:
+        raise RobotError(
+            f"{label}: more than {DEEPEST_LINK} joints from one link to the next in a chain, which "
+            "no robot needs."
+        )
+
+
 def _check(element: Element, where: str, label: str, strange: list[str]) -> None:
     tag = element.tag
     if tag in ("link", "joint"):
@@ -126,7 +180,8 @@ def _check(element: Element, where: str, label: str, strange: list[str]) -> None
             _check_numbers(element, name, text, attributes[name], where, label)
         elif ":" not in name and not name.startswith("xmlns"):
             strange.append(
-                f"<{tag}> of {where} has the unknown attribute {name!r}{_guess(name, attributes)}"
+                f"<{tag}> of {where} has the unknown attribute {name[:60]!r}"
+                f"{_guess(name, attributes)}"
             )
     known = _CHILDREN.get(tag, set())
     other = _OTHER_MATTERS.get(tag, "").split()
@@ -139,7 +194,7 @@ def _check(element: Element, where: str, label: str, strange: list[str]) -> None
             _check(child, where, label, strange)
         elif child.tag not in other and ":" not in child.tag:
             strange.append(
-                f"<{child.tag}> in <{tag}> of {where} is unknown{_guess(child.tag, known)}"
+                f"<{child.tag[:60]}> in <{tag}> of {where} is unknown{_guess(child.tag, known)}"
             )
     if tag == "inertial" and not {"mass", "inertia"} <= seen:
         raise RobotError(f"{label}: the <inertial> of {where} needs <mass> and <inertia>.")
@@ -190,5 +245,7 @@ def _missing_limits(joint: Element) -> Iterator[str]:
 
 
 def _guess(name: str, known: set[str] | dict[str, int]) -> str:
+    if len(name) > LONGEST_GUESS:
+        return ""
     near = difflib.get_close_matches(name, sorted(known), n=1)
     return f" (did you mean {near[0]!r}?)" if near else ""

@@ -1,50 +1,85 @@
-"""XML text as a tree, in the plain reading that robot files need.
+"""XML text as a tree, in the plain reading that robot files need, and a tree as text again.
 
 Python's own reader refuses a tag like ``<gazebo:plugin>`` whose prefix nothing declares, which
-robot files are full of, and it builds trees so deep that nothing can walk them.
+robot files are full of; it builds trees so deep that nothing can walk them, and it replaces
+entities until the memory is full.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
 from heelstrike.errors import RobotError
 
 DEEPEST = 400
 """Most elements inside one another; MuJoCo's parser takes 500."""
 
+MOST_ELEMENTS = 20_000
+"""Most elements of a robot, copies included; the largest we know has some 2000."""
 
-def xml_tree(text: str, label: str) -> Element:
-    """Return the tree of an XML text. Prefixes of tags stay in the tags.
+
+class Node(Element):
+    """An element that knows where it was written.
+
+    Attributes
+    ----------
+    line : int
+        Line of the main file on which it begins, or that of the ``<include>`` that brought it.
+    folder : Path or None
+        Folder of the file that it was included from, None if it is in the main file.
+    """
+
+    line = 0
+    folder: Path | None = None
+
+
+def xml_tree(text: str, label: str) -> Node:
+    """Return the tree of an XML text, without the text between its tags, which means nothing.
+
+    Prefixes of tags stay in the tags.
 
     Raises
     ------
     RobotError
-        If the text is not well-formed XML, with line and column, or nested too deeply.
+        If the text is not well-formed XML, with line and column; if it is nested too deeply, has
+        too many elements, or declares a document type or entities.
     """
-    builder = TreeBuilder()
-    depth = 0
+    builder: TreeBuilder = TreeBuilder(element_factory=Node)
+    depth = count = 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
+        nonlocal depth, count
         depth += 1
+        count += 1
         if depth > DEEPEST:
-            raise RobotError(
-                f"{label}: line {parser.CurrentLineNumber}: more than {DEEPEST} elements inside "
-                "one another, which no robot needs."
-            )
-        builder.start(tag, attributes)
+            refuse(f"more than {DEEPEST} elements inside one another, which no robot needs.")
+        if count > MOST_ELEMENTS:
+            refuse(f"more than {MOST_ELEMENTS} elements, which no robot needs.")
+        builder.start(tag, attributes).line = parser.CurrentLineNumber  # type: ignore[attr-defined]
 
     def end(tag: str) -> None:
         nonlocal depth
         depth -= 1
         builder.end(tag)
 
+    def declaration(*_: object) -> None:
+        refuse(
+            "a document type or entity declaration, which no robot needs and which can make a "
+            "parser read other files or fill the memory. Remove it."
+        )
+
+    def refuse(what: str) -> NoReturn:
+        raise RobotError(f"{label}: line {parser.CurrentLineNumber}: {what}")
+
     parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler = start
     parser.EndElementHandler = end
-    parser.CharacterDataHandler = builder.data
+    parser.StartDoctypeDeclHandler = declaration
+    parser.EntityDeclHandler = declaration
     try:
         parser.Parse(text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
@@ -52,4 +87,32 @@ def xml_tree(text: str, label: str) -> Element:
             f"{label}: this is not well-formed XML: {expat.ErrorString(error.code)} at line "
             f"{error.lineno}, column {error.offset + 1}. Is the file complete?"
         ) from error
-    return builder.close()
+    root: Node = builder.close()  # type: ignore[assignment]
+    return root
+
+
+def xml_text(root: Element) -> str:
+    """Return the text of a tree, every element on its line where that is possible.
+
+    What a parser says about a line is then true of the file that the tree was read from.
+    """
+    parts: list[str] = []
+    line = 1
+    stack: list[Element | str] = [root]
+    while stack:
+        element = stack.pop()
+        if isinstance(element, str):
+            parts.append(element)
+            continue
+        missing = getattr(element, "line", 0) - line
+        if missing > 0:
+            parts.append("\n" * missing)
+            line += missing
+        attributes = "".join(f" {key}={quoteattr(text)}" for key, text in element.attrib.items())
+        if len(element):
+            parts.append(f"<{element.tag}{attributes}>")
+            stack.append(f"</{element.tag}>")
+            stack.extend(reversed(element))
+        else:
+            parts.append(f"<{element.tag}{attributes}/>")
+    return "".join(parts)

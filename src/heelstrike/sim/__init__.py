@@ -9,10 +9,10 @@ from heelstrike.sim.contact_law import (
     RegularisedFriction,
 )
 from heelstrike.sim.controller import CompiledController, Contacts, Controller, controller_kernel
-from heelstrike.sim.dataset import load_run
 from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
+from heelstrike.sim.run_file import load_run
 from heelstrike.sim.simulation import simulate
 from heelstrike.sim.status import EventKind, RunStatus, Scheme
 from heelstrike.sim.time_stepping import TimeStepping

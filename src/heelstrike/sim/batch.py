@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller import CompiledController, Controller
@@ -36,6 +38,7 @@ from heelstrike.sim.memory import (
     allocate_memory,
 )
 from heelstrike.sim.push import Push, pushes_on
+from heelstrike.sim.record_size import check_runs
 from heelstrike.sim.run import Run, Timing
 from heelstrike.sim.simulation import Loop, compiled_form, prepared
 from heelstrike.sim.status import EventKind, RunStatus
@@ -45,6 +48,9 @@ Integers = NDArray[np.int64]
 
 NO_ROWS = 2**62
 """Steps between two rows of runs that are not recorded: more than any run has."""
+
+
+NOT_BEGUN = "interrupted before it began"
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,13 +200,15 @@ def simulate_batch(
         Threads to work with; by default one a processor.
     progress : callable or bool, optional
         Called with the numbers of finished and of all runs; true shows a bar, false nothing. By
-        default there is a bar on a terminal and nothing elsewhere.
+        default there is a bar on a terminal and nothing elsewhere. If it raises, that ends all runs
+        like Ctrl-C, and their messages tell.
 
     Returns
     -------
     Batch
-        How every run ended. A fall or a failure ends its own run only; Ctrl-C ends all, and those
-        that had not begun are where they started.
+        How every run ended. A fall or a failure, of the controller too, ends its own run only;
+        Ctrl-C ends all, and those that had not begun are where they started. While compiling,
+        Ctrl-C raises KeyboardInterrupt.
 
     Raises
     ------
@@ -261,12 +269,16 @@ def simulate_batch(
     _check_parameters(compiled, entries["parameters"])
     loops = [loop(index) for index in range(count)]
     # What only the method can refuse (and compiling) comes before the first run, too.
+    rows = 0
     for index, each in enumerate(loops):
         with _naming(index, count):
             if index == 0:
                 each.begin()
+                rows += each.engine.rows_left
             else:
-                each.new_engine(loops[0].memory)
+                rows += each.new_engine(loops[0].memory).rows_left
+    if record_every is not None:
+        check_runs(entries["robot"][0], rows, count, record_every)
     compile_s = loops[0].engine.compile_s
     crew = _Crew(loops, controller_of, recorded=record_every is not None)
     del loops, each  # the crew lets go of each when it is finished
@@ -441,6 +453,7 @@ class _Crew:
         self._recorded = recorded
         self._lock = threading.Lock()
         self._stop = threading.Event()
+        self._why = ""
         self._next = 0
         self._done = 0
         count = len(loops)
@@ -451,7 +464,7 @@ class _Crew:
         self._v = np.array([loop.state.v for loop in loops]).reshape(count, robot.nv)
         self._time = np.zeros(count)
         self._status = [RunStatus.INTERRUPTED] * count
-        self._message = ["interrupted before it began"] * count
+        self._message = [NOT_BEGUN] * count
         self._tally = np.zeros((count, 2), dtype=np.int64)
         self._events = np.zeros((count, len(EventKind)), dtype=np.int64)
         self._extreme = np.zeros((count, 4))
@@ -464,13 +477,23 @@ class _Crew:
             try:
                 while futures:
                     done, futures = wait(futures, timeout=0.1, return_when=FIRST_EXCEPTION)
-                    show(self._done, self._count)
                     for future in done:
                         future.result()
-            except KeyboardInterrupt:
-                pass
+                    self._show(show)
+            except KeyboardInterrupt as interrupt:
+                acknowledge(interrupt)
             finally:
                 self._stop.set()
+
+    def _show(self, show: Callable[[int, int], None]) -> None:
+        """Show how far it is; what that raises ends all runs, unless all have ended."""
+        try:
+            show(self._done, self._count)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self._why = f": progress raised {type(error).__name__}: {error}"
+            self._stop.set()
 
     def _take_runs(self) -> None:
         """Work of one thread, which allocates memory once for all of its runs, if they allow it."""
@@ -514,6 +537,8 @@ class _Crew:
         self._time[index] = loop.engine.time
         self._status[index] = status
         self._message[index] = message
+        if status is RunStatus.INTERRUPTED:
+            self._message[index] += self._why
         self._tally[index] = memory.tally[[STEPS, SATURATIONS]]
         places = [PENETRATION, COMPLEMENTARITY, CONE, NON_PENETRATION]
         self._extreme[index] = memory.extreme[places]
@@ -529,12 +554,16 @@ class _Crew:
 
     def batch(self, threads: int, timing: Timing) -> Batch:
         """Return what came out."""
+        if self._why and RunStatus.INTERRUPTED not in self._status:
+            warnings.warn(f"all runs ended{self._why}", stacklevel=3)
         return Batch(
             position=self._q,
             velocity=self._v,
             time=self._time,
             status=tuple(self._status),
-            message=tuple(self._message),
+            message=tuple(
+                text + self._why if text == NOT_BEGUN else text for text in self._message
+            ),
             steps=self._tally[:, 0].copy(),
             saturations=self._tally[:, 1].copy(),
             events=self._events,

@@ -22,6 +22,7 @@ from heelstrike.contact.ground import Ground, GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.asking import ask
 from heelstrike.sim.compliant_dynamics import (
     GAINS_LAST,
     CompliantWorkspace,
@@ -61,6 +62,7 @@ from heelstrike.sim.engine import (
     Setting,
     whole_steps,
 )
+from heelstrike.sim.guard import guarded
 from heelstrike.sim.memory import (
     CONE,
     PENETRATION,
@@ -71,6 +73,7 @@ from heelstrike.sim.memory import (
     allocate_record,
 )
 from heelstrike.sim.push import share_over_step
+from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import (
     JOINT_STOP,
     LIFTOFF,
@@ -183,7 +186,8 @@ class Compliant:
         Raises
         ------
         SimulationError
-            If the ground has a restitution of its own.
+            If the ground has a restitution of its own; if steps or rows are too many to be counted
+            or kept.
         """
         return _CompliantEngine(self, setting)
 
@@ -454,14 +458,13 @@ def _advance(
             for contact in range(count):
                 memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
         if k % span[CONTROL_EVERY] == 0:
-            controller(
+            ask(
+                controller,
                 time,
                 memory.q,
                 memory.v,
-                memory.contacts,
                 model,
-                memory.tree,
-                memory.scratch,
+                memory,
                 parameters,
                 controller_memory,
                 memory.torque,
@@ -537,8 +540,11 @@ class _CompliantEngine:
                 "on compliant ground the restitution follows from the contact law; leave that of "
                 "the ground at zero and use HuntCrossley.from_sink or KelvinVoigt.from_sink"
             )
+        check_steps(setting, "step", method.step)
+        check_room(setting, "step", method.step)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
+        self.spare = guarded(())
         self._work = compliant_workspace(setting.robot.nv, setting.robot.nu, setting.robot.nc)
         numbers = np.zeros(NUMBERS)
         method.law.write(numbers)
@@ -565,6 +571,11 @@ class _CompliantEngine:
                 0,
             ]
         )
+
+    def _spare_for(self, controller_memory: Floats) -> Floats:
+        if self.spare.size != controller_memory.size:
+            self.spare = guarded(controller_memory)
+        return self.spare
 
     @property
     def time(self) -> float:
@@ -595,7 +606,7 @@ class _CompliantEngine:
                 self._laws,
                 parameters,
                 controller_memory,
-                np.empty_like(controller_memory),
+                self._spare_for(controller_memory),
                 setting.memory,
                 self._work,
                 record,

@@ -35,6 +35,7 @@ from heelstrike.dynamics.kernels import (
     solve_factorized,
 )
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.asking import ask
 from heelstrike.sim.contact_geometry import contact_rows, observe, row_product
 from heelstrike.sim.contact_law import (
     BRISTLE_BY_BRISTLE,
@@ -51,8 +52,10 @@ from heelstrike.sim.contact_law import (
     joint_friction,
     normal_force,
 )
+from heelstrike.sim.guard import guarded
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
+from heelstrike.sim.recording import try_torque
 from heelstrike.sim.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
@@ -220,7 +223,7 @@ def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
         stop_partial=np.zeros((nv, 2)),
         torque_by_q=np.zeros((nu, nv)),
         torque_by_v=np.zeros((nu, nv)),
-        trial_torque=np.zeros(nu),
+        trial_torque=guarded(np.zeros(nu)),
         age=np.full(1, GAINS_LAST, dtype=np.int64),
         base_q=np.zeros(nv),
         base_v=np.zeros(nv),
@@ -257,23 +260,18 @@ def command(
     control: Control, memory_now: Floats, time: float, model: Model, memory: Memory, torque: Floats
 ) -> None:
     """Torques of a controller at the state now, within their limits."""
-    control.kernel(
+    ask(
+        control.kernel,
         time,
         memory.q,
         memory.v,
-        memory.contacts,
         model,
-        memory.tree,
-        memory.scratch,
+        memory,
         control.parameters,
         memory_now,
         torque,
     )
-    for i in range(torque.shape[0]):
-        if torque[i] > model.torque_upper[i]:
-            torque[i] = model.torque_upper[i]
-        elif torque[i] < model.torque_lower[i]:
-            torque[i] = model.torque_lower[i]
+    try_torque(model, memory.q, memory.v, torque, memory)
 
 
 @kernel

@@ -8,11 +8,14 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numba import types
+from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from heelstrike.bundle import Bundle
 from heelstrike.compilation import compiled_for, type_of
 from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.state import State
 
@@ -124,6 +127,10 @@ CONTROLLER_SIGNATURE = types.void(
 CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 
 
+def _is_ours(function: Callable[..., None]) -> bool:
+    return str(getattr(function, "__module__", "")).split(".")[0] == __name__.split(".")[0]
+
+
 def controller_kernel(function: Callable[..., None]) -> Any:
     """Compile a controller so that it can run inside the compiled loop.
 
@@ -131,8 +138,64 @@ def controller_kernel(function: Callable[..., None]) -> Any:
     and writes into ``torque`` (nu,). ``tree`` is the dynamics workspace with the kinematics and
     velocities of ``(q, v)``; its scratch fields and all of ``scratch`` may be used freely.
     ``parameters`` is read only, ``memory`` is kept from call to call.
+
+    Its own indices are checked, those of the functions it calls are not: an index beyond an array
+    raises IndexError, which like any exception ends the run; ``simulate(..., checked=True)`` names
+    the array and the index.
     """
-    return compiled_for(CONTROLLER_SIGNATURE, function, address=True)
+    checked = not _is_ours(function)  # the tests see to those of this package
+    return compiled_for(CONTROLLER_SIGNATURE, function, address=True, boundscheck=checked)
+
+
+def name_of(controller: Any) -> str:
+    """Return what to call a controller: the name of its function, or of its class."""
+    kernel = getattr(controller, "kernel", None)
+    return str(getattr(kernel, "__name__", "") or type(controller).__name__)
+
+
+def is_stock(controller: CompiledController) -> bool:
+    """Whether a controller is one of this package, whose tests see to what it writes."""
+    return _is_ours(controller.kernel)
+
+
+def read_only(contacts: Contacts) -> Contacts:
+    """Return the same contacts, to be looked at only."""
+    shown = {name: array.view() for name, array in contacts.members().items()}
+    for array in shown.values():
+        array.flags.writeable = False
+    return Contacts(**shown)
+
+
+def checked_kernel(controller: CompiledController) -> CompiledController:
+    """Return a compiled controller that the loops may call.
+
+    Raises
+    ------
+    ControllerError
+        If its kernel is not compiled for what loops hand to it, or its numbers are not vectors.
+    """
+    kernel: Any = controller.kernel
+    name = name_of(controller)
+    if not isinstance(kernel, Dispatcher):
+        raise ControllerError(
+            f"the kernel of a CompiledController comes from controller_kernel, {name!r} does not: "
+            f"it is a {type(kernel).__name__}"
+        )
+    if tuple(CONTROLLER_SIGNATURE.args) not in kernel.overloads:
+        try:
+            kernel.compile(CONTROLLER_SIGNATURE)
+        except (NumbaError, RuntimeError, TypeError) as error:
+            raise ControllerError(
+                f"controller {name!r} cannot be compiled for the arguments of a controller; make "
+                f"it with controller_kernel. {error}"
+            ) from error
+    for field in ("parameters", "memory"):
+        if np.ndim(getattr(controller, field)) != 1:
+            raise ControllerError(
+                f"the {field} of controller {name!r} must be a vector, got shape "
+                f"{np.shape(getattr(controller, field))}"
+            )
+    return controller
 
 
 @controller_kernel

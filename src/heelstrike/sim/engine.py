@@ -23,6 +23,7 @@ DIVERGED = 3
 SOLVER_FAILED = 4
 BAD_CONTROLLER = 5
 PAUSED = 6
+RAISED = 7
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,13 @@ class Engine(Protocol):
         Seconds it took to compile or load.
     solver : str
         Contact solver tried first, or the contact law.
+    spare : (m,) float
+        Copy of the controller's memory for the calls that it shall forget; guarded.
     """
 
     compile_s: float
     solver: str
+    spare: NDArray[np.float64]
 
     @property
     def time(self) -> float:
@@ -89,7 +93,11 @@ class Engine(Protocol):
         controller_memory: NDArray[np.float64],
         record: Record,
     ) -> int:
-        """Advance under a compiled controller until something stops it; return what."""
+        """Advance under a compiled controller until something stops it; return what.
+
+        `parameters` and `controller_memory` are guarded (:mod:`heelstrike.sim.guard`). What the
+        controller raises comes out.
+        """
         ...
 
 

@@ -25,6 +25,7 @@ from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, mom
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.asking import ask
 from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
 from heelstrike.sim.controller import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
 from heelstrike.sim.dormand_prince import SLOPES, interpolate
@@ -86,6 +87,7 @@ from heelstrike.sim.event_phase import (
     Phase,
     allocate_phase,
 )
+from heelstrike.sim.guard import guarded
 from heelstrike.sim.impact import REST, collide, heading, strike
 from heelstrike.sim.memory import (
     PENETRATION,
@@ -96,6 +98,7 @@ from heelstrike.sim.memory import (
     allocate_record,
 )
 from heelstrike.sim.push import switch_at
+from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import center_height, limit_torque, sound
 from heelstrike.sim.status import EventKind
 
@@ -203,7 +206,8 @@ class EventDriven:
         Raises
         ------
         SimulationError
-            If the robot begins in the ground, or with a joint beyond its range.
+            If the robot begins in the ground, or with a joint beyond its range; if steps or rows
+            are too many to be counted or kept.
         """
         return _EventDrivenEngine(self, setting)
 
@@ -542,9 +546,9 @@ def control(
     forward_kinematics(model, state[:nv], memory.tree)
     link_velocities(model, state[nv:], memory.tree)
     locate_contacts(model, ground, memory)
-    controller(
-        clock[TIME], state[:nv], state[nv:], memory.contacts, model, memory.tree, memory.scratch,
-        parameters, kept, memory.torque,
+    ask(
+        controller, clock[TIME], state[:nv], state[nv:], model, memory, parameters, kept,
+        memory.torque,
     )  # fmt: skip
     if not limit_torque(model, memory):
         return BAD
@@ -808,10 +812,19 @@ class _EventDrivenEngine:
     """Event-driven simulation at work."""
 
     def __init__(self, method: EventDriven, setting: Setting) -> None:
+        check_steps(setting, "max_step", method.max_step, recorded=method.output_period is None)
+        if setting.control_period is not None:
+            check_steps(setting, "control_period", setting.control_period, recorded=False)
+        if method.output_period is None:
+            check_room(setting, "max_step", method.max_step)  # and more, if steps get shorter
+        else:
+            check_steps(setting, "output_period", method.output_period)
+            check_room(setting, "output_period", method.output_period)
         _check_start(setting, method.swing_feet_pass)
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
         self._phase = allocate_phase(setting.robot)
+        self.spare = guarded(())
         self._order = solver_order(method.solver)
         self._phase.order[:] = self._order
         self.solver = method.solver
@@ -831,6 +844,11 @@ class _EventDrivenEngine:
         clock[FALLEN] = setting.fallen_height
         count[ROW_EVERY] = setting.record_every
         count[LET_PASS] = int(method.swing_feet_pass)
+
+    def _spare_for(self, controller_memory: Floats) -> Floats:
+        if self.spare.size != controller_memory.size:
+            self.spare = guarded(controller_memory)
+        return self.spare
 
     @property
     def time(self) -> float:
@@ -875,7 +893,7 @@ class _EventDrivenEngine:
                 setting.ground,
                 parameters,
                 controller_memory,
-                np.empty_like(controller_memory),
+                self._spare_for(controller_memory),
                 setting.memory,
                 record,
                 self._phase,

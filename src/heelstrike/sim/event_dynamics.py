@@ -14,6 +14,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.asking import ask
 from heelstrike.sim.contact_geometry import (
     add_impulse,
     assemble_delassus,
@@ -30,6 +31,7 @@ from heelstrike.sim.event_gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
+from heelstrike.sim.recording import try_torque
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
@@ -296,14 +298,11 @@ def evaluate(
     if phase.clock[SAMPLE_PERIOD] == 0.0:
         for i in range(kept.shape[0]):
             spare[i] = kept[i]
-        controller(
-            time, state[:nv], state[nv:], contacts, model, memory.tree, memory.scratch, parameters,
-            spare, memory.torque,
+        ask(
+            controller, time, state[:nv], state[nv:], model, memory, parameters, spare,
+            memory.torque,
         )  # fmt: skip
-        for i in range(model.actuator_joint.shape[0]):
-            memory.torque[i] = min(
-                max(memory.torque[i], model.torque_lower[i]), model.torque_upper[i]
-            )
+        try_torque(model, state[:nv], state[nv:], memory.torque, memory)
     free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
     count = gather_closed(model, memory, phase)
     phase.count[CLOSED] = count

@@ -16,6 +16,7 @@ from heelstrike.dynamics.articulated import ArticulatedBodies, articulated_bodie
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller import Contacts
+from heelstrike.sim.guard import guarded, guarded_bundle
 from heelstrike.sim.programs import straight_line_programs, usual_points
 from heelstrike.sim.push import Push, Pushes, pushes_on
 
@@ -26,7 +27,16 @@ Integers = NDArray[np.int64]
 SATURATIONS = 0
 STEPS = 1
 BAD_TORQUE = 2
-TALLIES = 3
+CONDUCT = 3
+NOT_FINITE = 4
+TALLIES = 5
+
+# What CONDUCT says of the controller: that nobody looks whether it changes state and contacts, or
+# that one does; that it has; that it wrote beyond its own arrays.
+TRUSTED = 0
+WATCHED = 1
+CHANGED = 2
+OVERRAN = 3
 
 # Places in ``Memory.extreme``: worst values over every step, recorded or not.
 PENETRATION = 0
@@ -115,7 +125,7 @@ class Memory(Bundle):
         Memory of the contact solvers.
     pushes : Pushes
         Forces from outside.
-    tally : (3,) int
+    tally : (5,) int
     extreme : (4,) float
         Counts and worst values of the run; their places are module constants.
     """
@@ -184,10 +194,10 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     place = np.full(nc, -1)
     place[usual] = np.arange(len(usual))
     return Memory(
-        q=np.zeros(nv),
-        v=np.zeros(nv),
+        q=guarded(np.zeros(nv)),
+        v=guarded(np.zeros(nv)),
         next_v=np.zeros(nv),
-        torque=np.zeros(nu),
+        torque=guarded(np.zeros(nu)),
         force=np.zeros(nv),
         rate=np.zeros(nv),
         bias=np.zeros(nv),
@@ -197,9 +207,11 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         factor=np.zeros((nv, nv)),
         added=np.zeros(nv),
         bodies=articulated_bodies(nv),
-        tree=workspace(nv),
-        scratch=workspace(nv),
-        contacts=Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2))),
+        tree=guarded_bundle(workspace(nv)),
+        scratch=guarded_bundle(workspace(nv)),
+        contacts=guarded_bundle(
+            Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2)))
+        ),
         friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
         restitution=np.zeros(capacity),
         slip=np.zeros(nc),

@@ -11,7 +11,7 @@ from llvmlite import ir
 from numpy.typing import NDArray
 
 from heelstrike.dynamics.kernels import solve_factorized, state_equations
-from heelstrike.dynamics.machine_code import addresses, can_fuse
+from heelstrike.dynamics.machine_code import addresses
 from heelstrike.dynamics.straight_line import Recording, add_function, description
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot.model import Model
@@ -65,7 +65,7 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     nv, nc, size = len(model.parent), len(model.contact_link), len(points)
     count = len(KERNELS) if size > 0 else DELASSUS
     programs = np.zeros(len(KERNELS), dtype=np.int64)
-    if not 0 < nv <= MOST_COORDINATES or not can_fuse():
+    if not 0 < nv <= MOST_COORDINATES:
         return programs
     matrix, vector, pairs = np.zeros((nv, nv)), np.zeros(nv), np.zeros((nc, 2))
     tree = workspace(nv)

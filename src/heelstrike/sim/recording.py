@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from heelstrike.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contact_geometry import contact_velocity
 from heelstrike.sim.memory import (
     BAD_TORQUE,
     COMPLEMENTARITY,
     CONE,
     NON_PENETRATION,
+    NOT_FINITE,
     PENETRATION,
     SATURATIONS,
     STEPS,
@@ -50,6 +51,26 @@ def limit_torque(model: Model, memory: Memory) -> bool:
             memory.torque[i] = model.torque_lower[i]
             memory.tally[SATURATIONS] += 1
     return True
+
+
+@kernel
+def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memory) -> None:
+    """Clip torques that a controller was asked for within a step, at a state that may be no good.
+
+    Keeps in mind which of them was not finite when it was last asked at a state that was.
+    """
+    bad = 0
+    for i in range(torque.shape[0]):
+        if not abs(torque[i]) < INFINITY:
+            bad = i + 1
+        elif torque[i] > model.torque_upper[i]:
+            torque[i] = model.torque_upper[i]
+        elif torque[i] < model.torque_lower[i]:
+            torque[i] = model.torque_lower[i]
+    for i in range(v.shape[0]):
+        if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
+            return
+    memory.tally[NOT_FINITE] = bad
 
 
 @dissolved_kernel

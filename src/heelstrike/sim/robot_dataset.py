@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Foot, Mirror, Robot
@@ -39,6 +41,8 @@ _MODEL = {
     "torque_upper": ("actuator",),
 }
 _INDICES = ("parent", "contact_link", "actuator_joint")
+_ONCE_UNKNOWN = {"dry_friction": 0.0, "speed_limit": math.inf}
+"""What files do not have that are older than these numbers of a robot, and what it was then."""
 _MAY_BE_INFINITE = ("lower", "upper", "speed_limit", "torque_lower", "torque_upper")
 _NAMES = {
     "joint_names": "coordinate",
@@ -85,59 +89,79 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     return xarray.Dataset(variables, attrs=attributes)
 
 
-def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
+def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
     """Build the robot that :func:`robot_to_dataset` described.
+
+    Parameters
+    ----------
+    contents : mapping
+        Its variables by name, numbers or texts; its attributes, without dimensions, by their name
+        after an @.
 
     Raises
     ------
-    ValueError, KeyError
+    ValueError
         If anything is missing, of the wrong shape, or points outside the robot.
     """
-    import xarray
 
-    for name, nothing in (("dry_friction", 0.0), ("speed_limit", math.inf)):
-        if name not in dataset:  # the file of a time when robots had none
-            none = xarray.full_like(dataset["damping"], nothing)
-            dataset = dataset.assign({name: none})
+    def found(name: str) -> NDArray[Any]:
+        if name not in contents:
+            raise ValueError(f"{name.lstrip('@')} is missing")
+        return contents[name]
+
     sizes = {
-        "coordinate": dataset["parent"].size,
-        "contact": dataset["contact_link"].size,
-        "actuator": dataset["actuator_joint"].size,
-        "foot": dataset["foot_link"].size,
+        "coordinate": found("parent").size,
+        "contact": found("contact_link").size,
+        "actuator": found("actuator_joint").size,
+        "foot": found("foot_link").size,
         "motion": 3,
         "xz": 2,
     }
 
     def numbers(name: str, dims: tuple[str, ...], kind: type) -> Any:
-        values = dataset[name].values
         shape = tuple(sizes[dim] for dim in dims)
-        if values.shape != shape or values.dtype.kind not in "fiu":
+        if name in _ONCE_UNKNOWN and name not in contents:
+            return np.full(shape, _ONCE_UNKNOWN[name])
+        values = found(name)
+        if values.shape != shape or values.dtype.kind not in "fi":
             raise ValueError(f"{name} is not an array of numbers of shape {shape}")
+        if kind is np.int64 and values.dtype.kind != "i":
+            raise ValueError(f"{name} does not hold whole numbers")
         return np.ascontiguousarray(values, dtype=kind)
 
-    def text(name: str, dim: str) -> tuple[str, ...]:
+    def texts(name: str, dim: str) -> tuple[str, ...]:
         if not sizes[dim]:
             return ()
-        values = dataset[name].values
-        if values.shape != (sizes[dim],):
-            raise ValueError(f"{name} does not have {sizes[dim]} entries")
-        return tuple(_decoded(value) for value in values)
+        values = found(name)
+        if values.shape != (sizes[dim],) or values.dtype.kind != "U":
+            raise ValueError(f"{name} does not have {sizes[dim]} names")
+        return tuple(values.tolist())
+
+    def attribute(name: str, kind: str) -> Any:
+        value = found(f"@{name}")
+        if value.ndim or value.dtype.kind != kind:
+            raise ValueError(f"{name} is not {'text' if kind == 'U' else 'a whole number'}")
+        return value.item()
 
     model = Model(
         **{
             name: numbers(name, dims, np.int64 if name in _INDICES else np.float64)
             for name, dims in _MODEL.items()
         },
-        pivot=int(dataset.attrs["pivot"]),
+        pivot=attribute("pivot", "i"),
     )
     foot_link = numbers("foot_link", ("foot",), np.int64)
     contact_foot = numbers("contact_foot", ("contact",), np.int64)
+    if np.any(contact_foot < -1) or np.any(contact_foot >= len(foot_link)):
+        raise ValueError("contact_foot points outside the robot")
     feet = tuple(
         Foot(name, int(link), tuple(int(i) for i in np.flatnonzero(contact_foot == index)))
-        for index, (name, link) in enumerate(zip(text("foot_name", "foot"), foot_link, strict=True))
+        for index, (name, link) in enumerate(
+            zip(texts("foot_name", "foot"), foot_link, strict=True)
+        )
     )
     mirror = None
-    if int(dataset.attrs["symmetric"]):
+    if attribute("symmetric", "i"):
         mirror = Mirror(
             **{
                 name: numbers(f"mirror_{name}", (dim,), np.float64 if name == "sign" else np.int64)
@@ -145,29 +169,21 @@ def robot_from_dataset(dataset: xarray.Dataset) -> Robot:
             }
         )
     friction: tuple[float, ...] = ()
-    if "contact_friction" in dataset:
+    if "contact_friction" in contents:
         friction = tuple(numbers("contact_friction", ("contact",), np.float64).tolist())
-    names: dict[str, Any] = {name: text(name, dim) for name, dim in _NAMES.items()}
+    names: dict[str, Any] = {name: texts(name, dim) for name, dim in _NAMES.items()}
     robot = Robot(
-        name=_decoded(dataset.attrs["name"]),
+        name=attribute("name", "U"),
         model=model,
         **names,
         feet=feet,
         mirror=mirror,
-        floating=bool(int(dataset.attrs["floating"])),
+        floating=bool(attribute("floating", "i")),
         contact_friction=friction,
-        source=_decoded(dataset.attrs["source"]),
+        source=attribute("source", "U"),
     )
     _check(robot)
     return robot
-
-
-def _decoded(value: Any) -> str:
-    if isinstance(value, bytes):
-        return value.decode("utf-8")
-    if not isinstance(value, str):
-        raise ValueError(f"expected text, found {type(value).__name__}")
-    return value
 
 
 def _check(robot: Robot) -> None:
@@ -199,3 +215,5 @@ def _check(robot: Robot) -> None:
         for name, size in (("joint", count), ("contact", robot.nc), ("foot", len(robot.feet))):
             if sorted(getattr(robot.mirror, name)) != list(range(size)):
                 raise ValueError(f"mirror_{name} is not an exchange of left and right")
+        if np.any(np.abs(robot.mirror.sign) != 1.0):
+            raise ValueError("mirror_sign must be 1 or -1")

@@ -146,7 +146,7 @@ class Run:
         every step or control period. Of a controller that acts continuously, at the samples or
         ends of steps only; what is clipped within them is not counted.
     timing : Timing
-    error : Exception or None
+    error : BaseException or None
         What the controller raised, if that ended the run.
     pushes : tuple of Push
         What pushed the robot.
@@ -175,7 +175,7 @@ class Run:
     steps: int
     saturations: int
     timing: Timing
-    error: Exception | None = field(default=None, repr=False)
+    error: BaseException | None = field(default=None, repr=False)
     pushes: tuple[Push, ...] = ()
 
     def __repr__(self) -> str:
@@ -228,6 +228,6 @@ class Run:
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`."""
-        from heelstrike.sim.dataset import save
+        from heelstrike.sim.run_file import save
 
         return save(self, path)

@@ -14,29 +14,46 @@ from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.dynamics.kernels import center_of_mass, forward_kinematics
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.checked import CheckedController
 from heelstrike.sim.contact_geometry import observe
-from heelstrike.sim.controller import CompiledController, Controller, hold_torque
+from heelstrike.sim.controller import (
+    CompiledController,
+    Contacts,
+    Controller,
+    checked_kernel,
+    hold_torque,
+    is_stock,
+    name_of,
+    read_only,
+)
 from heelstrike.sim.engine import (
     DIVERGED,
     DONE,
     FELL,
     PAUSED,
+    RAISED,
     RECORD_FULL,
     SOLVER_FAILED,
     Engine,
     Method,
     Setting,
 )
+from heelstrike.sim.guard import guarded
 from heelstrike.sim.memory import (
     BAD_TORQUE,
     COMPLEMENTARITY,
+    CONDUCT,
     CONE,
     NON_PENETRATION,
+    NOT_FINITE,
     PENETRATION,
     SATURATIONS,
     STEPS,
+    TRUSTED,
+    WATCHED,
     Memory,
     Record,
     allocate_memory,
@@ -47,9 +64,18 @@ from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.status import EventKind, RunStatus
 from heelstrike.sim.time_stepping import TimeStepping
+from heelstrike.sim.watch import Watch, numbers_of, restored
 
-# Rows of one chunk of the record, and steps between two looks at Ctrl-C and the progress bar.
+# Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096
+# Steps before the first look, and seconds that should pass between two.
+FIRST_LOOK = 256
+LOOK_EVERY = 0.05
+# Calls of a controller in Python between two reports of progress.
+LOOK_AFTER = 256
+
+# The loops count in 64 bits.
+MOST_EVERY = 2**62
 
 # A walking robot has fallen when its centre of mass is below this fraction of its first height.
 FALL_FRACTION = 0.5
@@ -67,6 +93,7 @@ def simulate(
     record_every: int = 1,
     stop_when_fallen: bool | None = None,
     pushes: Sequence[Push] = (),
+    checked: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Simulate a robot on the ground under a controller.
@@ -98,13 +125,23 @@ def simulate(
         it was at first. By default true for floating robots with several feet.
     pushes : sequence of Push
         Forces from outside, each on a point of the robot over a window of time.
+    checked : bool
+        Run a compiled controller in Python, some hundred times slower, and look at every index: one
+        that reads or writes beyond its arrays, or writes where it may not, ends the run with a
+        message that names the array and the index. Like any controller in Python it is then called
+        every `control_period`.
     progress : callable, optional
-        Called now and then with the simulated time.
+        Called now and then with the simulated time. If it raises, the run ends there, with status
+        ``interrupted``.
 
     Returns
     -------
     Run
-        Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``.
+        Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``. A
+        controller that raises anything but KeyboardInterrupt, even SystemExit, ends the run with
+        status ``controller_failed``, as does one that writes beyond its arrays or changes the
+        robot; what was raised is in ``run.error``. While compiling, when there is nothing to keep,
+        Ctrl-C raises KeyboardInterrupt.
 
     Raises
     ------
@@ -123,6 +160,7 @@ def simulate(
         record_every=record_every,
         stop_when_fallen=stop_when_fallen,
         pushes=pushes,
+        checked=checked,
         progress=progress,
     )
     return loop.run(controller)
@@ -139,6 +177,7 @@ def prepared(
     record_every: int,
     stop_when_fallen: bool | None,
     pushes: Sequence[Push],
+    checked: bool = False,
     progress: Callable[[float], None] | None = None,
     work: Workspace | None = None,
 ) -> Loop:
@@ -159,8 +198,8 @@ def prepared(
         raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
     if control_period is not None and not 0.0 < control_period < np.inf:
         raise SimulationError(f"control_period must be a positive number, got {control_period}")
-    if record_every < 1:
-        raise SimulationError(f"record_every must be at least 1, got {record_every}")
+    if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
+        raise SimulationError(f"record_every must be a whole number ≥ 1, got {record_every!r}")
     if stop_when_fallen is None:
         stop_when_fallen = robot.floating and len(robot.feet) > 1
     fallen_height = -np.inf
@@ -180,6 +219,7 @@ def prepared(
         record_every=record_every,
         fallen_height=fallen_height,
         pushes=_checked_pushes(robot, pushes),
+        checked=checked,
         progress=progress,
     )
 
@@ -214,16 +254,16 @@ def compiled_form(
     Raises
     ------
     ControllerError
-        If it is no controller at all.
+        If it is no controller at all, or one that loops cannot call.
     """
     if controller is None:
         return CompiledController(hold_torque, np.zeros(robot.nu), np.zeros(0))
     if isinstance(controller, CompiledController):
-        return controller
+        return checked_kernel(controller)
     make = getattr(controller, "compiled", None)
     compiled = make() if callable(make) else None
     if isinstance(compiled, CompiledController):
-        return compiled
+        return checked_kernel(compiled)
     if not callable(getattr(controller, "torque", None)):
         raise ControllerError(
             f"a controller needs a method torque(t, state, contacts), "
@@ -249,6 +289,7 @@ class Loop:
     record_every: int
     fallen_height: float
     pushes: tuple[Push, ...]
+    checked: bool
     progress: Callable[[float], None] | None
     keep_rows: bool = True
     stopped: Callable[[], bool] | None = None
@@ -256,7 +297,12 @@ class Loop:
     def run(self, controller: Controller | CompiledController | None) -> Run:
         """Simulate from beginning to end."""
         self.begin()
-        return self.result(*self.advance(controller))
+        status, message, timing = self.advance(controller)
+        try:
+            return self.result(status, message, timing)
+        except KeyboardInterrupt as interrupt:  # too late for anything to be lost
+            acknowledge(interrupt)
+            return self.result(RunStatus.INTERRUPTED, self._interrupted(), timing)
 
     def begin(self, memory: Memory | None = None, record: Record | None = None) -> None:
         """Allocate everything, compile, and check what only the method can.
@@ -276,7 +322,8 @@ class Loop:
         self.ground_model = self.ground.model()
         self.engine: Engine = self.new_engine(memory)
         self.event_counts = np.zeros(len(EventKind), dtype=np.int64)
-        self.error: Exception | None = None
+        self.error: BaseException | None = None
+        self.controller = "the controller"
         self.records: list[Record] = [] if record is None else [record]
         if record is None:
             self._new_record()
@@ -307,7 +354,8 @@ class Loop:
         begin = clock_time.perf_counter()
         try:
             status, message = self._walk(controller)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
+            acknowledge(interrupt)
             status = RunStatus.INTERRUPTED
             message = self._interrupted()
         self.final_state = self._state_now()
@@ -345,26 +393,56 @@ class Loop:
 
     def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
         compiled = compiled_form(self.robot, controller)
-        if compiled is not None:
-            return self._run_compiled(compiled)
-        return self._run_python(controller)  # type: ignore[arg-type]
+        if compiled is None:
+            return self._run_python(controller)  # type: ignore[arg-type]
+        driven = self.robot.model.actuator_joint
+        if compiled.stiffness is not None:
+            self.memory.stiffness[driven] += compiled.stiffness
+        if compiled.damping is not None:
+            self.memory.damping[driven] += compiled.damping
+        if self.checked and controller is not None:
+            return self._run_python(CheckedController(self.robot, compiled))
+        return self._run_compiled(compiled)
 
     def _run_compiled(self, controller: CompiledController) -> tuple[RunStatus, str]:
-        parameters = np.ascontiguousarray(controller.parameters, dtype=np.float64)
-        controller_memory = np.array(controller.memory, dtype=np.float64)
-        driven = self.robot.model.actuator_joint
-        if controller.stiffness is not None:
-            self.memory.stiffness[driven] += controller.stiffness
-        if controller.damping is not None:
-            self.memory.damping[driven] += controller.damping
+        self.controller = f"controller {name_of(controller)!r}"
+        parameters = guarded(controller.parameters)
+        controller_memory = guarded(controller.memory)
+        self.memory.tally[CONDUCT] = TRUSTED if is_stock(controller) else WATCHED
+        watch = Watch(self.robot, self.engine, self.memory, parameters, controller_memory)
+        steps = FIRST_LOOK
         while True:
-            code = self._run(CHUNK, controller.kernel, parameters, controller_memory)
-            if self.progress is not None:
-                self.progress(self.engine.time)
+            begin = clock_time.perf_counter()
+            code = self._run(steps, controller.kernel, parameters, controller_memory)
+            elapsed = clock_time.perf_counter() - begin
+            misdeed = watch.misdeed()
+            if misdeed is not None:
+                return RunStatus.CONTROLLER_FAILED, (
+                    f"{self.controller} {misdeed}; noticed at t = {self.engine.time:.6g} s. "
+                    "simulate(..., checked=True) tells more"
+                )
+            complaint = self._report()
             if code != PAUSED:
-                return self._ending(code)
+                status, message = self._ending(code)
+                return status, f"{message}; {complaint}" if complaint else message
+            if complaint:
+                return RunStatus.INTERRUPTED, f"{self._interrupted()}: {complaint}"
             if self.stopped is not None and self.stopped():
                 return RunStatus.INTERRUPTED, self._interrupted()
+            steps = int(min(CHUNK, max(1.0, steps * min(4.0, LOOK_EVERY / max(elapsed, 1e-9)))))
+
+    def _report(self) -> str:
+        """Report progress; say what went wrong with that, if something did."""
+        if self.progress is None:
+            return ""
+        try:
+            self.progress(self.engine.time)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self.error = error
+            return f"progress raised {_raised(error)}"
+        return ""
 
     def _run(
         self,
@@ -376,42 +454,73 @@ class Loop:
         """Advance by a number of steps, or by one control period; return how it came back."""
         self.engine.pause_after(steps)
         while True:
-            code = self.engine.advance(kernel, parameters, controller_memory, self.records[-1])
+            try:
+                code = self.engine.advance(kernel, parameters, controller_memory, self.records[-1])
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # of a compiled controller: loops raise nothing
+                self.error = error
+                return RAISED
             if code != RECORD_FULL:
                 return code
             self._new_record()
 
     def _run_python(self, controller: Controller) -> tuple[RunStatus, str]:
-        empty = np.zeros(0)
+        self.controller = f"{type(controller).__name__}.torque"
+        empty, held = guarded(()), guarded(np.zeros(self.robot.nu))
+        contacts = read_only(self.memory.contacts)
+        numbers = numbers_of(self.robot)
         calls = 0
         while True:
-            observe(self.robot.model, self.ground_model, self.memory)
-            try:
-                torque = np.asarray(
-                    controller.torque(
-                        self.engine.time, State(self.memory.q, self.memory.v), self.memory.contacts
-                    ),
-                    dtype=np.float64,
-                )
-            except Exception as error:
-                self.error = error
-                return RunStatus.CONTROLLER_FAILED, (
-                    f"{type(controller).__name__}.torque raised {type(error).__name__} at "
-                    f"t = {self.engine.time:.6g} s: {error} (the exception is in run.error)"
-                )
-            if torque.shape != (self.robot.nu,):
-                return RunStatus.CONTROLLER_FAILED, (
-                    f"{type(controller).__name__}.torque returned shape {torque.shape} at "
-                    f"t = {self.engine.time:.6g} s; robot {self.robot.name!r} needs "
-                    f"({self.robot.nu},): "
-                    f"{', '.join(self.robot.actuator_names)}"
-                )
-            code = self._run(None, hold_torque, np.ascontiguousarray(torque), empty)
+            ending = self._ask(controller, contacts, held)
+            code = PAUSED if ending else self._run(None, hold_torque, held, empty)
             calls += 1
-            if self.progress is not None and calls % 256 == 0:
-                self.progress(self.engine.time)
+            if calls % LOOK_AFTER != 0 and code == PAUSED and ending is None:
+                continue
+            changed = restored(self.robot, numbers)
+            if changed:
+                return RunStatus.CONTROLLER_FAILED, (
+                    f"{self.controller} changed the robot: {changed}; noticed at "
+                    f"t = {self.engine.time:.6g} s"
+                )
+            if ending is not None:
+                return ending
+            complaint = self._report()
             if code != PAUSED:
-                return self._ending(code)
+                status, message = self._ending(code)
+                return status, f"{message}; {complaint}" if complaint else message
+            if complaint:
+                return RunStatus.INTERRUPTED, f"{self._interrupted()}: {complaint}"
+
+    def _ask(
+        self, controller: Controller, contacts: Contacts, held: NDArray[np.float64]
+    ) -> tuple[RunStatus, str] | None:
+        """Ask for the torques to hold; return how the controller ended the run, if it did."""
+        observe(self.robot.model, self.ground_model, self.memory)
+        now = f"t = {self.engine.time:.6g} s"
+        try:
+            torque = np.asarray(
+                controller.torque(self.engine.time, State(self.memory.q, self.memory.v), contacts),
+                dtype=np.float64,
+            )
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self.error = error
+            if isinstance(controller, CheckedController) and isinstance(error, ControllerError):
+                return RunStatus.CONTROLLER_FAILED, f"{error} (at {now})"
+            return RunStatus.CONTROLLER_FAILED, (
+                f"{self.controller} raised {_raised(error)} at {now} (the exception is in "
+                "run.error)"
+            )
+        if torque.shape != (self.robot.nu,):
+            return RunStatus.CONTROLLER_FAILED, (
+                f"{self.controller} returned shape {torque.shape} at {now}; robot "
+                f"{self.robot.name!r} needs ({self.robot.nu},): "
+                f"{', '.join(self.robot.actuator_names)}"
+            )
+        held[:] = torque
+        return None
 
     def _ending(self, code: int) -> tuple[RunStatus, str]:
         now = f"t = {self.engine.time:.6g} s"
@@ -421,6 +530,16 @@ class Loop:
             return RunStatus.FELL, (
                 f"the robot fell at {now}: its centre of mass is below half its first height"
             )
+        if code == RAISED:
+            assert self.error is not None
+            more = "; simulate(..., checked=True) names the array and the index"
+            return RunStatus.CONTROLLER_FAILED, (
+                f"{self.controller} raised {_raised(self.error)} at {now} (the exception is in "
+                f"run.error){more if isinstance(self.error, IndexError) else ''}"
+            )
+        tally = self.memory.tally
+        if code == DIVERGED and tally[NOT_FINITE] > 0:
+            return self._not_finite(int(tally[NOT_FINITE]) - 1, f"in the step after {now}")
         reason = getattr(self.engine, "reason", "")
         if code == DIVERGED and reason:
             return RunStatus.DIVERGED, f"the simulation could not go on at {now}: {reason}"
@@ -433,9 +552,12 @@ class Loop:
                 f"no contact solver could certify a solution at {now}; residuals "
                 f"{self.memory.residual.tolist()}"
             )
-        actuator = self.robot.actuator_names[int(self.memory.tally[BAD_TORQUE])]
+        return self._not_finite(int(tally[BAD_TORQUE]), f"at {now}")
+
+    def _not_finite(self, actuator: int, when: str) -> tuple[RunStatus, str]:
         return RunStatus.CONTROLLER_FAILED, (
-            f"the controller asked for a torque that is not finite at {now}, actuator {actuator!r}"
+            f"the controller asked for a torque that is not finite {when}, actuator "
+            f"{self.robot.actuator_names[actuator]!r}"
         )
 
     def result(self, status: RunStatus, message: str, timing: Timing) -> Run:
@@ -489,3 +611,8 @@ class Loop:
             error=self.error,
             pushes=self.pushes,
         )
+
+
+def _raised(error: BaseException) -> str:
+    """Return kind and words of an exception."""
+    return f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

@@ -35,6 +35,7 @@ from heelstrike.dynamics.straight_line import play
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.asking import ask
 from heelstrike.sim.contact_geometry import (
     add_impulse,
     assemble_delassus,
@@ -61,10 +62,12 @@ from heelstrike.sim.engine import (
     solver_order,
     whole_steps,
 )
+from heelstrike.sim.guard import guarded
 from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
 from heelstrike.sim.point_contacts import point_velocities
 from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
+from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import (
     center_height,
     limit_torque,
@@ -476,14 +479,13 @@ def _advance(
             return DIVERGED
         evaluate_state(model, ground, memory)
         if k % control_every == 0:
-            controller(
+            ask(
+                controller,
                 time,
                 memory.q,
                 memory.v,
-                memory.contacts,
                 model,
-                memory.tree,
-                memory.scratch,
+                memory,
                 parameters,
                 controller_memory,
                 memory.torque,
@@ -544,6 +546,8 @@ class _TimeSteppingEngine:
     """Time stepping of one simulation."""
 
     def __init__(self, method: TimeStepping, setting: Setting) -> None:
+        check_steps(setting, "step", method.step)
+        check_room(setting, "step", method.step)
         self._advance, self.compile_s = compiled_advance()
         if method.scheme is not Scheme.MOREAU_JEAN and np.any(setting.ground.restitution > 0.0):
             raise SimulationError(
@@ -552,6 +556,7 @@ class _TimeSteppingEngine:
             )
         self._setting = setting
         self.solver = method.solver
+        self.spare = guarded(())
         self._order = solver_order(method.solver)
         self._control_every = 1
         if setting.control_period is not None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import os
 from pathlib import Path
 
 import numpy as np
 
-from heelstrike.errors import ViewError
+from heelstrike.errors import ViewError, WriteError
 from heelstrike.sim.run import Run
 from heelstrike.view.film import Film
-from heelstrike.view.style import checked_target, styled
+from heelstrike.view.mp4 import write_mp4
+from heelstrike.view.style import styled
+from heelstrike.whole_file import check_target, whole_file
 
 GIF_COLORS = 64
 
@@ -51,7 +54,11 @@ def animate(
     ViewError
         If the run is empty, an option is out of range, or the file cannot be written.
     """
-    target = checked_target(path)
+    target = Path(path)
+    try:
+        check_target(target)
+    except WriteError as error:
+        raise ViewError(str(error)) from error
     kind = target.suffix.lower()
     if kind not in (".mp4", ".gif"):
         raise ViewError(f"cannot write {target}: the name of an animation ends in .mp4 or .gif")
@@ -68,48 +75,19 @@ def animate(
         fps = 100.0 / max(2, round(100.0 / fps))  # the format counts hundredths of a second
     with styled():
         film = Film(run, (width, height), fps, speed)
-        # Written beside the target first, so that a failure leaves an older film alone.
-        name = str(target.with_name(f".part-{os.getpid()}-{target.name}"))
         try:
-            write = _write_mp4 if kind == ".mp4" else _write_gif
-            write(film, name, fps)
-            if not Path(name).stat().st_size:
-                raise ViewError(f"cannot write {target}: ffmpeg left an empty file")
-            Path(name).replace(target)
-        except OSError as error:
-            raise ViewError(f"cannot write {target}: {error}") from error
-        finally:
-            Path(name).unlink(missing_ok=True)
+            with whole_file(target) as beside:
+                if kind == ".mp4":
+                    pictures = (film.draw(index) for index in range(len(film)))
+                    write_mp4(pictures, film.size, fps, beside)
+                else:
+                    _write_gif(film, beside, fps)
+        except WriteError as error:
+            raise ViewError(str(error)) from error
     return target
 
 
-def _write_mp4(film: Film, name: str, fps: float) -> None:
-    import imageio_ffmpeg
-
-    try:
-        writer = imageio_ffmpeg.write_frames(
-            name,
-            film.size,
-            pix_fmt_in="rgba",
-            pix_fmt_out="yuv420p",
-            fps=fps,
-            codec="libx264",
-            quality=None,
-            macro_block_size=1,
-            ffmpeg_log_level="error",
-            output_params=["-preset", "veryfast", "-crf", "21", "-movflags", "+faststart"],
-        )
-        writer.send(None)
-    except RuntimeError as error:
-        raise ViewError(f"no ffmpeg to write MP4 with ({error}); a .gif needs none") from error
-    try:
-        for index in range(len(film)):
-            writer.send(film.draw(index))
-    finally:
-        writer.close()
-
-
-def _write_gif(film: Film, name: str, fps: float) -> None:
+def _write_gif(film: Film, path: Path, fps: float) -> None:
     from PIL import Image
 
     def picture(index: int) -> Image.Image:
@@ -119,4 +97,13 @@ def _write_gif(film: Film, name: str, fps: float) -> None:
     plain = Image.Dither.NONE
     pictures = (picture(i).quantize(palette=palette, dither=plain) for i in range(len(film)))
     first = next(pictures)
-    first.save(name, save_all=True, append_images=pictures, duration=round(1000.0 / fps), loop=0)
+    content = io.BytesIO()  # what writes into a file itself does not say why it cannot
+    first.save(
+        content,
+        format="GIF",
+        save_all=True,
+        append_images=pictures,
+        duration=round(1000.0 / fps),
+        loop=0,
+    )
+    path.write_bytes(content.getbuffer())

@@ -7,6 +7,7 @@ Nothing here touches matplotlib's global state: figures are made without pyplot 
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,8 +20,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from heelstrike.errors import ViewError
+from heelstrike.errors import ViewError, WriteError
 from heelstrike.robot.robot import Robot
+from heelstrike.whole_file import check_target, write_whole
 
 # Okabe and Ito's palette.
 BLUE = "#0072B2"
@@ -93,28 +95,24 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     ViewError
-        If the folder does not exist, or matplotlib knows no such kind of picture.
+        If matplotlib knows no such kind of picture, or the file cannot be written; an older one is
+        as it was.
     """
-    target = checked_target(path)
-    kinds = figure.canvas.get_supported_filetypes()
-    if target.suffix.lstrip(".").lower() not in kinds:
-        raise ViewError(f"cannot write {target}: the name of a picture ends in .png, .pdf or .svg")
-    try:
-        with styled():
-            figure.savefig(target)
-    except OSError as error:
-        raise ViewError(f"cannot write {target}: {error.strerror or error}") from error
-    return target
-
-
-def checked_target(path: str | os.PathLike[str]) -> Path:
-    """Return the path of a file to write, if its folder is there."""
     target = Path(path)
-    if not target.parent.is_dir():
-        raise ViewError(f"cannot write {target}: there is no folder {target.parent}")
-    if target.is_dir():
-        raise ViewError(f"cannot write {target}: it is a folder; give the name of a file")
-    return target
+    try:
+        check_target(target)
+    except WriteError as error:
+        raise ViewError(str(error)) from error
+    kind = target.suffix.lstrip(".").lower()
+    if kind not in figure.canvas.get_supported_filetypes():
+        raise ViewError(f"cannot write {target}: the name of a picture ends in .png, .pdf or .svg")
+    picture = io.BytesIO()
+    with styled():
+        figure.savefig(picture, format=kind)
+    try:
+        return write_whole(target, picture.getbuffer())
+    except WriteError as error:
+        raise ViewError(str(error)) from error
 
 
 def figure_title(figure: Figure, robot: Robot, title: str, *, note: str = "") -> None:

@@ -56,6 +56,8 @@ def measure_endurance(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  
             pushes=pushes,
             progress=False,
         )
+        if any(status is RunStatus.INTERRUPTED for status in batch.status):
+            raise KeyboardInterrupt
         total["runs"] += count
         total["steps"] += int(batch.steps.sum())
         total["fell"] += sum(status is RunStatus.FELL for status in batch.status)

@@ -11,6 +11,7 @@ from heelstrike.experiments.benchmark.stopwatch import Work
 from heelstrike.sim import Run, TimeStepping, simulate
 from heelstrike.sim.controller import CompiledController
 from heelstrike.sim.engine import Method
+from heelstrike.sim.whole_run import whole
 
 NEVER = 2**62
 """Steps between two rows of a run of which only the end is wanted."""
@@ -34,15 +35,17 @@ def run(
     record_every: int = NEVER,
 ) -> Run:
     """Simulate a scenario."""
-    return simulate(
-        scenario.robot,
-        controller(scenario, own=own),
-        state=scenario.state,
-        duration=scenario.duration,
-        method=method,
-        ground=scenario.ground,
-        record_every=record_every,
-        stop_when_fallen=False,
+    return whole(
+        simulate(
+            scenario.robot,
+            controller(scenario, own=own),
+            state=scenario.state,
+            duration=scenario.duration,
+            method=method,
+            ground=scenario.ground,
+            record_every=record_every,
+            stop_when_fallen=False,
+        )
     )
 
 

@@ -16,6 +16,7 @@ from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario, chain
 from heelstrike.experiments.benchmark.stopwatch import Work, best_of, steps_in_slot
 from heelstrike.robot import State, read_mjcf
 from heelstrike.sim import Run, TimeStepping, simulate
+from heelstrike.sim.whole_run import whole
 
 STEP = 1e-3
 STEPS = 500
@@ -56,14 +57,16 @@ def _measure(
     method, ground = TimeStepping(step=STEP), Ground(friction=FRICTION)
 
     def run(steps: int = STEPS, record_every: int = NEVER) -> Run:
-        done = simulate(
-            robot,
-            state=state,
-            duration=steps * STEP,
-            method=method,
-            ground=ground,
-            record_every=record_every,
-            stop_when_fallen=False,
+        done = whole(
+            simulate(
+                robot,
+                state=state,
+                duration=steps * STEP,
+                method=method,
+                ground=ground,
+                record_every=record_every,
+                stop_when_fallen=False,
+            )
         )
         if not done.completed:
             raise InvalidRunError(f"{robot.name} of {size}: {done.message}")

@@ -19,6 +19,7 @@ from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
 from heelstrike.sim import EventDriven, simulate
 from heelstrike.sim.controller import Controller
+from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 
@@ -146,13 +147,15 @@ def walking(*, duration: float = 1.0) -> Scenario:
     """
     robot, gait = walk_gait()
     own = ComputedTorque(robot, gait)
-    model_walk = simulate(
-        robot,
-        own,
-        state=gait.initial_state,
-        duration=1.98 * STEP_DURATION,
-        method=EventDriven(),
-        ground=Ground(friction=FRICTION),
+    model_walk = whole(
+        simulate(
+            robot,
+            own,
+            state=gait.initial_state,
+            duration=1.98 * STEP_DURATION,
+            method=EventDriven(),
+            ground=Ground(friction=FRICTION),
+        )
     )
     begins = STEP_DURATION * np.arange(3)
     sides = [gait.coefficients, gait.mirrored_coefficients(robot)]

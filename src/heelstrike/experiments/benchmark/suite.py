@@ -22,6 +22,7 @@ from heelstrike.experiments.benchmark.scaling import measure_scaling
 from heelstrike.experiments.benchmark.steps import measure_steps
 from heelstrike.experiments.benchmark.tables import tables
 from heelstrike.experiments.benchmark.threads import measure_threads
+from heelstrike.interruption import acknowledge
 
 PARTS: dict[str, tuple[str, Callable[..., dict[str, Any]]]] = {
     "steps": ("µs a step", measure_steps),
@@ -50,6 +51,8 @@ class Benchmark:
         Version of each engine, or why it is not in the comparison.
     parts : dict
         Results by part; plain numbers and text.
+    interrupted : str
+        What was being measured when Ctrl-C ended it; empty if it is whole.
     """
 
     quick: bool
@@ -57,6 +60,7 @@ class Benchmark:
     machine: dict[str, Any]
     peers: dict[str, str]
     parts: dict[str, Any]
+    interrupted: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain numbers and text."""
@@ -65,19 +69,24 @@ class Benchmark:
             "date": self.date,
             "machine": self.machine,
             "peers": self.peers,
+            **({"interrupted": self.interrupted} if self.interrupted else {}),
             **self.parts,
         }
 
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write benchmark.json and the figures into a folder; return the files."""
+        """Write benchmark.json and the figures into a folder; return the files.
+
+        Of a benchmark that was interrupted no figures are drawn.
+        """
         from heelstrike.experiments.benchmark.figures import draw
         from heelstrike.view.style import save_figure
+        from heelstrike.whole_file import write_whole
 
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         files = [target / "benchmark.json"]
-        files[0].write_text(json.dumps(self.to_dict(), indent=2) + "\n", encoding="utf-8")
-        for name, figure in draw(self.parts).items():
+        write_whole(files[0], json.dumps(self.to_dict(), indent=2) + "\n")
+        for name, figure in draw({} if self.interrupted else self.parts).items():
             files.append(save_figure(figure, target / f"{name}.png"))
         return files
 
@@ -115,6 +124,7 @@ def run_benchmark(
     Returns
     -------
     Benchmark
+        After Ctrl-C, of the parts that were finished by then.
 
     Raises
     ------
@@ -130,10 +140,18 @@ def run_benchmark(
     about = machine()
     found = peers()
     results: dict[str, Any] = {}
+    interrupted = ""
     for done, name in enumerate(wanted):
         title, measure = PARTS[name]
         if progress is not None:
             progress(title, done / len(wanted))
-        results[name] = measure(quick=quick, peers=compared(found))
+        try:
+            results[name] = measure(quick=quick, peers=compared(found))
+        except KeyboardInterrupt as interrupt:
+            if not results:
+                raise
+            acknowledge(interrupt)
+            interrupted = title
+            break
     date = datetime.now(UTC).isoformat(timespec="seconds")
-    return Benchmark(quick, date, about, found, results)
+    return Benchmark(quick, date, about, found, results, interrupted)

@@ -14,7 +14,7 @@ from heelstrike.experiments.benchmark.peer import reason
 from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import best_of
 from heelstrike.robot import State
-from heelstrike.sim import TimeStepping, simulate_batch
+from heelstrike.sim import RunStatus, TimeStepping, simulate_batch
 
 STEP = 1e-3
 DURATION = 7.0
@@ -43,6 +43,8 @@ def measure_threads(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
             threads=threads,
             progress=False,
         )
+        if any(status is RunStatus.INTERRUPTED for status in last[threads].status):
+            raise KeyboardInterrupt
         return perf_counter() - begin
 
     numbers = _thread_numbers()

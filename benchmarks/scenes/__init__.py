@@ -1,0 +1,22 @@
+"""Random scenes for every way through time, and a judge of its own for what comes out.
+
+``python benchmarks/scenes --help`` runs a campaign; ``baseline.md`` beside this file is its last
+committed table, ``causes.md`` says what lies behind it. The modules, from the bottom up:
+
+``mechanics``, ``terrain``
+    Kinematics, mass matrix, bias force and Jacobians of a planar tree, and distances to a polyline,
+    written a second time in plain numpy, over all rows of a record at once.
+``scene``
+    What a scene is, and the random one of a seed.
+``findings``, ``record``
+    Laws that were measured, and how badly each was broken where; the mechanics at a run's rows.
+``step_judge``, ``event_judge``, ``compliant_judge``
+    The laws of time stepping, of event-driven runs and of compliant ground, re-derived from the
+    record alone. Nothing of :mod:`heelstrike.sim`, ``contact`` or ``dynamics`` takes part.
+``twins``
+    The same scene mirrored, with its links in another order, or begun again.
+``methods``, ``running``
+    The ways through time by name; one scene under one of them.
+``campaign``, ``table``
+    Many scenes in worker processes, resumable, and the page that sums them up.
+"""

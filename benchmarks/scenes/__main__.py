@@ -1,0 +1,75 @@
+"""Command line of the random scenes.
+
+    python benchmarks/scenes run --out scenes.jsonl --methods event_driven --seeds 0:300
+    python benchmarks/scenes page scenes.jsonl --out benchmarks/scenes/baseline.md
+    python benchmarks/scenes show event_driven 38
+
+`run` goes on where a file of results ends; `show` judges one scene and prints what is wrong.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+# Run as a folder, its modules would be on the path and not the package.
+sys.path[0] = str(Path(__file__).resolve().parent.parent)
+
+from scenes.campaign import Task, campaign, results_in  # noqa: E402
+from scenes.methods import METHODS  # noqa: E402
+from scenes.running import prepare, run_scene  # noqa: E402
+from scenes.table import page  # noqa: E402
+
+
+def _seeds(text: str) -> range:
+    first, _, last = text.partition(":")
+    return range(int(first), int(last)) if last else range(int(first))
+
+
+def main() -> None:
+    """Run a campaign, write its page, or show one scene."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    commands = parser.add_subparsers(dest="command", required=True)
+    run = commands.add_parser("run", help="run scenes and append what comes out to a file")
+    run.add_argument("--out", type=Path, required=True, help="file of results, one a line")
+    run.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
+    run.add_argument("--seeds", type=_seeds, default=range(300), help="FIRST:END or their number")
+    run.add_argument("--workers", type=int, choices=(1, 2), default=1)
+    run.add_argument("--without-twins", action="store_true")
+    sums = commands.add_parser("page", help="sum a file of results up")
+    sums.add_argument("results", type=Path)
+    sums.add_argument("--out", type=Path)
+    sums.add_argument("--written-by", default="python benchmarks/scenes run", help="the command")
+    show = commands.add_parser("show", help="run and judge one scene")
+    show.add_argument("method", choices=METHODS)
+    show.add_argument("seed", type=int)
+    options = parser.parse_args()
+    if options.command == "run":
+        twins = not options.without_twins
+        for one in campaign(
+            options.out,
+            options.methods,
+            options.seeds,
+            workers=options.workers,
+            task=Task(run_scene, prepare),
+            twins=twins,
+        ):
+            found = one.get("objections", []) + one.get("twins", {}).get("objections", [])
+            words = "; ".join(f"{o['law']} {o['size']:.1e}" for o in found)
+            print(f"{one['method']} {one['seed']}: {one['status']}. {words}", flush=True)
+    elif options.command == "page":
+        text = page(results_in(options.results), options.written_by)
+        if options.out is None:
+            print(text)
+        else:
+            options.out.write_text(text)
+    else:
+        print(json.dumps(run_scene(options.method, options.seed), indent=2))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,445 @@
+"""The laws of event-driven runs, re-derived row by row and impulse by impulse from the record.
+
+Rows are instants of a continuous motion with the contact forces of that very instant; velocities
+jump between two rows of one time, by impulses that stand in the events. Promised is:
+
+- balance: between rows the velocity changes by ``∫ M⁻¹ (Γ + passive + pushes − H + Jᵀf) dt``, at a
+  jump by ``M⁻¹ Jᵀp``. The integral runs over the polynomial through up to four neighbouring rows
+  of the same smooth piece; how much the last row changed it is what it is trusted to.
+- motion: the position changes by the integral of the velocity (Hermite's rule, with the
+  accelerations at both ends), and not at all at a jump.
+- contact law at each row: no penetration; forces within the friction cone, only where the ground
+  is touched and not left, friction against the sliding; no point on the ground accelerates into
+  it, and none that sticks breaks loose below the limit of its friction. Stops and dry joints alike.
+- impact law at each jump: Newton's restitution on the normal velocity, Coulomb's cone on the
+  impulses, friction against the sliding that is left.
+- energy: the work of motors, dampers, pushes, friction and stops explains its change; an impact
+  never makes any, except by Newton's restitution with friction, where the run has to say so.
+
+Velocities count in kinetic sizes relative to ``|v|`` and what the known forces do in a millisecond,
+forces relative to the size of the known forces. What happens within an interval in which a push
+begins or ends has no row; such intervals are left out and counted.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.sim import EventKind
+from scenes.findings import Findings
+from scenes.mechanics import generalised, rates
+from scenes.record import Rows, excess_over_cone, friction_that_does_not_oppose
+
+Array = NDArray[Any]
+
+BALANCE = 1e-4
+"""Velocity that nothing explains over an interval, relative to that at its ends and what the known
+forces do in it. The integration is a thousand times finer, rows of 1 ms hardly are."""
+JUMP = 1e-6
+"""The same of an impact."""
+LAW = 1e-6
+"""Contact laws, relative to the size of their data."""
+TOUCH = 1e-8
+"""Gap (m, rad) up to which a contact or stop is on its limit."""
+MOVING = 1e-9
+"""Speed (m/s, rad/s) below which nothing slides or leaves."""
+CLOSED, RESTING = 1e-13, 1e-10
+"""Gap and speed up to which a point is held on the ground, and not in a bounce too small to see."""
+DEPTH = 1e-7
+"""Penetration (m, rad)."""
+MOTION = 1e-6
+"""Change of position (m, rad) that the velocity does not explain."""
+ENERGY = 1e-4
+"""Energy that nothing explains over a run, relative to the greatest that is in it."""
+GAIN = 1e-8
+"""Energy that an impact makes without saying so, relative to what there is."""
+TOGETHER = 5e-11
+"""Gap (m) up to which a point takes part in an impact elsewhere."""
+ROW = 1e-3
+"""What the known forces do in this time (s) is a velocity to reckon with, even at rest."""
+INSTANT = 1e-14
+"""Rows and events closer than this (s) are of one time."""
+
+IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.PAINLEVE)
+
+
+def judge_events(run: Any, start: Any = None) -> Findings:
+    """Judge an event-driven run.
+
+    Parameters
+    ----------
+    run : heelstrike.sim.Run
+        Its record.
+    start : State, optional
+        Where it began, before any impact of the first instant.
+    """
+    found = Findings()
+    rows = Rows(run)
+    rows.geometry(found)
+    found.figures["penetration"] = float(max(np.max(-rows.gap, initial=0.0), 0.0))
+    if len(rows.time):
+        _Events(rows, start).judge(found)
+    return found
+
+
+class _Events:
+    def __init__(self, rows: Rows, start: Any) -> None:
+        self.rows, self.start = rows, start
+        time, run = rows.time, rows.run
+        edges = [edge for one in run.pushes for edge in (one.start, one.end)]
+        self.edges = np.array(sorted(edges))
+        acts = [(one.start < time) & (time <= one.end) for one in run.pushes]
+        share = np.stack(acts, axis=1) if acts else np.zeros((len(time), 0))
+        self.pushed = rows.push(share.astype(float))
+        self.known = rows.smooth + self.pushed
+        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
+        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
+        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
+        # One time after the other: first and last row of each instant.
+        new = np.concatenate(([True], np.diff(time) > INSTANT))
+        self.first = np.flatnonzero(new)
+        self.last = np.concatenate((self.first[1:] - 1, [len(time) - 1]))
+        self.instant = time[self.first]
+        self.settled = np.isin(np.arange(len(time)), self.last)
+        """Rows that show what follows their instant, not what went before."""
+
+    def judge(self, found: Findings) -> None:
+        self.rows_in_order(found)
+        self.forces(found)
+        self.impacts(found)
+        self.intervals(found)
+
+    def rows_in_order(self, found: Findings) -> None:
+        back = np.maximum(-np.diff(self.rows.time), 0.0)
+        found.look("time runs back", back, 0.0, self.rows.time)
+
+    # --- Forces at the rows --------------------------------------------------------------------
+
+    def forces(self, found: Findings) -> None:
+        rows, size = self.rows, self.force_size[:, None]
+        time, names = rows.time, rows.contacts
+        if names:
+            weight = np.maximum(rows.metric.weight(rows.jacobian), 1e-300)
+            unit = size / weight[..., 0]
+            speed_unit = weight * self.speed_size[:, None, None] + 1e-9
+            pressed = rows.force[..., 0] / unit
+            found.look("penetration", -rows.gap, DEPTH, time, names)
+            apart = np.minimum(np.abs(rows.gap) / TOUCH * LAW, pressed)
+            found.look("contact: force without touch", apart, LAW, time, names)
+            leaving = np.minimum(np.abs(rows.speed[..., 0]) / speed_unit[..., 0], pressed)
+            found.look("contact: force while it leaves or enters", leaving, LAW, time, names)
+            cone = excess_over_cone(rows.force, rows.high) / (size / weight[..., 1])
+            found.look("friction cone", cone, LAW, time, names)
+            slip = rows.speed[..., 1]
+            slides = np.where(np.abs(slip) > MOVING, slip, 0.0)
+            wrong = friction_that_does_not_oppose(
+                rows.force, slides, rows.low, rows.high, size / weight[..., 1], speed_unit[..., 1]
+            )
+            found.look("friction opposes", wrong, LAW, time, names)
+            recorded = np.abs(rows.run.slip_velocity - slip) / speed_unit[..., 1]
+            recorded = np.where(pressed > LAW, recorded, 0.0)
+            found.look("recorded slip", recorded, LAW, time, names)
+            self.accelerations(found, weight)
+        self.joints(found)
+
+    def accelerations(self, found: Findings, weight: Array) -> None:
+        """No point on the ground may accelerate into it, or slide off below its friction limit."""
+        rows = self.rows
+        rate = rates(rows.jacobian, self.acceleration) + rows.bias_acceleration()
+        unit = weight * self.force_size[:, None, None]
+        bias = np.abs(rows.bias_acceleration())
+        unit = unit + bias
+        still = np.abs(rows.speed) < RESTING
+        # At a corner a point, or a disc too small, has no acceleration of its gap to speak of.
+        plain = ~rows.measured.at_corner & (rows.measured.tied.sum(axis=-1) == 1)
+        on = (np.abs(rows.gap) < CLOSED) & still[..., 0] & plain & self.settled[:, None]
+        into = np.where(on, -rate[..., 0] / unit[..., 0], 0.0)
+        found.look("contact: acceleration into it", into, LAW, rows.time, rows.contacts)
+        pressed = rows.force[..., 0] * weight[..., 0] / self.force_size[:, None]
+        both = np.minimum(np.abs(rate[..., 0]) / unit[..., 0], pressed)
+        both = np.where(on, both, 0.0)
+        found.look("contact: force while it lifts", both, LAW, rows.time, rows.contacts)
+        limit = rows.low * rows.force[..., 0] - np.abs(rows.force[..., 1])
+        slack = limit * weight[..., 1] / self.force_size[:, None]
+        loose = np.minimum(np.abs(rate[..., 1]) / unit[..., 1], slack)
+        loose = np.where(on & still[..., 1] & (pressed > LAW), loose, 0.0)
+        found.look("sticking point slides off", loose, LAW, rows.time, rows.contacts)
+
+    def joints(self, found: Findings) -> None:
+        rows, model, run = self.rows, self.rows.model, self.rows.run
+        weight = rows.metric.joint_weight()
+        size = self.force_size[:, None]
+        time, names = rows.time, rows.joints
+        speed = np.abs(rows.v) / (weight * self.speed_size[:, None] + 1e-9)
+        stop = run.stop_torque * weight / size
+        for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
+            gap = side * (rows.q - limit)
+            found.look(f"{name} stop: beyond it", np.nan_to_num(-gap), DEPTH, time, names)
+            pressed = np.maximum(side * stop, 0.0)
+            apart = np.minimum(np.nan_to_num(np.abs(gap), posinf=1e9) / TOUCH * LAW, pressed)
+            found.look(f"{name} stop: force without touch", apart, LAW, time, names)
+            moving = np.minimum(speed, pressed)
+            found.look(f"{name} stop: force while it moves", moving, LAW, time, names)
+            on = (np.abs(gap) < CLOSED) & (np.abs(rows.v) < RESTING) & self.settled[:, None]
+            into = -side * self.acceleration / (weight * size)
+            into = np.where(on, into, 0.0)
+            found.look(f"{name} stop: acceleration into it", into, LAW, time, names)
+        dry, most = run.friction_torque, model.dry_friction
+        over = (np.abs(dry) - most) * weight / size
+        found.look("dry friction: limit", over, LAW, time, names)
+        lacks = np.abs(dry + most * np.sign(rows.v)) * weight / size
+        lacks = np.where(np.abs(rows.v) > MOVING, lacks, 0.0)
+        found.look("dry friction: opposes", np.minimum(lacks, speed), LAW, time, names)
+        slack = (most - np.abs(dry)) * weight / size
+        loose = np.minimum(np.abs(self.acceleration) / (weight * size), slack)
+        held = (np.abs(rows.v) < RESTING) & (most > 0.0) & self.settled[:, None]
+        found.look("dry friction: holds", np.where(held, loose, 0.0), LAW, time, names)
+
+    # --- Impacts -------------------------------------------------------------------------------
+
+    def impulses(self) -> tuple[dict[int, Array], dict[int, Array], dict[int, int], set[int]]:
+        """Impulses on contacts and joints by the instant in which they act.
+
+        Also how many there are on the busiest contact, and where energy is said to be made.
+        """
+        contact: dict[int, Array] = {}
+        joint: dict[int, Array] = {}
+        most: dict[int, int] = {}
+        gains: set[int] = set()
+        seen: dict[tuple[int, int, int], int] = {}
+        for event in self.rows.run.events:
+            k = int(np.argmin(np.abs(self.instant - event.time)))
+            if event.kind is EventKind.ENERGY_GAIN:
+                gains.add(k)
+            stop = event.kind is EventKind.JOINT_STOP
+            if event.impulse == (0.0, 0.0) or not (stop or event.kind in IMPULSIVE):
+                continue
+            key = (k, int(stop), event.contact)
+            seen[key] = seen.get(key, 0) + 1
+            most[k] = max(most.get(k, 0), seen[key])
+            if stop:
+                model, q = self.rows.model, self.rows.q[self.first[k], event.contact]
+                low, high = model.lower[event.contact], model.upper[event.contact]
+                side = 1.0 if abs(q - low) < abs(q - high) else -1.0
+                joint.setdefault(k, np.zeros(self.rows.tree.size))[event.contact] += (
+                    side * event.impulse[0]
+                )
+            else:
+                contact.setdefault(k, np.zeros((len(self.rows.contacts), 2)))[event.contact] += (
+                    event.impulse
+                )
+        return contact, joint, most, gains
+
+    def impacts(self, found: Findings) -> None:
+        """Jumps between rows of one time, and impulses that have no row before them."""
+        rows = self.rows
+        contact, joint, most, gains = self.impulses()
+        self.kick: dict[int, Array] = {}
+        n, points = rows.tree.size, len(rows.contacts)
+        found.figures["impacts"] = len(set(contact) | set(joint))
+        found.figures["energy gains named"] = len(gains)
+        for k, (a, b) in enumerate(zip(self.first, self.last, strict=True)):
+            p = contact.get(k, np.zeros((points, 2)))
+            s = joint.get(k, np.zeros(n))
+            kicked = generalised(rows.jacobian[a : a + 1], p[None])[0] + s
+            before, q_before = rows.v[a], rows.q[a]
+            if a == b:
+                if not (k == 0 and self.start is not None):
+                    self.kick[k] = kicked
+                    continue
+                before, q_before = self.start.v, self.start.q
+            after = rows.v[b]
+            time = rows.time[a : a + 1]
+            leap = np.abs(rows.q[b] - q_before) / (1.0 + np.abs(q_before))
+            found.look("teleport", leap[None], MOTION, time, rows.joints)
+            one = slice(a, a + 1)
+            matrix = rows.matrix[a]
+            size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
+            left = matrix @ (after - before) - kicked
+            unexplained = rows.metric_of(one).of_force(left[None]) / size
+            found.look("balance of an impact", unexplained, JUMP, time)
+            gained = 0.5 * (after @ matrix @ after - before @ matrix @ before)
+            if k not in gains:
+                found.look("impact makes energy", np.array([gained / size**2]), GAIN, time)
+            if most.get(k, 0) == 1 and b - a <= 1:
+                self.impact_law(found, one, p, s, before, after, size)
+
+    def impact_law(
+        self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array,
+        size: float,
+    ) -> None:  # fmt: skip
+        rows, time, names = self.rows, self.rows.time[one], self.rows.contacts
+        metric = rows.metric_of(one)
+        if names:
+            weight = np.maximum(metric.weight(rows.jacobian[one]), 1e-300)
+            came = rates(rows.jacobian[one], before[None])
+            went = rates(rows.jacobian[one], after[None])
+            unit = size / weight
+            on = (rows.gap[one] <= TOGETHER) & (came[..., 0] <= MOVING)
+            bounce = rows.measured.restitution[one] * np.minimum(came[..., 0], 0.0)
+            # Bounces too short to follow are plastic: their limit is computed instead.
+            brief = np.abs(bounce) < 1e-2
+            least = np.where(brief, np.minimum(-bounce, 0.0), -bounce)
+            over = went[..., 0] - least
+            pressed = p[None, :, 0] / unit[..., 0]
+            into = np.where(on, -over / (weight[..., 0] * size), 0.0)
+            found.look("impact: speed into it", into, LAW, time, names)
+            off = np.minimum(
+                np.where(brief, np.maximum(np.abs(over) + bounce, 0.0), np.abs(over))
+                / (weight[..., 0] * size),
+                pressed,
+            )
+            found.look("impact: other speed than restitution gives", off, LAW, time, names)
+            apart = np.minimum(np.abs(rows.gap[one]) / TOUCH * LAW, pressed)
+            found.look("impact: without touch", apart, LAW, time, names)
+            high, low = rows.high[one], rows.low[one]
+            found.look(
+                "impact: cone", excess_over_cone(p[None], high) / unit[..., 1], LAW, time, names
+            )
+            wrong = friction_that_does_not_oppose(
+                p[None], went[..., 1], low, high, unit[..., 1], weight[..., 1] * size
+            )
+            found.look("impact: friction opposes", wrong, LAW, time, names)
+        weight = metric.joint_weight()
+        pressed = np.abs(s)[None] * weight / size
+        moving = np.minimum(np.abs(after)[None] / (weight * size), pressed)
+        found.look("impact: stop gives way", moving, LAW, time, rows.joints)
+
+    # --- Between the rows ----------------------------------------------------------------------
+
+    def intervals(self, found: Findings) -> None:
+        """Integrate forces, velocities and power from instant to instant."""
+        rows, n = self.rows, self.rows.tree.size
+        kinetic, potential = rows.energy()
+        energy = kinetic + potential
+        power = self.power()
+        values = np.column_stack((self.acceleration, power))
+        eventful = self.eventful()
+        momentum, motion, work, times = [], [], [], []
+        left_out = 0
+        total = 0.0
+        for k in range(len(self.instant) - 1):
+            a, b = self.last[k], self.first[k + 1]
+            begin, end = self.instant[k], self.instant[k + 1]
+            span = end - begin
+            if np.any((self.edges > begin - INSTANT) & (self.edges < end + INSTANT)):
+                left_out += 1
+                continue
+            usable = self.piece(k, eventful)
+            if len(usable) == 0:
+                left_out += 1
+                continue
+            integral, doubt = _integrate(rows.time[usable], values[usable], begin, end)
+            kick = self.kick.get(k + 1)
+            jump = np.zeros(n)
+            if kick is not None and np.any(kick):
+                jump = np.linalg.solve(rows.matrix[b], kick)
+            change = rows.v[b] - rows.v[a] - jump
+            matrix = rows.matrix[a]
+            forced = span * (self.force_size[a] + self.force_size[b])
+            size = _size(matrix, rows.v[a]) + _size(matrix, rows.v[b]) + forced + 1e-12
+            wrong = _size(matrix, change - integral[:n])
+            trust = 2.0 * _size(matrix, doubt[:n])
+            momentum.append(max(wrong - trust, 0.0) / size)
+            # Where it comes to from its velocity at the beginning, as the forces bend it.
+            bent, doubt_q = _integrate(
+                rows.time[usable], values[usable, :n], begin, end, twice=True
+            )
+            leap = np.abs(rows.q[b] - rows.q[a] - span * rows.v[a] - bent)
+            leap -= 2.0 * doubt_q + span * np.abs(change - integral[:n])
+            motion.append(np.maximum(leap, 0.0) / (1.0 + np.abs(rows.q[b])))
+            after = rows.v[b] - jump
+            gained = energy[b] - energy[a]
+            if kick is not None and np.any(kick):
+                gained -= 0.5 * float(kick @ (rows.v[b] + after))
+            missing = gained - integral[n]
+            total += np.sign(missing) * max(abs(missing) - 2.0 * abs(doubt[n]), 0.0)
+            work.append(abs(total))
+            times.append(begin)
+        found.figures["intervals left out"] = left_out
+        if not times:
+            return
+        at = np.array(times)
+        found.look("balance", np.array(momentum), BALANCE, at)
+        found.look("teleport", np.array(motion), MOTION, at, rows.joints)
+        top = max(float(kinetic.max()), float(np.ptp(potential)), 1e-9)
+        found.look("energy", np.array(work) / top, ENERGY, at)
+
+    def power(self) -> Array:
+        """Power of motors, dampers, pushes, contacts, stops and dry friction, (T,)."""
+        rows, model, run = self.rows, self.rows.model, self.rows.run
+        force = self.pushed - model.damping * rows.v + rows.contact_force()
+        force[:, model.actuator_joint] += run.torque
+        return np.sum(force * rows.v, axis=1)
+
+    def eventful(self) -> Array:
+        """Whether contact modes may have changed at each instant."""
+        changes = np.zeros(len(self.instant), dtype=bool)
+        changes |= self.first != self.last
+        for event in self.rows.run.events:
+            near = np.abs(self.instant - event.time) <= INSTANT
+            if np.any(near):
+                changes |= near
+            else:  # it has no row of its own: nothing may be integrated across it
+                changes |= np.abs(self.instant - event.time) < 2e-3
+        return changes
+
+    def piece(self, k: int, eventful: Array) -> Array:
+        """Up to four rows with forces of the smooth piece that holds the interval after instant k.
+
+        After an event only the last row of an instant shows what follows; before one, the first
+        does only if there are two.
+        """
+        low = k
+        while low > 0 and k - low < 2 and not eventful[low] and not self._edge(low - 1):
+            low -= 1
+        high = k + 1
+        end = len(self.instant) - 1
+        while high < end and high - low < 3 and not eventful[high] and not self._edge(high):
+            high += 1
+        while low > 0 and high - low < 3 and not eventful[low] and not self._edge(low - 1):
+            low -= 1
+        usable = [int(self.last[i]) for i in range(low, high)]
+        # In the row before an event modes may be those after it, so that it counts if need be only.
+        two = self.first[high] != self.last[high]
+        if not eventful[high] or (two and len(usable) < 3):
+            usable.append(int(self.first[high]))
+        return np.array(usable)
+
+    def _edge(self, k: int) -> bool:
+        """Whether a push begins or ends between instants k and k + 1."""
+        begin, end = self.instant[k] - INSTANT, self.instant[k + 1] + INSTANT
+        return bool(np.any((self.edges > begin) & (self.edges < end)))
+
+
+def _size(matrix: Array, v: Array) -> float:
+    return float(np.sqrt(max(v @ matrix @ v, 0.0)))
+
+
+def _weights(time: Array, begin: float, end: float, twice: bool) -> Array:
+    """Weights of values at some times in the integral of the polynomial through them.
+
+    Or in that of its integral, if it is to be integrated twice.
+    """
+    unit = max(end - begin, float(np.max(np.abs(time - begin))))
+    part = (end - begin) / unit
+    powers = np.arange(len(time))
+    moments = unit * part ** (powers + 1.0) / (powers + 1.0)
+    if twice:
+        moments *= unit * part / (powers + 2.0)
+    return np.linalg.solve(np.vander((time - begin) / unit, increasing=True).T, moments)
+
+
+def _integrate(
+    time: Array, values: Array, begin: float, end: float, *, twice: bool = False
+) -> tuple[Array, Array]:
+    """Integral of a polynomial through rows, and what the row farthest away does to it."""
+    integral = _weights(time, begin, end, twice) @ values
+    if len(time) == 1:
+        return integral, np.abs(integral)
+    near = np.sort(np.argsort(np.abs(time - 0.5 * (begin + end)))[:-1])
+    fewer = _weights(time[near], begin, end, twice) @ values[near]
+    return integral, np.abs(integral - fewer)

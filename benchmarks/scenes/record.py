@@ -1,0 +1,144 @@
+"""What every judge needs of a record: its numbers, and the mechanics at its rows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenes.findings import Findings
+from scenes.mechanics import Metric, Poses, Tree, generalised, rates
+from scenes.terrain import Terrain
+
+Array = NDArray[Any]
+
+REACH = 0.2
+"""Gaps above this (m) are not compared: a robot in free flight may take any ground for the nearest.
+"""
+SAME_PLACE = 1e-9
+"""Places and gaps (m) agree within this, relative to where the robot is beyond a metre."""
+
+
+class Rows:
+    """The rows of a run with the mechanics of each, by this package alone.
+
+    Parameters
+    ----------
+    run : heelstrike.sim.Run
+        The record. Of the robot only its numbers are read.
+    pull : (T, n) float, optional
+        Generalised forces of the pushes at the rows; a judge knows how its method applies them.
+
+    Attributes
+    ----------
+    q, v, time, gap, normal, force : arrays
+        As recorded.
+    jacobian : (T, nc, 2, n) float
+        Rows (normal, tangent) of the contact points under the recorded normals.
+    measured : Measurement
+        Distances from the centres of the contact discs to the ground.
+    metric : Metric
+        Sizes of velocities and forces.
+    smooth : (T, n) float
+        Generalised force of motors, springs and dampers, less H; pushes are not in it.
+    """
+
+    def __init__(self, run: Any) -> None:
+        model = run.robot.model
+        self.run, self.model = run, model
+        self.time, self.q, self.v = run.time, run.position, run.velocity
+        self.gap, self.normal, self.force = run.gap, run.contact_normal, run.contact_force
+        self.tree = Tree(model)
+        self.poses = Poses(self.tree, self.q)
+        ground = run.ground.model()
+        self.terrain = Terrain(ground.vertices, ground.friction, ground.restitution)
+        self.center = self.poses.points(model.contact_link, model.contact_position)
+        self.measured = self.terrain.measure(self.center)
+        self.point = self.center - model.contact_radius[:, None] * self.normal
+        world = self.poses.jacobian(model.contact_link, self.point)
+        self.jacobian = self.along(world)
+        self.matrix = self.poses.mass_matrix()
+        self.metric = Metric(self.matrix)
+        self.speed = rates(self.jacobian, self.v)
+        self.smooth = -self.poses.bias_force(self.v)
+        self.smooth -= model.damping * self.v + model.stiffness * (self.q - model.rest)
+        self.smooth[:, model.actuator_joint] += run.torque
+        self.low, self.high = self.measured.lowest_friction, self.measured.highest_friction
+        self.contacts = tuple(run.robot.contact_names)
+        self.joints = tuple(run.robot.joint_names)
+
+    def metric_of(self, some: slice) -> Metric:
+        """Sizes at some of the rows only."""
+        return Metric(self.matrix[some])
+
+    def along(self, world: Array) -> Array:
+        """Turn x and z of (T, nc, 2, ...) into normal and tangent."""
+        x, z = world[:, :, 0], world[:, :, 1]
+        shape = (*self.normal.shape[:2],) + (1,) * (world.ndim - 3)
+        nx, nz = self.normal[..., 0].reshape(shape), self.normal[..., 1].reshape(shape)
+        return np.stack((nx * x + nz * z, nz * x - nx * z), axis=2)
+
+    def push(self, share: Array) -> Array:
+        """Generalised force (T, n) of the pushes, each acting with a share (T, pushes)."""
+        total = np.zeros_like(self.v)
+        for i, one in enumerate(self.run.pushes):
+            link, local = one.place(self.run.robot)
+            links = np.array([link])
+            place = self.poses.points(links, np.array([local]))
+            jacobian = self.poses.jacobian(links, place)
+            force = np.broadcast_to(np.array(one.force), (len(self.time), 1, 2))
+            total += share[:, i, None] * generalised(jacobian, force)
+        return total
+
+    def contact_force(self) -> Array:
+        """Generalised force (T, n) of the recorded forces of contacts, stops and dry joints."""
+        pushed = generalised(self.jacobian, self.force)
+        return pushed + self.run.stop_torque + self.run.friction_torque
+
+    def bias_acceleration(self) -> Array:
+        """Accelerations (T, nc, 2) along normal and tangent while the velocity does not change.
+
+        Of the gap, and of the sliding velocity: the centre of a disc moves along its path, while
+        the material point that touches changes. Beside a corner the normal turns with the motion.
+        """
+        link = self.model.contact_link
+        center = self.along(self.poses.bias_acceleration(self.v, link, self.center))
+        jacobian = self.poses.jacobian(link, self.center)
+        moving = self.along(rates(jacobian, self.v))
+        apart = np.abs(self.measured.distance)
+        turning = self.measured.at_corner & (apart > 1e-6)
+        center[..., 0] += np.where(turning, moving[..., 1] ** 2 / np.maximum(apart, 1e-6), 0.0)
+        return center
+
+    def geometry(self, found: Findings) -> None:
+        """Hold what the record says of contact points against their own measure."""
+        size = 1.0 + np.max(np.abs(self.point), axis=-1, initial=0.0)
+        near = np.abs(self.measured.distance) < REACH
+        own = self.measured.distance - self.model.contact_radius
+        differs = np.where(near, np.abs(self.gap - own) / size, 0.0)
+        found.look("recorded gap", differs, SAME_PLACE, self.time, self.contacts)
+        turned = np.where(near, self.measured.disagreement(self.normal), 0.0)
+        found.look("recorded normal", turned, 1e-5, self.time, self.contacts)
+        away = np.linalg.norm(self.point - self.run.contact_point, axis=-1) / size
+        found.look("recorded place", away, SAME_PLACE, self.time, self.contacts)
+
+    def energy(self) -> tuple[Array, Array]:
+        """Kinetic and potential energy (T,)."""
+        kinetic = 0.5 * self.metric.of_velocity(self.v) ** 2
+        return kinetic, self.poses.potential_energy(self.q)
+
+
+def excess_over_cone(force: Array, friction: Array) -> Array:
+    """How far forces (..., 2) pull, or exceed the friction that there is."""
+    return np.maximum(-force[..., 0], np.abs(force[..., 1]) - friction * force[..., 0])
+
+
+def friction_that_does_not_oppose(
+    force: Array, speed: Array, low: Array, high: Array, force_unit: Array, speed_unit: Array
+) -> Array:
+    """How far friction differs from μ λ_n against the sliding, or sliding from zero: the less."""
+    normal = np.maximum(force[..., 0], 0.0)
+    opposing = -np.sign(speed) * force[..., 1]
+    lacks = np.maximum(np.maximum(low * normal - opposing, opposing - high * normal), 0.0)
+    return np.minimum(np.abs(speed) / speed_unit, lacks / force_unit)

@@ -1,0 +1,43 @@
+"""One scene under one method: run, judged and compared with its twins."""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from typing import Any
+
+from heelstrike.errors import HeelstrikeError
+from scenes.methods import Setting
+from scenes.scene import random_scene
+from scenes.twins import compare_twins
+
+TWINS_EVERY = 3
+"""Every so many seeds a scene is compared with its twins, which costs more than the scene."""
+WARM = 1_000_000
+"""Seed of the scene with which a worker compiles a method before any clock runs."""
+
+
+def run_scene(method: str, seed: int, *, twins: bool = True) -> dict[str, Any]:
+    """Run, judge and compare one scene; everything in the result is numbers and text."""
+    begin = time.process_time()
+    scene = random_scene(seed)
+    setting = Setting.of(scene)
+    result: dict[str, Any] = {"method": method, "seed": seed, "kind": scene.kind}
+    try:
+        run = setting.run(method)
+    except HeelstrikeError as error:
+        return result | {"status": "refused", "message": str(error)}
+    result |= {"status": run.status.value, "message": run.message, "rows": len(run.time)}
+    result |= {"end": float(run.time[-1]) if len(run.time) else 0.0}
+    result["simulated_s"] = time.process_time() - begin
+    result |= setting.judge(method, run).as_dict()
+    if twins and run.completed and seed % TWINS_EVERY == 0:
+        result["twins"] = compare_twins(setting, method, run).as_dict()
+    result["seconds"] = time.process_time() - begin
+    return result
+
+
+def prepare(method: str) -> None:
+    """Compile a method, so that no scene has to wait for it."""
+    with suppress(HeelstrikeError):
+        Setting.of(random_scene(WARM)).run(method, duration=0.01)

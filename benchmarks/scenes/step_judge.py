@@ -1,0 +1,247 @@
+"""The laws of time stepping, re-derived step by step from the record.
+
+One row a step is needed (``record_every=1``). With the recorded state (q, v), torques and forces
+λ/h of row k and the state of row k + 1 each scheme promises:
+
+- balance: ``M(q)(v⁺ − v) = h (Γ + passive + pushes − H) + Jᵀλ`` at the old state; the linearly
+  implicit scheme has ``M + hD + h²K`` in the place of M and ``−h K v`` on the right, K and D
+  including the gains of the controller.
+- motion: ``q⁺ = q + h v⁺``; the explicit scheme moves with v, Moreau-Jean with the mean of the two.
+- contact: ``w_n ≥ b ⟂ λ_n ≥ 0`` with w = J v⁺ and b = −gap/h (gap linearised), b = 0 where
+  gap ≤ activation (the paper's), b = −e w_n of before where the gap is foreseen to close
+  (Moreau-Jean); elsewhere λ = 0. The friction cone, and friction of μ λ_n against what slides.
+  Stops are contacts without friction, dry friction of joints a contact with a known normal force.
+- energy: the contact solve takes kinetic energy, but for what b > 0 asks for: λ_n b.
+
+All is measured in kinetic sizes (:class:`scenes.mechanics.Metric`) relative to the size of the
+data of the step, ``S = |v| + |v⁺| + h |known forces|``; the forces of contacts are no part of it,
+so that a huge force proves nothing.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.sim import Scheme
+from scenes.findings import Findings
+from scenes.mechanics import Metric, generalised, rates
+from scenes.record import Rows, excess_over_cone, friction_that_does_not_oppose
+
+Array = NDArray[Any]
+
+BALANCE = 1e-8
+"""Momentum of a step that nothing explains, relative to S."""
+LAW = 1e-7
+"""Contact laws of a step, relative to S. Certificates promise 1e-9 of problems that are scaled
+otherwise."""
+MOTION = 1e-10
+"""Change of position (m, rad) that the velocity does not explain."""
+SINK = 1e-6
+"""Depth (m) in the ground that neither the linearised gap nor the turning of the robot explains."""
+UNDECIDED = 1e-12
+"""A gap (m) this near the edge of a scheme's activation may count either way."""
+
+
+def judge_steps(run: Any, controller: Any = None) -> Findings:
+    """Judge a run of time stepping.
+
+    Parameters
+    ----------
+    run : heelstrike.sim.Run
+        Its record, with every step in it.
+    controller : JointFeedback, optional
+        What controlled it: the linearly implicit scheme takes its gains at the end of the step.
+    """
+    found = Findings()
+    rows = Rows(run)
+    rows.geometry(found)
+    depth = np.max(-rows.gap, initial=0.0)
+    found.figures["penetration"] = float(max(depth, 0.0))
+    if len(rows.time) > 1:
+        _Steps(rows, controller).judge(found)
+    return found
+
+
+class _Steps:
+    def __init__(self, rows: Rows, controller: Any) -> None:
+        run, model = rows.run, rows.model
+        self.rows = rows
+        self.scheme = run.method.scheme
+        self.activation = run.method.activation
+        self.h = float(run.method.step)
+        self.time = rows.time[:-1]
+        pushes = [one.time_within(rows.time, rows.time + self.h) / self.h for one in run.pushes]
+        share = np.stack(pushes, axis=1) if pushes else np.zeros((len(rows.time), 0))
+        self.pushed = rows.push(share)[:-1]
+        known = rows.smooth[:-1] + self.pushed
+        matrix = rows.matrix[:-1]
+        self.before, self.after = rows.v[:-1], rows.v[1:]
+        if self.scheme is Scheme.LINEARLY_IMPLICIT:
+            stiffness, damping = model.stiffness.copy(), model.damping.copy()
+            if controller is not None:
+                stiffness[model.actuator_joint] += controller.kp
+                damping[model.actuator_joint] += controller.kd
+            matrix = matrix + np.diag(self.h * damping + self.h**2 * stiffness)
+            known = known - self.h * stiffness * self.before
+        self.metric = Metric(matrix)
+        self.matrix = matrix
+        self.free = self.before + self.h * self.metric.accelerated(known)
+        self.jacobian = rows.jacobian[:-1]
+        self.impulse = self.h * rows.force[:-1]
+        self.stop, self.dry = self.h * run.stop_torque[:-1], self.h * run.friction_torque[:-1]
+        self.known = known
+        size = self.metric.of_velocity
+        self.size = size(self.before) + size(self.after) + self.h * self.metric.of_force(known)
+        self.size = np.maximum(self.size, 1e-100)
+        self.gap = rows.gap[:-1]
+        self.asked_for = np.zeros(len(self.time))
+        """Energy that the bounds b of the normal velocities ask for."""
+
+    def judge(self, found: Findings) -> None:
+        self.balance(found)
+        self.motion(found)
+        self.contacts(found)
+        self.stops(found)
+        self.dry_joints(found)
+        self.energy(found)
+
+    def balance(self, found: Findings) -> None:
+        momentum = np.einsum("tij,tj->ti", self.matrix, self.after - self.before)
+        acted = generalised(self.jacobian, self.impulse) + self.stop + self.dry
+        left = momentum - self.h * self.known - acted
+        unexplained = self.metric.of_force(left) / self.size
+        found.look("balance", unexplained, BALANCE, self.time)
+
+    def motion(self, found: Findings) -> None:
+        velocity = self.after
+        if self.scheme is Scheme.PAPER_EXPLICIT:
+            velocity = self.before
+        elif self.scheme is Scheme.MOREAU_JEAN:
+            velocity = 0.5 * (self.before + self.after)
+        q = self.rows.q
+        left = np.abs(q[1:] - q[:-1] - self.h * velocity) / (1.0 + np.abs(q[1:]))
+        found.look("teleport", left, MOTION, self.time, self.rows.joints)
+        dt = np.abs(np.diff(self.rows.time) - self.h)
+        found.look("length of a step", dt, 1e-9, self.time)
+
+    def bound(self, gap: Array, before: Array, bounce: Array) -> tuple[Array, Array]:
+        """Least normal velocity that the scheme asks for, -inf where it asks for none.
+
+        The second array tells where rounding decides whether it asks.
+        """
+        if self.scheme in (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT):
+            return -gap / self.h, np.zeros(gap.shape, dtype=bool)
+        foreseen, least = gap, np.zeros_like(gap)
+        if self.scheme is Scheme.MOREAU_JEAN:
+            foreseen, least = gap + 0.5 * self.h * before, -bounce * before
+        near = np.abs(foreseen - self.activation) < UNDECIDED
+        return np.where(foreseen <= self.activation, least, -np.inf), near
+
+    def normals(
+        self, law: str, found: Findings, impulse: Array, speed: Array, weight: Array,
+        least: Array, near: Array, names: tuple[str, ...],
+    ) -> None:  # fmt: skip
+        """Judge ``w ≥ b ⟂ λ ≥ 0``, row by row and place."""
+        size = self.size[:, None]
+        unit_of_speed = np.maximum(weight * size, 1e-300)
+        unit_of_impulse = size / np.maximum(weight, 1e-300)
+        asks = np.isfinite(least)
+        over = np.where(asks, speed - np.where(asks, least, 0.0), 0.0) / unit_of_speed
+        pushes = impulse / unit_of_impulse
+        below = np.where(asks & ~near, -over, 0.0)
+        found.look(f"{law}: speed into it", below, LAW, self.time, names)
+        both = np.where(asks, np.minimum(np.abs(over), pushes), np.where(near, 0.0, pushes))
+        found.look(f"{law}: force without touch", both, LAW, self.time, names)
+        found.look(f"{law}: pull", -pushes, LAW, self.time, names)
+        gain = np.where(asks, np.maximum(least, 0.0), 0.0) * np.maximum(impulse, 0.0)
+        self.asked_for += gain.sum(axis=1)
+
+    def contacts(self, found: Findings) -> None:
+        rows, names = self.rows, self.rows.contacts
+        if not names:
+            return
+        weight = self.metric.weight(self.jacobian)
+        speed = rates(self.jacobian, self.after)
+        before = rates(self.jacobian, self.before)[..., 0]
+        least, near = self.bound(self.gap, before, rows.measured.restitution[:-1])
+        self.normals(
+            "contact",
+            found,
+            self.impulse[..., 0],
+            speed[..., 0],
+            weight[..., 0],
+            least,
+            near,
+            names,
+        )
+        size = self.size[:, None]
+        unit = size / np.maximum(weight[..., 1], 1e-300)
+        low, high = rows.low[:-1], rows.high[:-1]
+        cone = excess_over_cone(self.impulse, high) / unit
+        found.look("friction cone", cone, LAW, self.time, names)
+        speed_unit = np.maximum(weight[..., 1] * size, 1e-300)
+        wrong = friction_that_does_not_oppose(
+            self.impulse, speed[..., 1], low, high, unit, speed_unit
+        )
+        found.look("friction opposes", wrong, LAW, self.time, names)
+        slip = np.abs(rows.run.slip_velocity[:-1] - speed[..., 1]) / speed_unit
+        pressed = self.impulse[..., 0] > 0.0
+        found.look("recorded slip", np.where(pressed, slip, 0.0), LAW, self.time, names)
+        self.sink(found, speed[..., 0])
+
+    def sink(self, found: Findings, speed: Array) -> None:
+        """Penetration that the schemes which bound the gap itself do not allow."""
+        if self.scheme not in (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT):
+            return
+        rows = self.rows
+        moved = np.einsum("tpc,tpc->tp", np.diff(rows.center, axis=0), rows.normal[:-1])
+        turning = moved - self.h * speed
+        deep = -rows.gap[1:] - np.maximum(-turning, 0.0)
+        found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
+
+    def stops(self, found: Findings) -> None:
+        rows, model = self.rows, self.rows.model
+        weight = self.metric.joint_weight()
+        nothing = np.zeros_like(self.stop)
+        for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
+            has = np.isfinite(limit)
+            gap = side * (rows.q[:-1] - np.where(has, limit, -side * 1e9))
+            least, near = self.bound(gap, side * self.before, nothing)
+            self.normals(
+                f"{name} stop", found, np.maximum(side * self.stop, 0.0), side * self.after,
+                weight, least, near, rows.joints,
+            )  # fmt: skip
+
+    def dry_joints(self, found: Findings) -> None:
+        model, names = self.rows.model, self.rows.joints
+        weight = self.metric.joint_weight()
+        most = self.h * model.dry_friction
+        unit = self.size[:, None] / weight
+        found.look("dry friction: limit", (np.abs(self.dry) - most) / unit, LAW, self.time, names)
+        lacks = np.abs(self.dry + most * np.sign(self.after)) / unit
+        slides = np.abs(self.after) / (weight * self.size[:, None])
+        found.look("dry friction: opposes", np.minimum(lacks, slides), LAW, self.time, names)
+
+    def energy(self, found: Findings) -> None:
+        size = self.metric.of_velocity
+        gained = 0.5 * (size(self.after) ** 2 - size(self.free) ** 2)
+        unit = 0.5 * self.size**2
+        unasked = (gained - self.asked_for) / unit
+        found.look("energy made in contact", unasked, LAW, self.time)
+        kinetic, potential = self.rows.energy()
+        top = max(float(kinetic.max()), 1e-12)
+        found.figures["energy asked for"] = float(np.maximum(gained, 0.0).sum() / top)
+        # Work over a step: impulses times the mean velocity, as for an exact jump.
+        mean = 0.5 * (self.before + self.after)
+        model, run = self.rows.model, self.rows.run
+        acted = generalised(self.jacobian, self.impulse) + self.stop + self.dry
+        motors = np.zeros_like(mean)
+        motors[:, model.actuator_joint] = run.torque[:-1]
+        forces = motors + self.pushed - model.damping * self.before
+        work = (acted + self.h * forces) * mean
+        change = np.diff(kinetic + potential) - work.sum(axis=1)
+        drift = float(np.max(np.abs(np.cumsum(change))))
+        found.figures["energy drift"] = drift / max(top, float(np.ptp(potential)))

@@ -1,0 +1,154 @@
+"""Machine code kept on disk: whole and of the right key, or not there at all.
+
+What is in a file is believed only if its digest is right, before anything is made of it: unpickling
+or running damaged bytes would take the process along. Files are written beside their place and
+renamed, so that processes which write the same one, or are killed at it, leave a whole one or none.
+A disk that is full or cannot be written costs time only.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from numba import config
+
+KEY = DIGEST = hashlib.sha256().digest_size
+"""Bytes of a key, and of the digest of what is in a file."""
+
+FORGOTTEN = 3600.0
+"""Age from which a half-written file is one of a killed process, in s."""
+
+_UNFINISHED = ".unfinished"
+
+_said: set[str] = set()
+
+
+class CacheWarning(UserWarning):
+    """Machine code could not be read from disk, or not be kept there; all else is as ever."""
+
+
+def directories(source: Path | None) -> list[Path]:
+    """Return where machine code made from a source file is kept, the best place first.
+
+    This is the directory that ``NUMBA_CACHE_DIR`` names. Else it is beside the source, or in the
+    user's directory for such files if that cannot be written or there is no file.
+
+    Parameters
+    ----------
+    source : Path or None
+        The file; None for what was typed at a prompt.
+    """
+    home = str(source.resolve().parent) if source else "typed"
+    own = f"{Path(home).name}_{hashlib.sha256(home.encode()).hexdigest()[:16]}"
+    settings: Any = config
+    if settings.CACHE_DIR:
+        return [Path(settings.CACHE_DIR) / own]
+    beside = [source.resolve().parent / "__pycache__"] if source else []
+    return [*beside, _user_directory() / "heelstrike" / own]
+
+
+def _user_directory() -> Path:
+    if sys.platform == "win32":
+        named, usual = "LOCALAPPDATA", "~/AppData/Local"
+    elif sys.platform == "darwin":
+        named, usual = "", "~/Library/Caches"
+    else:
+        named, usual = "XDG_CACHE_HOME", "~/.cache"
+    return Path(os.environ.get(named) or os.path.expanduser(usual))  # noqa: PTH111, needs no home
+
+
+def read(places: Sequence[Path], name: str, key: bytes) -> bytes | None:
+    """Return what was kept under a name, or None if that is missing, damaged or of another key."""
+    for place in places:
+        file = place / name
+        try:
+            found = file.read_bytes()
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            _say_damaged(file, error.strerror or str(error))
+            continue
+        if found[:DIGEST] != hashlib.sha256(found[DIGEST:]).digest():
+            _say_damaged(file, "its digest is wrong")
+        elif found[DIGEST : DIGEST + KEY] == key:
+            return found[DIGEST + KEY :]
+    return None
+
+
+def write(places: Sequence[Path], name: str, key: bytes, code: bytes) -> None:
+    """Keep code under a name, in the first place that takes it; nowhere if none is given."""
+    content = key + code
+    content = hashlib.sha256(content).digest() + content
+
+    def keep(unfinished: Path) -> None:
+        unfinished.write_bytes(content)
+        unfinished.replace(unfinished.parent / name)
+
+    _anywhere(places, keep)
+
+
+def can_write(places: Sequence[Path]) -> bool:
+    """Whether there is a place that files can be written to; says so if there is none."""
+    return _anywhere(places, lambda unfinished: unfinished.write_bytes(b"?"))
+
+
+def _anywhere(places: Sequence[Path], use: Callable[[Path], Any]) -> bool:
+    """Use a new file in the first place where that goes, and clear up; whether it went anywhere."""
+    failures = []
+    for place in places:
+        unfinished = place / f"{uuid.uuid4().hex}{_UNFINISHED}"
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            try:
+                use(unfinished)
+            finally:
+                unfinished.unlink(missing_ok=True)
+            _clear(place)
+        except OSError as error:
+            failures.append(f"{place}: {error.strerror or error}")
+        else:
+            return True
+    if failures:
+        _say_nowhere(failures)
+    return False
+
+
+def _clear(place: Path) -> None:
+    """Remove what killed processes left."""
+    for file in place.glob(f"*{_UNFINISHED}"):
+        try:
+            if time.time() - file.stat().st_mtime > FORGOTTEN:
+                file.unlink()
+        except OSError:  # somebody else was quicker
+            continue
+
+
+def _say_damaged(file: Path, reason: str) -> None:
+    _say(
+        "damaged",
+        f"Compiled code kept in {file} cannot be used: {reason}. It is compiled anew and written "
+        "again. Should this come back, look after the disk.",
+    )
+
+
+def _say_nowhere(failures: Sequence[str]) -> None:
+    _say(
+        "nowhere",
+        f"Compiled code cannot be kept ({'; '.join(failures)}), so it will be compiled anew at the "
+        "next start, too. Set NUMBA_CACHE_DIR to a directory with space that you can write to.",
+    )
+
+
+def _say(what: str, message: str) -> None:
+    """Warn, once in a process: what has befallen one file may have befallen them all."""
+    if what not in _said:
+        _said.add(what)
+        warnings.warn(message, CacheWarning, stacklevel=2)

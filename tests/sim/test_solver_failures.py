@@ -1,0 +1,69 @@
+"""A contact problem that a solver fails at: the next one tries, and without any the run ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import heelstrike as hs
+from heelstrike.robot import read_mjcf
+from heelstrike.sim import RunStatus
+
+SOLVERS = ("lemke", "fischer_burmeister", "gauss_seidel")
+
+# Speeds (m/s, rad/s) at which bravo7, its soles on the ground, makes Gauss-Seidel try the same
+# modes again and again. They are found by drawing; within 1e-3 of them it happens as well.
+CIRCLING = [-1.0, -0.6, -1.3, -2.3, -10.0, -10.0, 5.9, -3.9, -3.2]
+
+# A ball on the ground whose joint wants it five centimetres deeper.
+PRESSED = """
+<mujoco><worldbody><body name="ball" pos="0 0 0.1">
+  <joint name="shaft" type="slide" axis="0 0 1" range="-1 -0.05"/><geom size="0.1" mass="2"/>
+</body></worldbody></mujoco>
+"""
+
+
+def test_what_one_solver_cannot_another_does_and_the_run_counts_it() -> None:
+    robot = hs.load_robot("bravo7")
+    state = hs.State(robot.model.reference.copy(), np.array(CIRCLING))
+
+    def run(solver: str) -> hs.Run:
+        method = hs.TimeStepping(step=1e-3, solver=solver)
+        ground = hs.Ground(friction=0.3)
+        return hs.simulate(robot, state=state, duration=1e-3, method=method, ground=ground)
+
+    alone, helped = run("lemke"), run("gauss_seidel")
+    assert (alone.solver.fallbacks, alone.solver.failures) == (0, 0)
+    assert (helped.solver.name, helped.solver.fallbacks, helped.solver.failures) == (
+        "gauss_seidel",
+        1,
+        0,
+    )
+    for found in (alone, helped):
+        assert found.completed
+        assert found.residual.max() <= 1e-9
+    assert helped.contact_force[0, :, 0].max() > 0.0
+    np.testing.assert_allclose(helped.velocity[-1], alone.velocity[-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_without_a_solution_the_run_ends_and_says_so(solver: str) -> None:
+    """The ground pushes up, the stop down; no impulse satisfies both. It moves at 50 m/s or not."""
+    start = hs.State(np.zeros(1), np.zeros(1))
+    run = hs.simulate(
+        read_mjcf(PRESSED, name="pressed"),
+        state=start,
+        duration=0.1,
+        method=hs.TimeStepping(step=1e-3, solver=solver),
+    )
+    assert run.status is RunStatus.SOLVER_FAILED
+    assert "no contact solver could certify a solution at t = 0 s" in run.message
+    assert (run.solver.solves, run.solver.fallbacks, run.solver.failures) == (1, 3, 1)
+    # What there was is kept; the step that could not be is not in it.
+    assert run.steps == 0
+    np.testing.assert_array_equal(run.position, [start.q])
+    # The residuals say how far off the best answer was, on its row and in the run's worst.
+    worst = run.residual[0].max()
+    assert worst > 1e-2
+    assert f"{worst:g}" in run.message
+    assert run.certificates.non_penetration == worst
