@@ -42,8 +42,8 @@ def _call(number: int, arguments: tuple[Any, ...]) -> Any:
     return _by_number[int(number)](*arguments)
 
 
-def _compiled_for(signature: Any, function: Any, *, address: bool = False) -> Any:
-    del signature, address
+def _compiled_for(signature: Any, function: Any, **options: Any) -> Any:
+    del signature, options
     return _twin(function)
 
 
@@ -64,9 +64,8 @@ separate_kernel.SeparateKernel.begin = lambda _: None  # type: ignore[method-ass
 separate_kernel.SeparateKernel.finish = _finish  # type: ignore[method-assign]
 separate_kernel.call_at = _call
 
-from heelstrike.dynamics import machine_code, straight_line  # noqa: E402
+from heelstrike.dynamics import straight_line  # noqa: E402
 
-machine_code.can_fuse = lambda: True
 straight_line.play = _call
 
 from heelstrike.contact import elimination  # noqa: E402
@@ -91,7 +90,7 @@ from heelstrike.sim import programs  # noqa: E402
 
 def _programs(model: Any, points: Sequence[int]) -> np.ndarray:
     found = np.zeros(len(programs.KERNELS), dtype=np.int64)
-    if 0 < len(model.parent) <= programs.MOST_COORDINATES and programs.can_fuse():
+    if 0 < len(model.parent) <= programs.MOST_COORDINATES:
         count = len(programs.KERNELS) if len(points) > 0 else programs.DELASSUS
         found[:count] = [_number(kernel) for kernel in programs.KERNELS[:count]]
     return found
