@@ -8,6 +8,7 @@ kept here. A step of a biped takes some ten milliseconds, and an index out of ra
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -85,7 +86,14 @@ def _eliminations() -> tuple[int, ...]:
 
 elimination._programs = _eliminations
 
-from heelstrike.sim import programs  # noqa: E402
+from heelstrike.sim import guard, programs  # noqa: E402
+
+
+def _word_at(array: np.ndarray, place: int) -> int:
+    return ctypes.c_int64.from_address(array.ctypes.data + 8 * int(place)).value
+
+
+guard.word_at = _word_at
 
 
 def _programs(model: Any, points: Sequence[int]) -> np.ndarray:
