@@ -3,7 +3,7 @@
 A pytest plugin for the mutation campaign (``-p plain_kernels``). It must be loaded before anything
 of heelstrike is. Loops, kernels compiled apart and straight-line programs become the twins of
 :func:`heelstrike.compilation.uncompiled`; in place of addresses stand numbers under which they are
-kept here. A step of a biped takes some ten milliseconds, and an index out of range is an error.
+kept here. A step of a biped takes a millisecond or more, and an index out of range is an error.
 """
 
 from __future__ import annotations
