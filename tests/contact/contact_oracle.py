@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -66,8 +67,10 @@ def effort(delassus: Floats, free: Floats, impulse: Floats) -> float:
 def residual(delassus: Floats, free: Floats, friction: Floats, impulse: Floats) -> float:
     """Largest relative violation of the contact laws, written down a second time and plainly.
 
-    The velocities are exact, and everything is set against the size of the data.
+    Velocities and cones are exact, and everything is set against the size of the data.
     """
+    if not all(np.all(np.isfinite(values)) for values in (delassus, free, friction, impulse)):
+        return np.inf
     velocity = exact_velocity(delassus, free, impulse)
     beta = size_of_data(delassus, free)
     root = np.sqrt(np.diag(delassus))
@@ -95,9 +98,10 @@ def residual(delassus: Floats, free: Floats, friction: Floats, impulse: Floats) 
         else:
             size = mu * abs(ln) + abs(lt)
             unit = 1.0 / size if size > 0 else 0.0
-        excess = abs(lt) - mu * ln
+        limit = Fraction(float(mu)) * Fraction(float(ln))
+        excess = float(abs(Fraction(float(lt))) - limit)
         worst = max(worst, excess * unit if excess > 0.0 else 0.0)
-        lacking = mu * ln + lt if wt > 0 else mu * ln - lt
+        lacking = float(limit + Fraction(float(lt) if wt > 0 else -float(lt)))
         worst = max(worst, min(abs(wt), lacking * unit) if lacking > 0.0 and wt else 0.0)
     return float(worst)
 

@@ -7,6 +7,7 @@ so that the size of the data is β = 1/√0.5, velocities count in m/s and impul
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from hypothesis import strategies as st
 from heelstrike.contact import SolveStatus, solve_contact, solve_lcp
 from heelstrike.contact.certificate import certify, velocity_error
 from heelstrike.contact.search import contact_workspace
-from heelstrike.contact.workspace import FLOOR, ROUNDING, SETTINGS, SLOPE
+from heelstrike.contact.workspace import FLOOR, ROUNDING, SETTINGS, SKEWED, SLOPE
 
 SOLVERS = ["lemke", "fischer_burmeister", "gauss_seidel"]
 BLOCK = 0.5 * np.eye(2)
@@ -44,12 +45,14 @@ def verdict(
     *,
     slope: float = 0.0,
     floor: float = 0.0,
+    skewed: bool = False,
 ) -> Verdict:
     G, b, x = (np.array(values, dtype=float) for values in (delassus, free, impulse))
     mu = np.array(friction, dtype=float)
     work = contact_workspace(mu.size)
     work.vectors[SLOPE, : mu.size] = slope
     work.vectors[SETTINGS, FLOOR] = floor
+    work.vectors[SETTINGS, SKEWED] = float(skewed)
     velocity, found = np.zeros(b.size), np.zeros(3)
     worst = certify(mu.size, G, b, mu, x, velocity, found, work)
     error = velocity_error(worst, mu, work)
@@ -141,6 +144,63 @@ class TestWrongAnswers:
         assert wrong.penetration == pytest.approx(1e-6 / unit)
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", range(4))
+def test_data_that_are_no_numbers_are_never_certified(bad: float, place: int) -> None:
+    """A contact that leaves needs no impulse, and yet nothing is known of it."""
+    data = [BLOCK.copy(), np.array([1.0, 0.0]), np.array([0.5]), np.zeros(2)]
+    data[place].flat[0] = bad
+    assert not verdict(*data).worst <= 1e-9
+
+
+class TestGeneralMatrices:
+    """Of a general complementarity problem the diagonal may say little."""
+
+    def test_a_tiny_diagonal_makes_no_large_unit(self) -> None:
+        """By its diagonal the second row would count in units of 1e-10, its datum as 5e9."""
+        for diagonal in (1e-20, 1e-30, 0.0):
+            M = [[1.0, -1.0], [-1.0, diagonal]]
+            for solver in SOLVERS:
+                assert not solve_lcp(M, [-1.0, 0.5], solver=solver).certificate.valid
+
+    def test_weight_is_the_largest_entry_that_the_diagonal_does_not_explain(self) -> None:
+        """w = (−3, 0), and both rows weigh 4: β = 3/2, so that the first misses by one unit."""
+        M = np.kron([[1.0, 4.0], [0.0, 1.0]], np.diag([1.0, 0.0]))
+        wrong = verdict(M, [-3.0, 0.0, 0.0, 0.0], [0.0, 0.0], np.zeros(4), skewed=True)
+        assert wrong.penetration == pytest.approx(1.0)
+        wrong = verdict(M, [-3.0, 0.0, 6.0, 0.0], [0.0, 0.0], np.zeros(4), skewed=True)
+        assert wrong.penetration == pytest.approx(0.5)
+
+    def test_numbers_whose_products_overflow(self) -> None:
+        M = [[1e305, -1e305], [-1e305, 1e305]]
+        for solver in SOLVERS:
+            assert not solve_lcp(M, [-1.0, -1.0], solver=solver).certificate.valid
+
+
+@pytest.mark.parametrize("mass", [1e-300, 1e-150, 1.0, 1e150, 1e300])
+@pytest.mark.parametrize("speed", [1e-320, 1e-150, 1.0, 1e150, 1e300])
+def test_units_as_small_or_large_as_numbers_go(mass: float, speed: float) -> None:
+    """The impulse that stops a mass, unless it cannot be written down."""
+    solution = solve_contact(np.eye(2) / mass, [-speed, 0.0], 0.5)
+    with np.errstate(over="ignore"):
+        impulse = mass * speed
+    if 1e-290 < impulse < 1e290:
+        assert solution.certificate.valid
+        assert solution.impulse[0, 0] == pytest.approx(impulse)
+    elif not impulse < np.inf:
+        assert solution.certificate.status is SolveStatus.UNDECIDABLE
+
+
+def test_floor_of_a_solve() -> None:
+    """Two walls that close in at 1e-12 m/s: no impulse helps, and nobody minds below 1e-3 m/s."""
+    free = [-1e-12, 0.0, -1e-12, 0.0]
+    assert not solve_contact(WALLS, free, 0.0).certificate.valid
+    solution = solve_contact(WALLS, free, 0.0, floor=1e-2)
+    assert solution.certificate.valid
+    assert solution.certificate.penetration == pytest.approx(1e-10, rel=1e-6)
+    assert not solve_contact(WALLS, [-1e-2, 0.0, -1e-2, 0.0], 0.0, floor=1e-2).certificate.valid
+
+
 class TestHugeImpulses:
     """Two walls that face each other: equal impulses of any size cancel."""
 
@@ -157,6 +217,17 @@ class TestHugeImpulses:
         assert right.penetration == right.cone == right.complementarity == 0.0
         assert right.rounding < 1e-12
         assert right.velocity.tolist() == [0.0, 0.0, 0.0, 0.0]
+
+
+def test_friction_at_the_edge_of_a_huge_cone() -> None:
+    """0.3 · 1 000 001 996 N s is no number: what it is rounded to misses the cone by 2.3e-8 N s."""
+    corner = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    force = 1000001996.0
+    impulse = [force, 0.3 * force, force - 1.0, 0.3 * force]
+    found = verdict(corner @ corner.T, [-1.0, 0.0, 1.0, 0.0], [0.3, 0.5], impulse)
+    excess = float(Fraction(0.3 * force) - Fraction(0.3) * Fraction(force))
+    assert excess > 1e-8
+    assert found.cone == pytest.approx(excess, rel=1e-6)
 
 
 def test_without_a_solution_nothing_is_certified() -> None:
@@ -262,7 +333,7 @@ def test_hard_problems_are_certified_if_and_only_if_they_are_solved(seed: int, s
 def test_tolerance_and_floor_must_make_sense() -> None:
     from heelstrike.errors import ContactProblemError
 
-    for options in ({"tolerance": 0.0}, {"floor": -1.0}, {"floor": np.nan}):
+    for options in ({"tolerance": 0.0}, {"tolerance": np.inf}, {"floor": -1.0}, {"floor": np.nan}):
         with pytest.raises(ContactProblemError, match=next(iter(options))):
             solve_contact(BLOCK, [-1.0, 0.0], 0.5, **options)
         with pytest.raises(ContactProblemError, match=next(iter(options))):

@@ -50,9 +50,9 @@ class Certificate:
     ``sqrt(G_ii) beta`` and its impulse against ``beta / sqrt(G_ii)``, where ``beta``, the size of
     the data, is the largest ``|b_j| / sqrt(G_jj)``, or the floor if that is larger.
 
-    A certificate proves this much: there is an impulse, within the residuals of the reported one,
-    that solves exactly, without any residual, the problem whose free velocities differ from the
-    given ones by at most ``velocity_error``.
+    A certificate proves this much: there is an impulse close to the reported one that solves
+    exactly, without any residual, the problem whose free velocities differ from the given ones by
+    at most ``velocity_error``.
 
     Attributes
     ----------
@@ -78,7 +78,8 @@ class Certificate:
         What the residuals, rounding included, had to meet.
     velocity_error : (nc, 2) float
         How far the contact velocities may be from a solution's, in the unit of the free velocity
-        (m/s, or m/s²): the bound above, for each row.
+        (m/s, or m/s²): the bound above, for each row. Infinite if the residuals are no smaller
+        than the data.
     """
 
     status: SolveStatus
@@ -106,7 +107,8 @@ class Certificate:
         return (
             f"{self.solver.value}: {self.status.text} (complementarity "
             f"{self.complementarity:.1e}, cone {self.cone:.1e}, penetration "
-            f"{self.penetration:.1e}, {self.iterations} iterations, {self.fallbacks} fallbacks)"
+            f"{self.penetration:.1e}, rounding {self.rounding:.1e}, {self.iterations} iterations, "
+            f"{self.fallbacks} fallbacks)"
         )
 
 
@@ -133,7 +135,8 @@ def certify(
     settings, root, slope = work.vectors[SETTINGS], work.vectors[ROOT], work.vectors[SLOPE]
     unit = weigh(count, delassus, free, impulse, work)
     rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + settings[EFFORT])
-    if rounding <= VISIBLE and settings[SKEWED] == 0.0:
+    sharply = rounding > VISIBLE
+    if not sharply:
         sum_velocities(count, delassus, free, impulse, velocity)
     else:
         rounding = sum_velocities_sharply(count, delassus, free, impulse, velocity, unit, work)
@@ -144,14 +147,16 @@ def certify(
 
     complementarity = 0.0
     cone = 0.0
-    # Impulses without any cause in the data; NaN or infinite.
-    penetration = 0.0 if settings[EFFORT] + rounding < math.inf else math.inf
+    penetration = 0.0
+    nothing = 0.0 * unit  # and stays nothing unless a number is infinite or none
     for contact in range(count):
         normal = 2 * contact
         tangent = normal + 1
         normal_impulse = impulse[normal]
         tangent_impulse = impulse[tangent]
         limit = friction[contact] * normal_impulse
+        beyond = product_error(friction[contact], normal_impulse, limit) if sharply else 0.0
+        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (limit + beyond)
 
         speed = relative_speed(velocity[normal], root[normal], inverse)
         force_scale = root[normal] * inverse
@@ -170,13 +175,18 @@ def certify(
         else:
             both = abs(limit) + abs(tangent_impulse)
             force_scale = 1.0 / both if both > 0.0 else 0.0
+        upper = (limit - tangent_impulse) + beyond  # what friction lacks to either edge
+        lower = (limit + tangent_impulse) + beyond
         if slope[contact] != 0.0:
-            cone = max(cone, abs(tangent_impulse - slope[contact] * normal_impulse) * force_scale)
+            cone = max(cone, abs(upper if slope[contact] > 0.0 else lower) * force_scale)
             continue
-        cone = max(cone, (abs(tangent_impulse) - limit) * force_scale)
+        cone = max(cone, -min(upper, lower) * force_scale)
         speed = relative_speed(velocity[tangent], root[tangent], inverse)
-        complementarity = max(complementarity, min(speed, (limit + tangent_impulse) * force_scale))
-        complementarity = max(complementarity, min(-speed, (limit - tangent_impulse) * force_scale))
+        complementarity = max(complementarity, min(speed, lower * force_scale))
+        complementarity = max(complementarity, min(-speed, upper * force_scale))
+    # Impulses without any cause in the data count as much as numbers that are none.
+    if nothing != 0.0 or not settings[EFFORT] + rounding < math.inf:
+        penetration = math.inf
     residual[0] = complementarity
     residual[1] = cone
     residual[2] = penetration
@@ -193,9 +203,8 @@ def weigh(
     effort = 0.0
     for i in range(2 * count):
         weight = delassus[i, i]
-        if settings[SKEWED] != 0.0 and not weight > 0.0:
-            for j in range(2 * count):
-                weight = max(weight, max(abs(delassus[i, j]), abs(delassus[j, i])))
+        if settings[SKEWED] != 0.0:
+            weight = general_weight(2 * count, i, delassus)
         root[i] = math.sqrt(weight) if weight > 0.0 else 0.0
         if weight > 0.0:
             unit = max(unit, abs(free[i]) / root[i])
@@ -204,6 +213,21 @@ def weigh(
         effort = effort / unit if unit > 0.0 else math.inf
     settings[EFFORT] = effort
     return unit
+
+
+@kernel
+def general_weight(size: int, row: int, matrix: Floats) -> float:
+    """Weight of a row of any matrix: the least that keeps ``|M_ij| <= sqrt(weight_i weight_j)``.
+
+    That of a semidefinite matrix is its diagonal.
+    """
+    diagonal = max(matrix[row, row], 0.0)
+    weight = diagonal
+    for j in range(size):
+        entry = max(abs(matrix[row, j]), abs(matrix[j, row]))
+        if entry > math.sqrt(diagonal) * math.sqrt(max(matrix[j, j], 0.0)):
+            weight = max(weight, entry)
+    return weight
 
 
 @kernel
@@ -301,7 +325,7 @@ def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Fl
     root = work.vectors[ROOT, : 2 * friction.size]
     lever = np.zeros(friction.size)
     np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
-    if not worst < math.inf:
+    if not worst < 1.0:
         return np.full((friction.size, 2), math.inf)
     moved = worst * (1.0 + np.sum(2.0 + lever))
     bound: Floats = (moved * work.vectors[SETTINGS, UNIT] * root).reshape(friction.size, 2)

@@ -241,18 +241,31 @@ def run_solvers(
     of its diagonal entries.
     """
     count = friction.size
+    matrix, matrix_shift = _near_one(delassus, even=True)
+    offset, offset_shift = _near_one(free)
     work = contact_workspace(count)
     work.vectors[SETTINGS, TOLERANCE] = tolerance
-    work.vectors[SETTINGS, FLOOR] = floor
+    work.vectors[SETTINGS, FLOOR] = np.ldexp(floor, offset_shift - matrix_shift // 2)
     work.vectors[SETTINGS, SKEWED] = 0.0 if semidefinite else 1.0
     impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
-    status = solve_contact_kernel(
-        count, delassus, free, friction, order, mode, impulse, velocity, residual, work
+    status = SolveStatus(
+        solve_contact_kernel(
+            count, matrix, offset, friction, order, mode, impulse, velocity, residual, work
+        )
     )
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.
-    worst = certify(count, delassus, free, friction, impulse, velocity, residual, work)
+    worst = certify(count, matrix, offset, friction, impulse, velocity, residual, work)
+    error = velocity_error(worst, friction, work)
+    with np.errstate(over="ignore"):
+        impulse = np.ldexp(impulse, matrix_shift - offset_shift)
+        velocity = np.ldexp(velocity, -offset_shift)
+        error = np.ldexp(error, -offset_shift)
+    if not (np.all(np.isfinite(impulse)) and np.all(np.isfinite(velocity))):
+        # It cannot be written down in the units it is asked for.
+        impulse, velocity, residual[2] = np.zeros(2 * count), free.copy(), np.inf
+        status = SolveStatus.UNDECIDABLE
     certificate = Certificate(
-        status=SolveStatus(status),
+        status=status,
         solver=Solver.from_code(work.counters[SUCCEEDED]),
         iterations=int(work.counters[ITERATIONS]),
         fallbacks=int(work.counters[LAST_FALLBACKS]),
@@ -261,9 +274,21 @@ def run_solvers(
         penetration=float(residual[2]),
         rounding=float(work.vectors[SETTINGS, ROUNDING]),
         tolerance=float(tolerance),
-        velocity_error=velocity_error(worst, friction, work),
+        velocity_error=error,
     )
     return impulse, velocity, certificate
+
+
+def _near_one(values: Floats, *, even: bool = False) -> tuple[Floats, int]:
+    """Multiply numbers by the power of two that brings the largest near one; return its exponent.
+
+    It rounds nothing, and no product of such numbers overflows.
+    """
+    largest = float(np.max(np.abs(values), initial=0.0))
+    shift = -int(np.frexp(largest)[1]) if largest > 0.0 else 0
+    if even:
+        shift -= shift % 2
+    return np.ldexp(values, shift), shift
 
 
 def _may_be_semidefinite(matrix: Floats) -> bool:
@@ -278,10 +303,10 @@ def check_accuracy(tolerance: float, floor: float) -> None:
     Raises
     ------
     ContactProblemError
-        If the tolerance is not positive or the floor is negative or not a number.
+        If the tolerance is not between 0 and 1, or the floor is negative or not a number.
     """
-    if not tolerance > 0.0:
-        raise ContactProblemError(f"tolerance must be positive; got {tolerance}")
+    if not 0.0 < tolerance < 1.0:
+        raise ContactProblemError(f"tolerance must be between 0 and 1; got {tolerance}")
     if not 0.0 <= floor < np.inf:
         raise ContactProblemError(f"floor must be a number ≥ 0; got {floor}")
 

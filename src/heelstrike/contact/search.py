@@ -226,7 +226,6 @@ def try_solvers(
 
     status = UNCERTIFIED
     best = math.inf
-    doubtful = False
     with_fallbacks = order.shape[0] > 1
     for attempt in range(-1, order.shape[0] + (1 if with_fallbacks else 0)):
         solver = WARM_START
@@ -259,13 +258,14 @@ def try_solvers(
                 if call == 0:
                     begin_combinations(count, mode, best, work)
                 proposing = next_combination(count, work)
+                if not proposing:
+                    break
             call += 1
             if attempt >= 0 and stick_or_open(count, delassus, free, friction, clean, work):
                 keep(count, mode, impulse, velocity, residual, work)
                 counters[SUCCEEDED] = solver
                 return SOLVED
             worst = evaluate(count, delassus, free, friction, work)
-            doubtful = doubtful or is_doubtful(count, worst, work)
             if solver == COMBINATIONS:
                 note_residual(count, worst, work)
             latest = worst < best
@@ -309,7 +309,10 @@ def try_solvers(
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         counters[FAILURES] += 1
-        if doubtful or (with_fallbacks and nearly_singular(unknowns, delassus, work)):
+        worst = certify(count, delassus, free, friction, impulse, velocity, residual, work)
+        if is_doubtful(count, worst, work) or (
+            with_fallbacks and nearly_singular(unknowns, delassus, work)
+        ):
             status = UNDECIDABLE
     elif attempt < 0:
         counters[SHORTCUTS] += 1
