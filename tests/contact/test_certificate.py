@@ -246,7 +246,7 @@ def test_without_a_solution_nothing_is_certified() -> None:
 
 
 def test_linear_complementarity_without_a_solution() -> None:
-    """w₁ + w₂ = −1 + 1e-17 (z₁ + z₂): for this one would need 1e17."""
+    """w₁ + w₂ = −1 whatever z is."""
     M = np.array([[1.0, -1.0], [-1.0, 1.0]])
     for solver in SOLVERS:
         assert not solve_lcp(M, [-1.0, 0.0], solver=solver).certificate.valid

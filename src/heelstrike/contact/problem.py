@@ -176,7 +176,7 @@ def solve_contact(
         the smallest velocities are solved as sharply as large ones.
     fallback : bool
         Whether the other solvers are tried, in the order Lemke, Fischer-Burmeister,
-        Gauss-Seidel, when the first fails.
+        Gauss-Seidel, when the first fails, and in the end combinations of contact modes.
 
     Returns
     -------
@@ -282,7 +282,7 @@ def run_solvers(
 def _near_one(values: Floats, *, even: bool = False) -> tuple[Floats, int]:
     """Multiply numbers by the power of two that brings the largest near one; return its exponent.
 
-    It rounds nothing, and no product of such numbers overflows.
+    No product of such numbers overflows, and none is rounded that is above 1e-290 of the largest.
     """
     largest = float(np.max(np.abs(values), initial=0.0))
     shift = -int(np.frexp(largest)[1]) if largest > 0.0 else 0
