@@ -16,7 +16,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c c
 
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile
 BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
-SAMPLE := tests/test_plain_code.py tests/dynamics/test_straight_line.py tests/contact \
+SAMPLE := tests/compiler/test_plain_code.py tests/compiler/test_straight_line.py tests/contact \
 	tests/sim/test_contact_geometry.py tests/experiments/test_paper.py
 
 .DEFAULT_GOAL := help

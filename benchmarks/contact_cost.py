@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from heelstrike import load_robot
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.search import contact_workspace
+from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import SHORTCUTS
 from heelstrike.dynamics import bias_force, mass_matrix, point_jacobian
 

@@ -84,11 +84,11 @@ def prepare(folder: Path) -> None:
 def count(folder: Path, switch: Any) -> None:
     """Run the scenarios, counting (or, without a switch, only compiling)."""
     from heelstrike import Ground, State, load_robot
+    from heelstrike.compiler.separate_kernel import SeparateKernel
     from heelstrike.experiments.benchmark.scenarios import FRICTION
-    from heelstrike.separate_kernel import SeparateKernel
     from heelstrike.sim import CompiledController
+    from heelstrike.sim.controller.guard import guarded
     from heelstrike.sim.engine import PAUSED
-    from heelstrike.sim.guard import guarded
     from heelstrike.sim.simulation import compiled_form, prepared
 
     for file in sorted(folder.glob("scenario*.npz")):

@@ -259,7 +259,8 @@ def work(reader: str, first: int, directory: Path) -> None:
     import mujoco
 
     from heelstrike.errors import RobotError
-    from heelstrike.robot import inspect_robot, load_robot, mujoco_file
+    from heelstrike.robot import inspect_robot, load_robot
+    from heelstrike.robot.files import mujoco_file
 
     texts = seeds(directory)
     mujoco_file.try_apart = lambda *_: None  # this process is already apart

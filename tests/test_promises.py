@@ -22,9 +22,9 @@ import robot_cases
 from heelstrike.cli.bench import Part
 from heelstrike.cli.main import app
 from heelstrike.cli.walk import walk
+from heelstrike.compiler.straight_line import Recording
+from heelstrike.compiler.tape import ADD, COSINE, DIVIDE, MULTIPLY, NEGATE, READ, SINE, SUBTRACT
 from heelstrike.dynamics.kernels import state_equations
-from heelstrike.dynamics.straight_line import Recording
-from heelstrike.dynamics.tape import ADD, COSINE, DIVIDE, MULTIPLY, NEGATE, READ, SINE, SUBTRACT
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot import builtin_robots, load_robot
 

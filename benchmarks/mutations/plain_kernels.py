@@ -2,8 +2,9 @@
 
 A pytest plugin for the mutation campaign (``-p plain_kernels``). It must be loaded before anything
 of heelstrike is. Loops, kernels compiled apart and straight-line programs become the twins of
-:func:`heelstrike.compilation.uncompiled`; in place of addresses stand numbers under which they are
-kept here. A step of a biped takes a millisecond or more, and an index out of range is an error.
+:func:`heelstrike.compiler.compilation.uncompiled`; in place of addresses stand numbers under which
+they are kept here. A step of a biped takes a millisecond or more, and an index out of range is an
+error.
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-import heelstrike.compilation as compilation
+import heelstrike.compiler.compilation as compilation
 
-if "heelstrike.separate_kernel" in __import__("sys").modules:
+if "heelstrike.compiler.separate_kernel" in __import__("sys").modules:
     raise RuntimeError("load plain_kernels before heelstrike: pytest -p plain_kernels")
 
 _by_number: list[Callable[..., Any]] = [lambda *_: None]
@@ -65,11 +66,11 @@ separate_kernel.SeparateKernel.begin = lambda _: None  # type: ignore[method-ass
 separate_kernel.SeparateKernel.finish = _finish  # type: ignore[method-assign]
 separate_kernel.call_at = _call
 
-from heelstrike.dynamics import straight_line  # noqa: E402
+from heelstrike.compiler import straight_line  # noqa: E402
 
 straight_line.play = _call
 
-from heelstrike.contact import elimination  # noqa: E402
+from heelstrike.contact.solvers import elimination  # noqa: E402
 
 
 def _eliminations() -> tuple[int, ...]:
@@ -86,7 +87,8 @@ def _eliminations() -> tuple[int, ...]:
 
 elimination._programs = _eliminations
 
-from heelstrike.sim import guard, programs  # noqa: E402
+from heelstrike.sim import programs  # noqa: E402
+from heelstrike.sim.controller import guard  # noqa: E402
 
 
 def _word_at(array: np.ndarray, place: int) -> int:

@@ -25,7 +25,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-import heelstrike.plain_code as _plain_code
+import heelstrike.compiler.plain_code as _plain_code
 
 if _plain_code.is_asked_for():  # before anything else is imported
     _plain_code.select()

@@ -24,8 +24,8 @@ from heelstrike.contact.modes import (
     WARM_START,
 )
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.repetition import repeat
-from heelstrike.contact.search import contact_workspace
+from heelstrike.contact.solvers.repetition import repeat
+from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import (
     FAILURES,
     FALLBACKS,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from heelstrike.compilation import uncompiled
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.ground import Ground, ground_contact
 from heelstrike.errors import SimulationError
 

@@ -253,7 +253,7 @@ def test_what_encoders_tell_the_law() -> None:
 
 
 def test_readings_are_rounded_and_due_once_a_period() -> None:
-    from heelstrike.compilation import uncompiled
+    from heelstrike.compiler.compilation import uncompiled
     from heelstrike.control import computed_torque as law
 
     read = uncompiled(law.read_encoders)
@@ -295,7 +295,7 @@ def test_a_joint_without_a_motor_is_named() -> None:
 
 
 def test_the_estimate_is_exact_for_cubics() -> None:
-    from heelstrike.compilation import uncompiled
+    from heelstrike.compiler.compilation import uncompiled
     from heelstrike.control.computed_torque import estimated_velocity
 
     period, t = 0.01, 0.3

@@ -15,7 +15,7 @@ import pytest
 from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike import dynamics
-from heelstrike.compilation import uncompiled
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.errors import RobotError

@@ -18,7 +18,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.contact.inverse_dynamics import ContactInverseDynamics
+from heelstrike.contact.queries.inverse_dynamics import ContactInverseDynamics
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait import ClearanceProfile, collocation
 from heelstrike.gait.collocation import SETTINGS, CollocationProgram

@@ -12,14 +12,14 @@ from mechanisms import block, disc, point
 
 import heelstrike as hs
 from heelstrike.sim import EventKind
-from heelstrike.sim.compliant import Compliant
-from heelstrike.sim.contact_law import (
+from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,
     KelvinVoigt,
     NormalLaw,
     RegularisedFriction,
 )
+from heelstrike.sim.compliant.method import Compliant
 
 G = 9.81
 TIGHT = {"rtol": 1e-9, "atol": 1e-11}

@@ -8,7 +8,7 @@ from mechanisms import point
 from synthetic_runs import box, pendulum
 
 import heelstrike as hs
-from heelstrike.compilation import uncompiled
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.robot import Robot, read_mjcf
 from heelstrike.sim import Certificates, EventKind, Scheme
 from heelstrike.sim.memory import allocate_memory

@@ -18,8 +18,8 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller import CompiledController, Controller
-from heelstrike.sim.event_driven import EventDriven
+from heelstrike.sim.controller.interface import CompiledController, Controller
+from heelstrike.sim.event_driven.method import EventDriven
 
 Floats = NDArray[np.float64]
 

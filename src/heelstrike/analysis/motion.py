@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import (
     center_of_mass,
     forward_kinematics,

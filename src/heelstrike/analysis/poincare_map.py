@@ -23,8 +23,8 @@ from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.contact_geometry import observe
-from heelstrike.sim.controller import CompiledController, Controller
-from heelstrike.sim.event_driven import EventDriven
+from heelstrike.sim.controller.interface import CompiledController, Controller
+from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate

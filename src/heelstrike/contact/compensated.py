@@ -8,7 +8,7 @@ rounded once (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26, 2005).
 
 from __future__ import annotations
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
 
 UNIT_ROUNDOFF = 2.0**-53
 """Largest relative error of one operation."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.bundle import Bundle
-from heelstrike.compilation import kernel
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import SimulationError
 
 Floats = NDArray[np.float64]

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
-from heelstrike.contact.repetition import repeat
-from heelstrike.contact.search import CLEAN, contact_workspace
+from heelstrike.contact.solvers.repetition import repeat
+from heelstrike.contact.solvers.search import CLEAN, contact_workspace
 from heelstrike.contact.workspace import (
     FLOOR,
     ITERATIONS,
@@ -34,7 +35,6 @@ from heelstrike.contact.workspace import (
     Integers,
 )
 from heelstrike.errors import ContactProblemError
-from heelstrike.separate_kernel import call_at
 
 
 @kernel

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.bundle import Bundle
-from heelstrike.contact.elimination import LARGEST, elimination_programs
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.contact.solvers.elimination import LARGEST, elimination_programs
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -116,7 +116,7 @@ class ContactWorkspace(Bundle):
 
 
 def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:
-    """Allocate the buffers; see :func:`~heelstrike.contact.search.contact_workspace`."""
+    """Allocate the buffers; see :func:`~heelstrike.contact.solvers.search.contact_workspace`."""
     contacts = max(int(capacity), 1)
     unknowns = 2 * contacts
     pairs = 4 * contacts

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.separate_kernel import separate_kernel
 from heelstrike.dynamics.kernels import (
     forward_kinematics,
     inverse_dynamics,
@@ -27,8 +28,7 @@ from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.separate_kernel import separate_kernel
-from heelstrike.sim.controller import CONTROLLER_SIGNATURE, CompiledController, Contacts
+from heelstrike.sim.controller.interface import CONTROLLER_SIGNATURE, CompiledController, Contacts
 
 # Places in the parameters: a header, then blocks of nu numbers, then the feet.
 EARLIEST = 0  # a touchdown counts only after this time in a step, s

@@ -16,7 +16,7 @@ from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller import CompiledController, Contacts, controller_kernel
+from heelstrike.sim.controller.interface import CompiledController, Contacts, controller_kernel
 
 # Places in the parameters: pieces, coefficients of each polynomial, then beginnings of the pieces,
 # gains, and coefficients by piece, actuator and power.

@@ -13,7 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.separate_kernel import separate_kernel
 from heelstrike.control.computed_torque import (
     HEADER,
     MEMORY_HEADER,
@@ -29,8 +30,7 @@ from heelstrike.dynamics.workspace import Workspace
 from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.separate_kernel import separate_kernel
-from heelstrike.sim.controller import CONTROLLER_SIGNATURE, Contacts
+from heelstrike.sim.controller.interface import CONTROLLER_SIGNATURE, Contacts
 
 LATEST = 1  # the reference goes on along its polynomials until this time in a step, s
 

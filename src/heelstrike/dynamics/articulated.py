@@ -23,8 +23,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.bundle import Bundle
-from heelstrike.compilation import kernel
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 

@@ -9,7 +9,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compilation import uncompiled
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.equations_of_motion import weightless
 from heelstrike.dynamics.workspace import Workspace, workspace

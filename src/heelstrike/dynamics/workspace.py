@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.links import Links
-from heelstrike.robot.mujoco_file import MujocoFile
+from heelstrike.robot.files.links import Links
+from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.warning import warn
 
 SAME_PLACE = 1e-9  # metres; nearer points of one link are one point

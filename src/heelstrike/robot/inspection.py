@@ -14,15 +14,15 @@ import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import UNLIKELY, link_origins
-from heelstrike.robot.inclusion import is_readable
+from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.saving import body_links
+from heelstrike.robot.files.screening.inclusion import is_readable
+from heelstrike.robot.files.urdf import MASSLESS
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import find_mirror
-from heelstrike.robot.mjcf import read_mjcf
 from heelstrike.robot.model import Floats
 from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
-from heelstrike.robot.saving import body_links
-from heelstrike.robot.urdf import MASSLESS
 from heelstrike.robot.warning import RobotWarning
 
 SAME_HEIGHT = 1e-4
@@ -182,7 +182,7 @@ def _file(robot: str | os.PathLike[str]) -> Path | None:
 
 def _of_inertias(path: Path) -> Iterator[Finding]:
     """Inertias that the file states in three dimensions and no body can have; masses of zero."""
-    from heelstrike.robot.mujoco_file import parsed_bodies
+    from heelstrike.robot.files.mujoco_file import parsed_bodies
 
     for name, mass, tensor in parsed_bodies(path):
         if not mass >= MASSLESS:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

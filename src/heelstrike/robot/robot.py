@@ -320,7 +320,7 @@ class Robot:
         RobotWarning
             With everything that the format cannot hold, joint by joint.
         """
-        from heelstrike.robot.saving import save_robot
+        from heelstrike.robot.files.saving import save_robot
 
         return save_robot(self, path)
 

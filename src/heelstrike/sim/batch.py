@@ -24,7 +24,7 @@ from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller import CompiledController, Controller
+from heelstrike.sim.controller.interface import CompiledController, Controller
 from heelstrike.sim.engine import Method
 from heelstrike.sim.memory import (
     COMPLEMENTARITY,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from heelstrike.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
 from heelstrike.dynamics.kernels import (
@@ -16,7 +17,6 @@ from heelstrike.dynamics.kernels import (
     point_position,
     solve_lower,
 )
-from heelstrike.dynamics.straight_line import play
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.memory import Memory

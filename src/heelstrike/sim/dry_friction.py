@@ -15,7 +15,7 @@ with one certificate.
 
 from __future__ import annotations
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contact_geometry import write_unit_row
 from heelstrike.sim.memory import Memory

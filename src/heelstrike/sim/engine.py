@@ -95,8 +95,8 @@ class Engine(Protocol):
     ) -> int:
         """Advance under a compiled controller until something stops it; return what.
 
-        `parameters` and `controller_memory` are guarded (:mod:`heelstrike.sim.guard`). What the
-        controller raises comes out.
+        `parameters` and `controller_memory` are guarded
+        (:mod:`heelstrike.sim.controller.guard`). What the controller raises comes out.
         """
         ...
 

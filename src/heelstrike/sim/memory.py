@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.bundle import Bundle
-from heelstrike.contact.search import contact_workspace
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies, articulated_bodies
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller import Contacts
-from heelstrike.sim.guard import guarded, guarded_bundle
+from heelstrike.sim.controller.guard import guarded, guarded_bundle
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.programs import straight_line_programs, usual_points
 from heelstrike.sim.push import Push, Pushes, pushes_on
 

@@ -7,7 +7,7 @@ normals are those of :func:`~heelstrike.sim.contact_geometry.locate_contacts`.
 
 from __future__ import annotations
 
-from heelstrike.compilation import kernel
+from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import solve_factorized, solve_upper
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model

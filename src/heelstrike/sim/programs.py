@@ -10,9 +10,9 @@ import numpy as np
 from llvmlite import ir
 from numpy.typing import NDArray
 
+from heelstrike.compiler.machine_code import addresses
+from heelstrike.compiler.straight_line import Recording, add_function, description
 from heelstrike.dynamics.kernels import solve_factorized, state_equations
-from heelstrike.dynamics.machine_code import addresses
-from heelstrike.dynamics.straight_line import Recording, add_function, description
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot

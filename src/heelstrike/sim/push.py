@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from heelstrike.bundle import Bundle
-from heelstrike.compilation import kernel
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from heelstrike.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contact_geometry import contact_velocity

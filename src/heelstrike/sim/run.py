@@ -222,12 +222,12 @@ class Run:
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""
-        from heelstrike.sim.dataset import to_dataset
+        from heelstrike.sim.files.dataset import to_dataset
 
         return to_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`."""
-        from heelstrike.sim.run_file import save
+        from heelstrike.sim.files.run_file import save
 
         return save(self, path)

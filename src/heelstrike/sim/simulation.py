@@ -17,9 +17,10 @@ from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.checked import CheckedController
 from heelstrike.sim.contact_geometry import observe
-from heelstrike.sim.controller import (
+from heelstrike.sim.controller.checked import CheckedController
+from heelstrike.sim.controller.guard import guarded
+from heelstrike.sim.controller.interface import (
     CompiledController,
     Contacts,
     Controller,
@@ -29,6 +30,7 @@ from heelstrike.sim.controller import (
     name_of,
     read_only,
 )
+from heelstrike.sim.controller.watch import Watch, numbers_of, restored
 from heelstrike.sim.engine import (
     DIVERGED,
     DONE,
@@ -41,7 +43,6 @@ from heelstrike.sim.engine import (
     Method,
     Setting,
 )
-from heelstrike.sim.guard import guarded
 from heelstrike.sim.memory import (
     BAD_TORQUE,
     COMPLEMENTARITY,
@@ -63,8 +64,7 @@ from heelstrike.sim.memory import (
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.status import EventKind, RunStatus
-from heelstrike.sim.time_stepping import TimeStepping
-from heelstrike.sim.watch import Watch, numbers_of, restored
+from heelstrike.sim.time_stepping.method import TimeStepping
 
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096

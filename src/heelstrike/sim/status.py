@@ -55,7 +55,7 @@ class EventKind(enum.IntEnum):
 
 
 class Scheme(enum.IntEnum):
-    """How :class:`~heelstrike.sim.time_stepping.TimeStepping` discretises time.
+    """How :class:`~heelstrike.sim.time_stepping.method.TimeStepping` discretises time.
 
     ``GAP_LINEARISED``
         Semi-implicit Euler; the gap at the end of the step, linearised, may not be negative

@@ -9,7 +9,7 @@ import numpy as np
 from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import Work
 from heelstrike.sim import Run, TimeStepping, simulate
-from heelstrike.sim.controller import CompiledController
+from heelstrike.sim.controller.interface import CompiledController
 from heelstrike.sim.engine import Method
 from heelstrike.sim.whole_run import whole
 

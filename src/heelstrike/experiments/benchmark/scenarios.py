@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.inverse_dynamics import contact_inverse_dynamics
+from heelstrike.contact.queries.inverse_dynamics import contact_inverse_dynamics
 from heelstrike.control.computed_torque import ComputedTorque
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.dynamics import center_of_mass, contact_positions
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
 from heelstrike.sim import EventDriven, simulate
-from heelstrike.sim.controller import Controller
+from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]

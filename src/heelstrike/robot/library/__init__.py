@@ -8,7 +8,7 @@ import reprlib
 from pathlib import Path
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.mjcf import read_mjcf
+from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.robot import Robot
 
 _HERE = Path(__file__).parent

@@ -1,0 +1,1 @@
+"""What contact does to a robot: accelerations, torques and forces at one instant."""

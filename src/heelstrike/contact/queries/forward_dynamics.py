@@ -1,0 +1,145 @@
+"""What a robot on the ground does next: accelerations and contact forces under given torques."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.contact.certificate import Certificate
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, ContactMode, Solver
+from heelstrike.contact.problem import run_solvers, solver_order
+from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
+from heelstrike.contact.workspace import Floats
+from heelstrike.dynamics import applied_force, bias_force, mass_matrix
+from heelstrike.errors import ContactProblemError
+from heelstrike.robot.robot import Robot
+
+TOUCHING = 1e-6
+"""Contact points nearer to the ground than this (m) touch it."""
+MOVING = 1e-6
+"""Contact points faster than this (m/s) come down, separate or slide."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactForwardDynamics:
+    """Accelerations and contact forces of one state.
+
+    Attributes
+    ----------
+    acceleration : (nv,) float
+        Acceleration of the coordinates.
+    contact_force : (nc, 2) float
+        Force (normal, tangent) of the ground on the robot at each contact point, in N; zero where
+        it does not touch. On a flat foot the split of least norm.
+    contact_acceleration : (nc, 2) float
+        Acceleration of the gap and of the sliding velocity of each contact point, in m/s².
+    mode : tuple of nc ContactMode
+        What every contact point does.
+    certificate : Certificate
+        Whether, and how well, the contact problem is solved.
+    """
+
+    acceleration: Floats
+    contact_force: Floats
+    contact_acceleration: Floats
+    mode: tuple[ContactMode, ...]
+    certificate: Certificate
+
+
+def contact_forward_dynamics(
+    robot: Robot,
+    q: ArrayLike,
+    v: ArrayLike,
+    torque: ArrayLike,
+    *,
+    ground: Ground | None = None,
+    solver: str | Solver = Solver.LEMKE,
+) -> ContactForwardDynamics:
+    """Accelerations of a robot on rigid ground with Coulomb friction (paper eq. 14-19).
+
+    Points that touch (gap below 1e-6 m) and neither separate nor slide (velocity below 1e-6 m/s)
+    may stay, slip or lift as the forces decide; points that slide go on doing so; points that
+    separate are free. The joints' own stops and dry friction do not act.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, v : (nq,) and (nv,) array
+        State.
+    torque : (nu,) array
+        Joint torques; dampers and springs act besides.
+    ground : Ground, optional
+        Level ground with friction 0.75 by default.
+    solver : str
+        First contact solver to try, see :func:`heelstrike.solve_contact`.
+
+    Raises
+    ------
+    ContactProblemError
+        If a point comes down on the ground: that is an impact, which has no acceleration.
+    RobotError
+        If a vector has the wrong length.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> import numpy as np
+    >>> robot = hs.load_robot("bravo7")
+    >>> falling = hs.contact_forward_dynamics(
+    ...     robot, robot.reference_state().q + 1.0, np.zeros(9), np.zeros(6)
+    ... )
+    >>> float(falling.contact_force.sum())
+    0.0
+    """
+    kinematics = contact_kinematics(robot, q, v, ground)
+    touching = _touching(robot, kinematics)
+    sliding = np.where(np.abs(kinematics.velocity[:, 1]) > MOVING, kinematics.velocity[:, 1], 0.0)
+    count = len(touching)
+    mode = np.full(count, OPEN, np.int64)
+    mode[sliding[touching] > 0.0] = SLIDING_FORWARD
+    mode[sliding[touching] < 0.0] = SLIDING_BACKWARD
+
+    matrix = mass_matrix(robot, q)
+    rows = kinematics.jacobian[touching].reshape(2 * count, robot.nv)
+    force = applied_force(robot, q, v, torque) - bias_force(robot, q, v)
+    free = np.linalg.solve(matrix, force)
+    response = np.linalg.solve(matrix, rows.T)
+    delassus = rows @ response
+    forces, _, certificate = run_solvers(
+        np.ascontiguousarray(0.5 * (delassus + delassus.T)),
+        rows @ free + kinematics.bias_acceleration[touching].ravel(),
+        np.ascontiguousarray(kinematics.friction[touching]),
+        solver_order(solver),
+        mode,
+        tolerance=1e-9,
+    )
+    acceleration = free + response @ forces
+    contact_force = np.zeros((robot.nc, 2))
+    contact_force[touching] = forces.reshape(count, 2)
+    modes = [ContactMode.OPEN] * robot.nc
+    for place, contact in enumerate(touching):
+        modes[contact] = ContactMode(int(mode[place]))
+    return ContactForwardDynamics(
+        acceleration=acceleration,
+        contact_force=contact_force,
+        contact_acceleration=kinematics.jacobian @ acceleration + kinematics.bias_acceleration,
+        mode=tuple(modes),
+        certificate=certificate,
+    )
+
+
+def _touching(robot: Robot, kinematics: ContactKinematics) -> list[int]:
+    touches = kinematics.gap < TOUCHING
+    speed = kinematics.velocity[:, 0]
+    coming = [robot.contact_names[i] for i in np.flatnonzero(touches & (speed < -MOVING))]
+    if coming:
+        raise ContactProblemError(
+            f"robot {robot.name!r}: {', '.join(coming)} come down on the ground. That is an "
+            "impact, and there is no acceleration at it; simulate it, or ask for a state before "
+            "or after."
+        )
+    return [int(i) for i in np.flatnonzero(touches & (speed <= MOVING))]

@@ -1,0 +1,1 @@
+"""What solves contact problems: one idea a file, every answer certified."""

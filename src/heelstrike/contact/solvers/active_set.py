@@ -1,0 +1,305 @@
+"""The impulse that goes with given contact modes, and whether it solves the problem.
+
+Knowing which contacts are open, stick or slip to which side turns the contact problem into
+linear equations: zero normal velocity at closed contacts, zero tangential velocity at sticking
+ones. They are often singular (two vertices of one flat foot) and then consistent, so the
+elimination reveals the rank and the free directions, along which the least-norm split is chosen.
+All solvers end here: what they contribute is the modes. The certificate has the last word.
+"""
+
+from __future__ import annotations
+
+import math
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.certificate import certify
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.solvers.least_norm import split
+from heelstrike.contact.solvers.pivoting import pivot
+from heelstrike.contact.workspace import (
+    BEFORE,
+    EFFORT,
+    EQUATION,
+    IMPULSE,
+    LEAN,
+    NORMAL,
+    OFFSET,
+    PIVOT_ROW,
+    POINT,
+    RESIDUAL,
+    REST,
+    ROOT,
+    ROUNDING,
+    ROW_LABEL,
+    SCALE,
+    SETTINGS,
+    SKEWED,
+    SLOPE,
+    SOURCE,
+    SPEED,
+    TANGENT,
+    TRIAL_MODE,
+    VELOCITY,
+    WEIGHT,
+    ContactWorkspace,
+    Floats,
+    Integers,
+)
+
+RANK_TOLERANCE = 1e-12
+"""Pivots of the unit-diagonal matrix below this count as zero."""
+
+GOOD_PIVOT = 0.03
+"""Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
+matrix is stable in any order, and only its rank needs the large pivots first."""
+
+SINGULAR = 2e-15
+"""Pivots of the unit-diagonal matrix below this are rounding."""
+
+CONSISTENT = 1e-12
+"""Equations that are left with less than this, relative to the largest, are met."""
+
+SHARP = 1e-13
+"""Residuals above this are worth a step of iterative refinement."""
+
+PROMISING = 1e-6
+"""Residuals below this, relative to the velocities that cancel, may be due to rounding."""
+
+REFINEMENTS = 5
+"""Most steps of iterative refinement."""
+
+
+@kernel
+def assemble(count: int, delassus: Floats, friction: Floats, work: ContactWorkspace) -> int:
+    """Write the equations of the modes under trial into the tableau; return their number.
+
+    At a slipping contact the tangential impulse leans on the normal one and has no equation.
+    """
+    mode, equation = work.labels[TRIAL_MODE], work.labels[EQUATION]
+    normal, tangent, source = work.labels[NORMAL], work.labels[TANGENT], work.labels[SOURCE]
+    slope, lean, weight = work.vectors[SLOPE], work.vectors[LEAN], work.vectors[WEIGHT]
+    scale, offset, tableau = work.vectors[SCALE], work.vectors[OFFSET], work.tableau
+    size = 0
+    for contact in range(count):
+        if mode[contact] == OPEN:
+            continue
+        first = normal[contact]
+        equation[size] = first
+        weight[size] = scale[first]
+        lean[size] = slope[contact]
+        if tangent[contact] >= 0:
+            if mode[contact] == STICK:
+                size += 1
+                equation[size] = first + 1
+                weight[size] = scale[first + 1]
+                lean[size] = 0.0
+            else:
+                lean[size] = friction[contact]
+                if mode[contact] == SLIP_FORWARD:
+                    lean[size] = -friction[contact]
+        if lean[size] != 0.0:
+            weight[size] *= math.sqrt(1.0 + lean[size] * lean[size])
+        size += 1
+    for i in range(size):
+        row = source[equation[i]]
+        row_scale = scale[equation[i]]
+        tableau[i, 0] = offset[equation[i]]
+        for j in range(size):
+            column = source[equation[j]]
+            entry = delassus[row, column]
+            if lean[j] != 0.0:
+                entry += lean[j] * delassus[row, column + 1]
+            tableau[i, j + 1] = row_scale * entry * scale[equation[j]]
+    return size
+
+
+@kernel
+def eliminate(size: int, symmetric: bool, work: ContactWorkspace) -> int:
+    """Solve the equations in the tableau as far as their rank allows; return their nullity.
+
+    The solution with the free unknowns at zero goes to ``POINT``; ``PIVOT_ROW`` tells which
+    unknowns stayed free. Symmetric equations pivot on a large diagonal element, others on the
+    largest element of all.
+    """
+    pivot_row, taken = work.labels[PIVOT_ROW], work.labels[ROW_LABEL]
+    weight, point, tableau = work.vectors[WEIGHT], work.vectors[POINT], work.tableau
+    speeds = 0.0
+    for i in range(size):
+        pivot_row[i] = -1
+        taken[i] = 0
+        speeds = max(speeds, abs(tableau[i, 0]))
+    nullity = size
+    smallest = RANK_TOLERANCE
+    while nullity > 0:
+        largest = smallest
+        row = size
+        column = size
+        for i in range(size):
+            if taken[i] != 0:
+                continue
+            if symmetric:
+                if tableau[i, i + 1] > largest:
+                    largest = tableau[i, i + 1]
+                    row = i
+                    column = i
+                    if largest > GOOD_PIVOT:
+                        break
+                continue
+            for j in range(size):
+                if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
+                    largest = abs(tableau[i, j + 1])
+                    row = i
+                    column = j
+        if row < size:
+            pivot(tableau, size, size + 1, row, column + 1)
+            taken[row] = 1
+            pivot_row[column] = row
+            nullity -= 1
+            continue
+        # What is left is singular. If it is not consistent, it was not quite singular.
+        left = 0.0
+        for i in range(size):
+            if taken[i] == 0:
+                left = max(left, abs(tableau[i, 0]))
+        if smallest == SINGULAR or left <= CONSISTENT * speeds:
+            break
+        smallest = SINGULAR
+    for j in range(size):
+        point[j] = weight[j] * tableau[pivot_row[j], 0] if pivot_row[j] >= 0 else 0.0
+    return nullity
+
+
+@kernel
+def expand(count: int, friction: Floats, work: ContactWorkspace) -> None:
+    """Write ``POINT`` out as an impulse inside the cones, exactly.
+
+    The point is in units of impulse; along a slipping contact it measures the whole impulse.
+    """
+    mode, tangent, slope = work.labels[TRIAL_MODE], work.labels[TANGENT], work.vectors[SLOPE]
+    point, impulse = work.vectors[POINT], work.vectors[IMPULSE]
+    place = 0
+    for contact in range(count):
+        row = 2 * contact
+        impulse[row] = 0.0
+        impulse[row + 1] = 0.0
+        if mode[contact] == OPEN:
+            continue
+        along = max(point[place], 0.0)
+        limit = friction[contact]
+        place += 1
+        if tangent[contact] >= 0 and mode[contact] == STICK:
+            limit *= along
+            impulse[row] = along
+            impulse[row + 1] = min(max(point[place], -limit), limit)
+            place += 1
+            continue
+        across = slope[contact]
+        if tangent[contact] >= 0:
+            across = -limit if mode[contact] == SLIP_FORWARD else limit
+        impulse[row] = along / math.sqrt(1.0 + across * across)
+        impulse[row + 1] = across * impulse[row]
+
+
+@kernel
+def evaluate(
+    count: int, delassus: Floats, free: Floats, friction: Floats, work: ContactWorkspace
+) -> float:
+    """Find the impulse of the modes in ``TRIAL_MODE`` and return its largest residual.
+
+    The impulse, its velocity and residuals are left in the workspace. Where rounding shows,
+    iterative refinement sharpens them as long as it helps.
+    """
+    point, before, lean = work.vectors[POINT], work.vectors[BEFORE], work.vectors[LEAN]
+    settings = work.vectors[SETTINGS]
+    size = assemble(count, delassus, friction, work)
+    symmetric = settings[SKEWED] == 0.0
+    for j in range(size):
+        symmetric = symmetric and lean[j] == 0.0
+    singular = eliminate(size, symmetric, work) > 0
+    held = not symmetric  # whether directions that change a velocity are held back
+    if singular:
+        held = split(count, size, held, delassus, friction, work)
+    worst = prove(count, delassus, free, friction, work)
+    if singular and held and not worst < PROMISING * (1.0 + settings[EFFORT]):
+        # The slip speed is not unique, and what the elimination left it at does not do.
+        split(count, size, False, delassus, friction, work)
+        worst = prove(count, delassus, free, friction, work)
+    for _ in range(REFINEMENTS):
+        if worst < max(SHARP, 4.0 * settings[ROUNDING]):
+            break
+        if not worst < PROMISING * (1.0 + settings[EFFORT]):
+            break
+        for j in range(size):
+            before[j] = point[j]
+        refine(size, work)
+        sharper = prove(count, delassus, free, friction, work)
+        if not sharper < worst:
+            for j in range(size):
+                point[j] = before[j]
+            return prove(count, delassus, free, friction, work)
+        worst = sharper
+    return worst
+
+
+@kernel
+def prove(
+    count: int, delassus: Floats, free: Floats, friction: Floats, work: ContactWorkspace
+) -> float:
+    """Write ``POINT`` out as an impulse and certify it; return its largest residual."""
+    vectors = work.vectors
+    expand(count, friction, work)
+    return certify(
+        count,
+        delassus,
+        free,
+        friction,
+        vectors[IMPULSE],
+        vectors[VELOCITY],
+        vectors[RESIDUAL],
+        work,
+    )
+
+
+@kernel
+def refine(size: int, work: ContactWorkspace) -> None:
+    """Correct ``POINT`` by what the equations' velocities still lack to zero."""
+    equation, pivot_row, source = work.labels[EQUATION], work.labels[PIVOT_ROW], work.labels[SOURCE]
+    point, weight, scale = work.vectors[POINT], work.vectors[WEIGHT], work.vectors[SCALE]
+    velocity, speed, tableau = work.vectors[VELOCITY], work.vectors[SPEED], work.tableau
+    for j in range(size):
+        speed[j] = scale[equation[j]] * velocity[source[equation[j]]]
+    for j in range(size):
+        if pivot_row[j] >= 0:
+            correction = 0.0
+            for k in range(size):
+                if pivot_row[k] >= 0:
+                    correction -= tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
+            point[j] += weight[j] * correction
+
+
+@kernel
+def label(count: int, velocity: Floats, mode: Integers, work: ContactWorkspace) -> bool:
+    """Name every contact's mode from its velocity; return whether that is another problem.
+
+    A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
+    impulse in its cone. Only with all of these admitted is the least-norm split unique. The
+    velocity is judged by what the last certificate left in ``REST``.
+    """
+    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
+    tangent = work.labels[TANGENT]
+    changed = False
+    for contact in range(count):
+        row = 2 * contact
+        name = STICK
+        if velocity[row] > rest * root[row]:
+            name = OPEN
+        elif velocity[row + 1] > rest * root[row + 1]:
+            name = SLIP_FORWARD
+        elif velocity[row + 1] < -rest * root[row + 1]:
+            name = SLIP_BACKWARD
+        if tangent[contact] >= 0:
+            changed = changed or name != mode[contact]
+        else:
+            changed = changed or (name == OPEN) != (mode[contact] == OPEN)
+        mode[contact] = name
+    return changed

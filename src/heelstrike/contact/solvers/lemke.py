@@ -1,0 +1,141 @@
+"""Lemke's method with lexicographic anti-cycling.
+
+In the plane the friction cone has two edges, so the frictional problem is a linear
+complementarity problem without approximation. In the form of Stewart and Trinkle
+(Int. J. Numer. Methods Eng. 39, 1996) and Anitescu and Potra (Nonlinear Dynamics 14, 1997) a
+contact with friction brings four pairs::
+
+    normal velocity                0 <= w_n            _|_  lambda_n >= 0
+    tangential velocity + slip     0 <= w_t + sigma    _|_  beta_+   >= 0
+    slip - tangential velocity     0 <= sigma - w_t    _|_  beta_-   >= 0
+    friction still available       0 <= mu lambda_n - beta_+ - beta_-  _|_  sigma >= 0
+
+with ``lambda_t = beta_+ - beta_-`` and ``sigma`` the slip speed; one without friction brings
+the first. The matrix is copositive, so with lexicographic pivoting a ray means that the problem
+has internal forces that the free velocity works against, not that the method was unlucky.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.solvers.pivoting import pivot_to_solution
+from heelstrike.contact.workspace import (
+    CONE,
+    MATRIX,
+    NORMAL,
+    OFFSET,
+    PLACE,
+    TANGENT,
+    TRIAL_MODE,
+    ContactWorkspace,
+)
+
+PATHS = 9
+"""How many covering vectors are tried: what rounding spoils on one path it spares on another, and
+where one path ends in a ray another may find a solution."""
+
+AT_REST = 1e-11
+"""Velocities below this, where the largest free one is one, are read as zero."""
+
+GOLDEN = 0.6180339887498949
+
+
+@kernel
+def covering(path: int, row: int) -> float:
+    """Return an entry of the covering vector of a path, from 1 to 2 at first, later to 1e6."""
+    share = (GOLDEN * path * (row + 1)) % 1.0
+    return 1.0 + share if path < 3 else 10.0 ** (6.0 * share)
+
+
+@kernel
+def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
+    """Write the reduced problem as a dictionary; return the number of pairs.
+
+    The pairs of a contact are consecutive, in the order of the module's docstring. The free
+    velocity is scaled to one.
+    """
+    normal, tangent = work.labels[NORMAL], work.labels[TANGENT]
+    offset, cone = work.vectors[OFFSET], work.vectors[CONE]
+    matrix, tableau = work.squares[MATRIX], work.tableau
+    size = 0.0
+    for i in range(unknowns):
+        size = max(size, abs(offset[i]))
+    size = 1.0 / size if size > 0.0 else 1.0
+    pairs = unknowns
+    for contact in range(count):
+        if tangent[contact] >= 0:
+            pairs += 2
+    for i in range(pairs):
+        for j in range(pairs + 1):
+            tableau[i, j] = 0.0
+        tableau[i, pairs + 1] = covering(path, i)
+    row = 0
+    for contact in range(count):
+        height = 3 if tangent[contact] >= 0 else 1
+        for i in range(height):
+            own = normal[contact] + min(i, 1)
+            own_sign = -1.0 if i == 2 else 1.0
+            tableau[row + i, 0] = own_sign * size * offset[own]
+            column = 1
+            for other in range(count):
+                width = 3 if tangent[other] >= 0 else 1
+                for j in range(width):
+                    entry = matrix[own, normal[other] + min(j, 1)]
+                    tableau[row + i, column + j] = -own_sign * entry if j == 2 else own_sign * entry
+                column += 4 if width == 3 else 1
+            if i > 0:
+                tableau[row + i, row + 4] = 1.0
+                tableau[row + 3, row + 1 + i] = -1.0
+        if height == 3:
+            tableau[row + 3, row + 1] = cone[contact]
+        row += 4 if height == 3 else 1
+    return pairs
+
+
+@kernel
+def value(variable: int, work: ContactWorkspace) -> float:
+    """Return the value of a variable in the final dictionary."""
+    row = work.labels[PLACE, variable]
+    return work.tableau[row, 0] if row >= 0 else 0.0
+
+
+@kernel
+def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
+    """Find the contact modes of the reduced problem by Lemke's method; return the status.
+
+    ``path``, from 0 to ``PATHS`` - 1, chooses the covering vector and how close a tie is.
+    """
+    tie = 1e-11
+    if path % 3 == 1:
+        tie = 1e-13
+    elif path % 3 == 2:
+        tie = 1e-9
+    pairs = load_frictional(count, unknowns, path, work)
+    status = pivot_to_solution(work.tableau, pairs, tie, work)
+    place, tangent, mode = work.labels[PLACE], work.labels[TANGENT], work.labels[TRIAL_MODE]
+    row = 0
+    for contact in range(count):
+        frictional = tangent[contact] >= 0
+        mode[contact] = STICK if place[pairs + row] >= 0 else OPEN
+        if path == 0:
+            # By the velocities. The other paths are for problems that rounding makes difficult,
+            # and go by the basis.
+            if mode[contact] == OPEN and value(row, work) <= AT_REST:
+                mode[contact] = STICK
+            if mode[contact] == STICK and frictional:
+                slip = 0.5 * (value(row + 1, work) - value(row + 2, work))
+                if slip > AT_REST:
+                    mode[contact] = SLIP_FORWARD
+                elif slip < -AT_REST:
+                    mode[contact] = SLIP_BACKWARD
+        elif mode[contact] == STICK and frictional and place[pairs + row + 3] >= 0:
+            # Slip. With the friction to both sides in the basis its speed is zero, though.
+            forward = place[pairs + row + 2] >= 0
+            backward = place[pairs + row + 1] >= 0
+            if forward and not backward:
+                mode[contact] = SLIP_FORWARD
+            elif backward and not forward:
+                mode[contact] = SLIP_BACKWARD
+        row += 4 if frictional else 1
+    return status

@@ -1,0 +1,386 @@
+"""The usual case, fast: contacts go on sticking, or stay open, as in the solve before.
+
+Sticking contacts make one symmetric system. Vertices of one flat foot share their tangential row,
+so that only the sum of their friction is determined; among all splits the equal one has the least
+norm. Rows may depend on each other otherwise, as those of two feet under straight legs do. Whatever
+is less usual - slip, or friction that this split cannot hold - is left to the general way, and the
+certificate decides as always.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.straight_line import play
+from heelstrike.contact.certificate import certify
+from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.solvers.elimination import POOR_PIVOT
+from heelstrike.contact.workspace import (
+    BASIS,
+    EQUATION,
+    ORDER,
+    PIVOT_ROW,
+    POINT,
+    REST,
+    ROOT,
+    SETTINGS,
+    SHARERS,
+    SPAN,
+    SPEED,
+    STEP,
+    ContactWorkspace,
+    Floats,
+    Integers,
+)
+
+SAME_ROW = 1e-14
+"""Two rows are one if the inverse mass along their difference is less than this, relative."""
+
+GOOD_PIVOT = 1e-2
+"""Pivots that keep more than this of their diagonal are good."""
+
+NO_PIVOT = 1e-11
+"""Rows that keep less depend on those before; what lies between is left to the general way."""
+
+
+@dissolved_kernel
+def list_equations(
+    count: int, delassus: Floats, friction: Floats, mode: Integers, work: ContactWorkspace
+) -> int:
+    """List the rows that shall have no velocity; return how many differ, or -1 to give up.
+
+    ``EQUATION`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for
+    none, and ``SHARERS`` how many rows share an equation.
+    """
+    source, equation, sharers = work.labels[EQUATION], work.labels[PIVOT_ROW], work.vectors[SHARERS]
+    size = 0
+    for contact in range(count):
+        row = 2 * contact
+        tangent = row + 1
+        equation[row] = -1
+        equation[tangent] = -1
+        if mode[contact] == OPEN:
+            continue
+        has_friction = friction[contact] > 0.0
+        if mode[contact] >= SLIDING_FORWARD or (has_friction and mode[contact] != STICK):
+            return -1
+        equation[row] = size
+        source[size] = row
+        sharers[size] = 1.0
+        size += 1
+        if not has_friction:
+            continue
+        for earlier in range(contact):
+            other = 2 * earlier + 1
+            if equation[other] >= 0:
+                both = delassus[tangent, tangent] + delassus[other, other]
+                if abs(both - 2.0 * delassus[tangent, other]) <= SAME_ROW * both:
+                    equation[tangent] = equation[other]
+                    sharers[equation[other]] += 1.0
+                    break
+        if equation[tangent] < 0:
+            equation[tangent] = size
+            source[size] = tangent
+            sharers[size] = 1.0
+            size += 1
+    return size
+
+
+@dissolved_kernel
+def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+    """Like :func:`solve_equations` for few equations, by straight-line code."""
+    if size >= work.eliminations.shape[0] or work.eliminations[size] == 0:
+        return False
+    source, matrix = work.labels[EQUATION], work.lower_half
+    x, pivot = work.vectors[POINT], work.vectors[STEP]
+    place = 0
+    for i in range(size):
+        row = source[i]
+        x[i] = -free[row]
+        for j in range(i + 1):
+            matrix[place] = delassus[row, source[j]]
+            place += 1
+    play(work.eliminations[size], (matrix, x, pivot))
+    rank = 0
+    for i in range(size):
+        diagonal = delassus[source[i], source[i]]
+        if pivot[i] > POOR_PIVOT * diagonal:
+            rank += 1
+        elif abs(pivot[i]) > NO_PIVOT * diagonal:
+            return False
+    if rank < size:
+        leave_out_idle(size, work)
+    return True
+
+
+@kernel
+def leave_out_idle(size: int, work: ContactWorkspace) -> None:
+    """Take from the solution what lies along directions that change no velocity.
+
+    For few equations it is quicker than :func:`shorten`, which needs them in another order. There
+    is one such direction n for every row that depends on others, Lᵀ n = e. They are made
+    orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
+    counts 1/m.
+    """
+    matrix, x, basis = work.lower_half, work.vectors[POINT], work.squares[BASIS]
+    sharers = work.vectors[SHARERS]
+    found = 0
+    for row in range(size):
+        if matrix[row * (row + 1) // 2 + row] != 0.0:
+            continue
+        direction = basis[found]
+        for i in range(size):
+            direction[i] = 0.0
+        direction[row] = 1.0
+        for i in range(row, 0, -1):
+            for j in range(i):
+                direction[j] -= matrix[i * (i + 1) // 2 + j] * direction[i]
+        for earlier in range(found):
+            remove_part(size, basis[earlier], sharers, direction)
+        remove_part(size, direction, sharers, x)
+        found += 1
+
+
+@kernel
+def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -> None:
+    """Make a vector orthogonal to a direction."""
+    part = 0.0
+    length = 0.0
+    for i in range(size):
+        weighted = direction[i] / sharers[i]
+        part += weighted * vector[i]
+        length += weighted * direction[i]
+    for i in range(size):
+        vector[i] -= part / length * direction[i]
+
+
+@dissolved_kernel
+def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+    """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
+
+    Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
+    end of the list and bring no column to L: their number costs little. Neighbours among many
+    points of a sole nearly do, and are tried again after the others.
+    """
+    if solve_at_once(size, delassus, free, work):
+        return True
+    source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
+    rank = 0
+    rest = size
+    least = GOOD_PIVOT
+    poor = False
+    moved = False
+    while rank < rest:
+        row = source[rank]
+        total = -free[row]
+        for j in range(rank):
+            entry = delassus[row, source[j]]
+            for k in range(j):
+                entry -= matrix[rank, k] * matrix[j, k]
+            # Until the row is finished, its entries still carry their D.
+            matrix[rank, j] = entry
+        pivot = delassus[row, row]
+        diagonal = pivot
+        for j in range(rank):
+            ratio = matrix[rank, j] * matrix[j, j]
+            pivot -= ratio * matrix[rank, j]
+            total -= ratio * x[j]
+            matrix[rank, j] = ratio
+        x[rank] = total
+        if pivot > least * diagonal:
+            matrix[rank, rank] = 1.0 / pivot
+            rank += 1
+        elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
+            poor = poor or pivot > POOR_PIVOT * diagonal
+            rest -= 1
+            work.labels[SPAN, rest] = rank
+            if rest > rank:
+                if not moved:
+                    begin_order(size, work)
+                    moved = True
+                exchange(rank, rest, work)
+        else:
+            return False
+        if poor and rank == rest:
+            poor = False
+            least = POOR_PIVOT
+            rest = size
+    for i in range(rank):
+        x[i] *= matrix[i, i]
+    for i in range(rank - 1, -1, -1):
+        for j in range(i):
+            x[j] -= matrix[i, j] * x[i]
+    if rank < size:
+        shorten(rank, size, work)
+    if moved:
+        put_back(size, work)
+    return True
+
+
+@kernel
+def begin_order(size: int, work: ContactWorkspace) -> None:
+    """List the equations in their order."""
+    for i in range(size):
+        work.labels[ORDER, i] = i
+
+
+@kernel
+def exchange(rank: int, rest: int, work: ContactWorkspace) -> None:
+    """Exchange the equation in hand for the last that is untried."""
+    source, order, matrix = work.labels[EQUATION], work.labels[ORDER], work.tableau
+    sharers = work.vectors[SHARERS]
+    source[rank], source[rest] = source[rest], source[rank]
+    order[rank], order[rest] = order[rest], order[rank]
+    sharers[rank], sharers[rest] = sharers[rest], sharers[rank]
+    for i in range(rank):
+        matrix[rest, i] = matrix[rank, i]
+
+
+@kernel
+def put_back(size: int, work: ContactWorkspace) -> None:
+    """Undo all exchanges in the solution and the list of sharers."""
+    order, x, sharers = work.labels[ORDER], work.vectors[POINT], work.vectors[SHARERS]
+    for vector in (x, sharers):
+        for place in range(size):
+            work.vectors[SPEED, place] = vector[place]
+        for place in range(size):
+            vector[order[place]] = work.vectors[SPEED, place]
+
+
+@kernel
+def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
+    """Spread the solution from the independent rows over all, to the least norm.
+
+    The other rows are combinations of these, C = L₂ L₁⁻¹. Where y solves for these alone, every x
+    with ``x₁ + Cᵀ x₂ = y`` is a solution. In the norm of the impulses, where what m rows share in
+    equal parts counts 1/m (they make the diagonal M), the shortest has::
+
+        x₂ = M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
+    """
+    matrix, x, sharers = work.tableau, work.vectors[POINT], work.vectors[SHARERS]
+    y, system = work.vectors[STEP], work.squares[BASIS]
+    for place in range(rank, size):
+        part = matrix[place]
+        for j in range(work.labels[SPAN, place], rank):
+            part[j] = 0.0
+        for j in range(rank - 2, -1, -1):
+            entry = part[j]
+            for i in range(j + 1, rank):
+                entry -= part[i] * matrix[i, j]
+            part[j] = entry
+    for i in range(rank):
+        y[i] = x[i]
+        for j in range(i):
+            system[i, j] = 0.0
+        system[i, i] = sharers[i]
+    for place in range(rank, size):
+        part = matrix[place]
+        for i in range(rank):
+            weighted = sharers[place] * part[i]
+            for j in range(i + 1):
+                system[i, j] += weighted * part[j]
+    solve_regular(rank, system, y)
+    for place in range(rank, size):
+        part = matrix[place]
+        entry = 0.0
+        for i in range(rank):
+            entry += part[i] * y[i]
+        entry *= sharers[place]
+        x[place] = entry
+        for i in range(rank):
+            x[i] -= part[i] * entry
+
+
+@dissolved_kernel
+def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
+    """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
+    for i in range(size):
+        for j in range(i):
+            entry = matrix[i, j]
+            for k in range(j):
+                entry -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = entry
+        for j in range(i):
+            ratio = matrix[i, j] * matrix[j, j]
+            matrix[i, i] -= ratio * matrix[i, j]
+            x[i] -= ratio * x[j]
+            matrix[i, j] = ratio
+        matrix[i, i] = 1.0 / matrix[i, i]
+    for j in range(size - 1, -1, -1):
+        total = x[j] * matrix[j, j]
+        for i in range(j + 1, size):
+            total -= matrix[i, j] * x[i]
+        x[j] = total
+
+
+@dissolved_kernel
+def share_impulses(count: int, friction: Floats, impulse: Floats, work: ContactWorkspace) -> bool:
+    """Write the solution out to all rows in equal shares; return whether it is in the cones."""
+    equation, sharers, x = work.labels[PIVOT_ROW], work.vectors[SHARERS], work.vectors[POINT]
+    for row in range(2 * count):
+        place = equation[row]
+        impulse[row] = x[place] / sharers[place] if place >= 0 else 0.0
+    for contact in range(count):
+        normal = impulse[2 * contact]
+        if not (normal >= 0.0 and abs(impulse[2 * contact + 1]) <= friction[contact] * normal):
+            return False
+    return True
+
+
+@dissolved_kernel
+def moves_as_named(
+    count: int, friction: Floats, mode: Integers, velocity: Floats, work: ContactWorkspace
+) -> bool:
+    """Whether the velocity has every contact do what its mode says.
+
+    A contact without friction takes the name of its velocity.
+    """
+    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
+    for contact in range(count):
+        normal = 2 * contact
+        tangent = normal + 1
+        departs = velocity[normal] > rest * root[normal]
+        if departs != (mode[contact] == OPEN):
+            return False
+        if departs:
+            continue
+        if abs(velocity[tangent]) > rest * root[tangent]:
+            if friction[contact] > 0.0:
+                return False
+            mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
+    return True
+
+
+@dissolved_kernel
+def repeat(
+    count: int,
+    delassus: Floats,
+    free: Floats,
+    friction: Floats,
+    mode: Integers,
+    impulse: Floats,
+    velocity: Floats,
+    residual: Floats,
+    tolerance: float,
+    work: ContactWorkspace,
+) -> bool:
+    """Solve the contact problem if its contacts do what ``mode`` says; return success.
+
+    Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`. After a
+    success they hold the one solution of least norm, certified to ``tolerance``.
+    """
+    size = list_equations(count, delassus, friction, mode, work)
+    if size < 0 or not solve_equations(size, delassus, free, work):
+        return False
+    if not share_impulses(count, friction, impulse, work):
+        return False
+    worst = certify(
+        count,
+        delassus,
+        free,
+        friction,
+        impulse,
+        velocity,
+        residual,
+        work,
+    )
+    return worst <= tolerance and moves_as_named(count, friction, mode, velocity, work)

@@ -1,0 +1,1 @@
+"""Robot files: every format, in and out."""

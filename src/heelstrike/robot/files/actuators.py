@@ -1,0 +1,169 @@
+"""From the actuators of a file to torques at joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.warning import warn
+
+DRIVES_JOINT = (0, 1)  # MuJoCo's mjTRN_JOINT and mjTRN_JOINTINPARENT, alike for hinge and slide
+FIXED_GAIN = 0  # mjGAIN_FIXED: force = gain * control
+AFFINE_GAIN = 1
+NO_BIAS = 0
+AFFINE_BIAS = 1
+NO_ACTIVATION = 0
+LINEAR_ACTIVATION = (0, 1, 2, 3)  # none, integrator, filter, exact filter
+
+
+@dataclass(frozen=True)
+class Actuators:
+    """Which coordinates are driven, and how hard.
+
+    Attributes
+    ----------
+    joint : (nu,) int
+        Coordinate that each actuator drives.
+    lower, upper : (nu,) float
+        Limits of the torque or force at the joint; infinite where there are none.
+    names : tuple of str
+        Names of the actuators.
+    armature, damping : (nv,) float
+        Rotor inertia and damping of the motors, seen at the joints.
+    """
+
+    joint: Integers
+    lower: Floats
+    upper: Floats
+    names: tuple[str, ...]
+    armature: Floats
+    damping: Floats
+
+
+def read_actuators(file: MujocoFile) -> Actuators:
+    """Read the torque limits at the joints; a controller of ours commands torques, not ``ctrl``.
+
+    Position and velocity servos are taken as plain motors, with a warning: heelstrike's
+    controllers command the torque, so the servo's own law would act twice.
+
+    Raises
+    ------
+    RobotError
+        If an actuator does not act on a joint, is a muscle or the like, or shares its joint.
+    """
+    model = file.model
+    if file.is_urdf and model.nu == 0:
+        return _from_effort_limits(file)
+    joints: list[int] = []
+    limits: list[tuple[float, float]] = []
+    names: list[str] = []
+    for actuator in range(len(model.actuator_trntype)):
+        joint = _driven_joint(file, actuator)
+        name = file.name("actuator", actuator)
+        if joint in joints:
+            other = names[joints.index(joint)]
+            raise file.error(
+                f"joint {file.name('joint', joint)!r} is driven by two actuators, {other!r} and "
+                f"{name!r}. Keep one, with the torque limits of both together."
+            )
+        joints.append(joint)
+        limits.append(_torque_limits(file, actuator, joint))
+        names.append(file.given_name("actuator", actuator) or file.name("joint", joint))
+    gear = model.actuator_gear[:, 0]
+    return _assembled(
+        joints,
+        np.array(limits, dtype=np.float64).reshape(-1, 2),
+        names,
+        armature=_at_joints(file, "actuator_armature", gear, joints),
+        damping=_at_joints(file, "actuator_damping", gear, joints),
+    )
+
+
+def _from_effort_limits(file: MujocoFile) -> Actuators:
+    """Drive every joint of a URDF that has an effort limit: the format has no actuators."""
+    joints = np.flatnonzero(file.model.jnt_actfrclimited).tolist()
+    names = [file.name("joint", joint) for joint in joints]
+    none = np.zeros(file.model.nv)
+    return _assembled(joints, file.model.jnt_actfrcrange[joints], names, none, none)
+
+
+def _assembled(
+    joints: list[int],
+    limits: Floats,
+    names: list[str],
+    armature: Floats,
+    damping: Floats,
+) -> Actuators:
+    lower, upper = np.ascontiguousarray(limits.T)
+    return Actuators(
+        np.array(joints, dtype=np.int64), lower, upper, tuple(names), armature, damping
+    )
+
+
+def _at_joints(file: MujocoFile, field: str, gear: Floats, joints: list[int]) -> Floats:
+    """Inertia or damping of the actuators, through their gears, at the joints they drive."""
+    result = np.zeros(file.model.nv)
+    values = file.field(field)  # only newer versions of MuJoCo have it
+    if values.size:
+        result[joints] = gear**2 * values
+    return result
+
+
+def _driven_joint(file: MujocoFile, actuator: int) -> int:
+    model, name = file.model, file.name("actuator", actuator)
+    if model.actuator_trntype[actuator] not in DRIVES_JOINT:
+        raise file.error(
+            f"actuator {name!r} does not act on a joint. heelstrike drives joints: replace it by "
+            f'<motor name="{name}" joint="…"/>.'
+        )
+    if (
+        model.actuator_gaintype[actuator] not in (FIXED_GAIN, AFFINE_GAIN)
+        or model.actuator_biastype[actuator] not in (NO_BIAS, AFFINE_BIAS)
+        or model.actuator_dyntype[actuator] not in LINEAR_ACTIVATION
+    ):
+        raise file.error(
+            f"actuator {name!r} is a muscle or another actuator with a law of its own, which "
+            f"heelstrike does not simulate. Replace it by a <motor> on the same joint."
+        )
+    return int(model.actuator_trnid[actuator, 0])
+
+
+def _torque_limits(file: MujocoFile, actuator: int, joint: int) -> tuple[float, float]:
+    """Range of the torque at the joint that control, force and joint limits leave."""
+    model, name = file.model, file.name("actuator", actuator)
+    gear = float(model.actuator_gear[actuator, 0])
+    if gear == 0.0:
+        raise file.error(f"actuator {name!r} has gear 0 and can exert no torque.")
+    plain = (
+        model.actuator_gaintype[actuator] == FIXED_GAIN
+        and model.actuator_biastype[actuator] == NO_BIAS
+        and model.actuator_dyntype[actuator] == NO_ACTIVATION
+    )
+    force = np.array([-np.inf, np.inf])
+    if not plain:
+        warn(
+            f"{file.source}: actuator {name!r} has a control law of its own (a position or "
+            "velocity servo, or a filter). It is loaded as a motor that exerts the torque a "
+            "heelstrike controller asks for; only its force limits are kept."
+        )
+    elif model.actuator_ctrllimited[actuator] and not file.disabled("clampctrl"):
+        gain = float(model.actuator_gainprm[actuator, 0])
+        force = np.sort(gain * model.actuator_ctrlrange[actuator])
+    if model.actuator_forcelimited[actuator]:
+        force = _intersect(force, model.actuator_forcerange[actuator])
+    torque = gear * (force if gear > 0.0 else force[::-1])
+    if model.jnt_actfrclimited[joint]:
+        torque = _intersect(torque, model.jnt_actfrcrange[joint])
+    if not torque[0] < torque[1]:
+        raise file.error(
+            f"actuator {name!r} has contradictory limits: at its joint they leave the torque range "
+            f"{torque[0]:g} to {torque[1]:g}. Check its ctrlrange, forcerange and gear."
+        )
+    return float(torque[0]), float(torque[1])
+
+
+def _intersect(a: Floats, b: Floats) -> Floats:
+    return np.array([max(a[0], b[0]), min(a[1], b[1])])

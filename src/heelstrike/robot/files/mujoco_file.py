@@ -1,0 +1,247 @@
+"""A robot file as MuJoCo's own parser understands it, posed in its reference configuration."""
+
+from __future__ import annotations
+
+import textwrap
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.files.flattening import float_in_plane, project
+from heelstrike.robot.files.screening.screening import Screened, screen
+from heelstrike.robot.files.screening.trial import try_apart
+from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
+from heelstrike.robot.files.urdf import let_massless_links_pass, prepare_urdf, urdf_text
+from heelstrike.robot.plausibility import is_possible
+from heelstrike.robot.warning import warn
+
+LONGEST_REASON = 600  # letters of MuJoCo's own words in a message
+
+
+@dataclass(frozen=True)
+class MujocoFile:
+    """A parsed MJCF or URDF file.
+
+    Attributes
+    ----------
+    model : mujoco.MjModel
+        The compiled file.
+    pose : mujoco.MjData
+        World poses of joints, bodies and geoms in the reference configuration (``qpos0``).
+    xml : Element
+        The file as it is written, included ones in place, without what plays no part in motion.
+    source : str
+        What to call the file in messages.
+    flexible : bool
+        Whether it had flexible bodies, which are left out.
+    """
+
+    model: Any
+    pose: Any
+    xml: Element
+    source: str
+    flexible: bool = False
+
+    @property
+    def is_urdf(self) -> bool:
+        """Whether the file is URDF and not MJCF."""
+        return self.xml.tag == "robot"
+
+    def given_name(self, kind: str, index: int) -> str:
+        """Name that the file gives a body, joint, geom, actuator …, or the empty string."""
+        import mujoco
+
+        object_type = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return mujoco.mj_id2name(self.model, object_type, index) or ""
+
+    def name(self, kind: str, index: int) -> str:
+        """Name of a body, joint, geom, actuator …, or its kind and number if it has none."""
+        return self.given_name(kind, index) or f"{kind} {index}"
+
+    def error(self, message: str) -> RobotError:
+        """Return an error that names the file."""
+        return RobotError(f"{self.source}: {message}")
+
+    def disabled(self, flag: str) -> bool:
+        """Whether the file switches off the part of the physics called `flag`."""
+        import mujoco
+
+        bit = getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)
+        return bool(self.model.opt.disableflags & int(bit))
+
+    def field(self, name: str) -> NDArray[np.float64]:
+        """Return an array of the model, empty where this version of MuJoCo does not have it."""
+        return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
+
+
+def parse(
+    source: Path | str,
+    *,
+    floating: bool = False,
+    projected: bool = False,
+    lenient: bool = False,
+) -> MujocoFile:
+    """Parse an MJCF or URDF file, or a string that holds one.
+
+    Parameters
+    ----------
+    source : Path or str
+        Path of a file, or the XML text itself.
+    floating : bool
+        Whether the body that the file fixes to the world (or leaves free) floats in the plane.
+    projected : bool
+        Whether joints that leave the x–z plane are locked.
+    lenient : bool
+        Whether masses and inertias that no body can have pass, mended as MuJoCo mends them. For
+        looking at the file, not for simulating the robot.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read or MuJoCo's parser refuses it; the message is the parser's.
+    """
+    label = str(source) if isinstance(source, Path) else "XML string"
+    file = screen(source, label)
+    xml = file.xml
+    import mujoco
+
+    remarks: list[str] = []
+    try:
+        with _warnings_into(remarks):
+            urdf = xml.tag == "robot"
+            if urdf and not lenient:
+                check_urdf(xml, label)
+            if urdf or floating or projected or lenient:
+                spec = _parsed(source, file, label)
+                if lenient:
+                    spec.compiler.balanceinertia = True
+                    let_massless_links_pass(spec)
+                if floating:
+                    float_in_plane(spec, label)
+                if projected:
+                    project(spec, label)
+                model = compiled(spec, remarks)
+            else:
+                if file.delicate:
+                    try_apart(file.text, file.models, label)
+                model = mujoco.MjModel.from_xml_string(file.text, file.models)
+            pose = mujoco.MjData(model)
+            mujoco.mj_kinematics(model, pose)
+    except RobotError:
+        raise
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise _unreadable(label, error) from error
+    for remark in remarks:
+        warn(f"{label}: {remark}")
+    if not lenient:
+        _warn_of_mended_inertias(source, file, label)
+    return MujocoFile(model, pose, xml, label, file.flexible)
+
+
+def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
+    """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
+
+    Bodies that do not move, and those that leave their inertia to their geoms, are not among them.
+
+    Raises
+    ------
+    RobotError
+        If the file cannot be read.
+    """
+    import mujoco
+
+    label = str(path)
+    file = screen(path, label)
+    try:
+        with _warnings_into([]), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            spec = _parsed(path, file, label)
+    except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
+        raise _unreadable(label, error) from error
+    return _stated(spec)
+
+
+def _stated(spec: Any) -> list[tuple[str, float, NDArray[np.float64]]]:
+    result = []
+    for body in spec.bodies:
+        if not body.explicitinertial or body.id == 0:
+            continue
+        full = np.array(body.fullinertia, dtype=np.float64)
+        if np.isnan(full[0]):  # given by its principal moments
+            tensor = np.diag(np.array(body.inertia, dtype=np.float64))
+        else:
+            xx, yy, zz, xy, xz, yz = full
+            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        result.append((body.name, float(body.mass), tensor))
+    return result
+
+
+def _warn_of_mended_inertias(source: Path | str, file: Screened, label: str) -> None:
+    """Warn of inertias that MuJoCo changed because the file says ``balanceinertia="true"``."""
+    compilers = file.xml.iter("compiler")
+    if not any(compiler.get("balanceinertia") == "true" for compiler in compilers):
+        return
+    with _warnings_into([]), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        stated = _stated(_parsed(source, file, label))
+    mended = [name for name, _, tensor in stated if not is_possible(tensor)]
+    if mended:
+        warn(
+            f"{label}: the inertias of {', '.join(mended)} violate the triangle inequality, and "
+            'balanceinertia="true" in the file lets MuJoCo replace them by others.'
+        )
+
+
+def _unreadable(label: str, error: Exception) -> RobotError:
+    reason = textwrap.shorten(" ".join(str(error).split()), LONGEST_REASON)
+    return RobotError(f"{label}: MuJoCo's parser cannot read this robot: {reason}")
+
+
+def compiled(spec: Any, remarks: list[str]) -> Any:
+    """Compile a parsed file; what MuJoCo warns of goes to `remarks`."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        model = spec.compile()
+    remarks += [str(one.message) for one in caught]
+    return model
+
+
+def _parsed(source: Path | str, file: Screened, label: str) -> Any:
+    """Return a file as MuJoCo understands it, not yet compiled."""
+    import mujoco
+
+    text = file.text
+    if file.xml.tag == "robot":
+        check_urdf_tree(file.xml, label)
+        directory = source.parent if isinstance(source, Path) else Path()
+        text = urdf_text(file.xml, directory, label)
+    if file.delicate:
+        try_apart(text, file.models, label)
+    spec = mujoco.MjSpec.from_string(text, include=file.models)
+    if file.xml.tag == "robot":
+        prepare_urdf(spec)
+    return spec
+
+
+@contextmanager
+def _warnings_into(remarks: list[str]) -> Iterator[None]:
+    """Collect MuJoCo's warnings, which it would print and append to a file in the work directory.
+
+    MuJoCo has one handler a process; the one that was set is put back.
+    """
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(remarks.append)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)

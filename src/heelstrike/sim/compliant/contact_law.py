@@ -1,0 +1,477 @@
+"""Contact laws of compliant ground: force from penetration and speed, point by point.
+
+A contact law is what the penalty methods of the paper's [13] put in the place of the contact
+problem. It says how hard the ground pushes for a given penetration and speed, so that there is
+nothing to solve; in exchange every foot sinks in. Both halves are passive: the normal laws and the
+friction laws take energy out of the robot or store it, and never give back more than they stored.
+
+Signs: `gap` is negative in the ground, ``penetration = −gap``; `normal_speed` is the rate of the
+gap, positive when leaving; forces act on the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import acos, acosh, exp, log1p, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.errors import SimulationError
+
+Floats = NDArray[np.float64]
+
+# Standard gravity (m/s²): turns the weight on a contact point into the mass that hits the ground.
+GRAVITY = 9.80665
+
+# Speed (rad/s, m/s) around which dry friction of the joints is smoothed beside a law that has none.
+JOINT_SPEED = 1e-4
+
+# What the kernels call the laws.
+HUNT_CROSSLEY = 0
+KELVIN_VOIGT = 1
+REGULARISED = 0
+BRISTLE = 1
+
+# Places in the numbers of a contact law.
+STIFFNESS = 0
+DISSIPATION = 1
+EXPONENT = 2
+SLIP_SCALE = 3
+BRISTLE_STIFFNESS = 4
+BRISTLE_DAMPING = 5
+JOINT_SCALE = 6
+NUMBERS = 7
+
+# Places in the partial derivatives of a contact's forces.
+NORMAL_BY_GAP = 0
+NORMAL_BY_SPEED = 1
+TANGENT_BY_NORMAL = 2
+TANGENT_BY_SPEED = 3
+TANGENT_BY_BRISTLE = 4
+BRISTLE_BY_NORMAL = 5
+BRISTLE_BY_SPEED = 6
+BRISTLE_BY_BRISTLE = 7
+PARTIALS = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class HuntCrossley:
+    """Nonlinear spring whose damping grows with the penetration (the paper's [13]).
+
+    ``F = k δⁿ (1 + 3/2 α δ̇)``, never pulling, with penetration δ. The force begins and ends at
+    zero, without the jump that a linear damper makes at the first touch.
+
+    Parameters
+    ----------
+    stiffness : float
+        k in N/mⁿ, for each contact point.
+    dissipation : float
+        α in s/m. A mass that hits the ground at speed v leaves it at e v with e ≈ 1 − α v for
+        small α v; :meth:`restitution` gives e in full.
+    exponent : float
+        n ≥ 1; 3/2 is Hertz's theory of the sphere on a plane.
+
+    Raises
+    ------
+    SimulationError
+        If a parameter is out of its range.
+
+    Notes
+    -----
+    By default a 75 kg robot at rest on the two corners of one foot sinks in by 0.1 mm.
+
+    Examples
+    --------
+    >>> law = HuntCrossley(stiffness=4e8, dissipation=0.5)
+    >>> round(law.restitution(0.1), 3)
+    0.952
+    """
+
+    stiffness: float = 4e8
+    dissipation: float = 50.0
+    exponent: float = 1.5
+
+    def __post_init__(self) -> None:
+        _positive("Hunt-Crossley stiffness", self.stiffness, "N/mⁿ")
+        _not_negative("Hunt-Crossley dissipation", self.dissipation, "s/m")
+        if not 1.0 <= self.exponent < np.inf:
+            raise SimulationError(f"the Hunt-Crossley exponent must be ≥ 1, got {self.exponent}")
+
+    @classmethod
+    def from_sink(
+        cls,
+        *,
+        weight: float,
+        sink: float,
+        restitution: float,
+        speed: float,
+        exponent: float = 1.5,
+    ) -> HuntCrossley:
+        """Choose the law by what one can see of it.
+
+        Parameters
+        ----------
+        weight : float
+            Load of one contact point at rest, in newtons.
+        sink : float
+            Penetration under that load, in metres.
+        restitution, speed : float
+            Ratio of the speeds after and before an impact at `speed` (m/s), in (0, 1].
+        exponent : float
+            n of the law.
+        """
+        _positive("weight", weight, "N")
+        _positive("sink", sink, "m")
+        _positive("speed", speed, "m/s")
+        _restitution(restitution)
+        scaled = 0.0
+        if restitution < 1.0:
+            # With c = 3/2 α: c v − ln(1 + c v) is the same before and after; see `restitution`.
+            def defect(approach: float) -> float:
+                leave = restitution * approach
+                return approach - log1p(approach) + leave + log1p(-leave)
+
+            highest = (1.0 - 1e-15) / restitution
+            scaled = _root(defect, 1e-6 * highest, highest)
+        return cls(
+            stiffness=weight / sink**exponent,
+            dissipation=scaled / (1.5 * speed),
+            exponent=exponent,
+        )
+
+    def restitution(self, speed: float) -> float:
+        """Ratio of the speeds after and before an impact of a free mass, whatever the mass.
+
+        ``m v dv/dδ = −k δⁿ (1 + c v)``, c = 3/2 α, integrates to ``c v − ln(1 + c v)`` being the
+        same when the mass leaves as when it came.
+        """
+        _positive("speed", speed, "m/s")
+        approach = 1.5 * self.dissipation * speed
+        if approach < 1e-7:
+            return 1.0 - self.dissipation * speed
+        level = approach - log1p(approach)
+        leave = _root(lambda x: -x - log1p(-x) - level, 0.0, -np.expm1(-level - 1.0))
+        return leave / approach
+
+    def sink(self, weight: float) -> float:
+        """Penetration in metres of a contact point at rest under a load in newtons."""
+        return float((weight / self.stiffness) ** (1.0 / self.exponent))
+
+    def stored_energy(self, gap: Floats) -> Floats:
+        """Elastic energy in joules at the given gaps (m)."""
+        depth = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0)
+        energy: Floats = self.stiffness * depth ** (self.exponent + 1.0) / (self.exponent + 1.0)
+        return energy
+
+    @property
+    def kind(self) -> int:
+        """What the kernels call this law."""
+        return HUNT_CROSSLEY
+
+    def write(self, numbers: Floats) -> None:
+        """Write the parameters where the kernels look for them."""
+        numbers[STIFFNESS] = self.stiffness
+        numbers[DISSIPATION] = 1.5 * self.dissipation
+        numbers[EXPONENT] = self.exponent
+
+
+@dataclass(frozen=True, kw_only=True)
+class KelvinVoigt:
+    """Linear spring and damper side by side: ``F = max(0, k δ + c δ̇)`` with penetration δ.
+
+    Parameters
+    ----------
+    stiffness : float
+        k in N/m, for each contact point.
+    damping : float
+        c in N s/m, for each contact point.
+
+    Raises
+    ------
+    SimulationError
+        If a parameter is out of its range.
+
+    Notes
+    -----
+    By default a 75 kg robot at rest on the two corners of one foot sinks in by 0.07 mm.
+    """
+
+    stiffness: float = 5e6
+    damping: float = 3e4
+
+    def __post_init__(self) -> None:
+        _positive("Kelvin-Voigt stiffness", self.stiffness, "N/m")
+        _not_negative("Kelvin-Voigt damping", self.damping, "N s/m")
+
+    @classmethod
+    def from_sink(cls, *, weight: float, sink: float, restitution: float) -> KelvinVoigt:
+        """Choose the law by what one can see of it.
+
+        Parameters
+        ----------
+        weight : float
+            Load of one contact point at rest, in newtons; the mass that it stands for is the mass
+            that hits the ground.
+        sink : float
+            Penetration under that load, in metres.
+        restitution : float
+            Ratio of the speeds after and before an impact, in (0, 1], whatever the speed.
+        """
+        _positive("weight", weight, "N")
+        _positive("sink", sink, "m")
+        _restitution(restitution)
+        stiffness = weight / sink
+        ratio = 0.0
+        if restitution < 1.0:
+            ratio = _root(lambda z: _linear_restitution(z) - restitution, 0.0, 1e9)
+        return cls(stiffness=stiffness, damping=2.0 * ratio * sqrt(stiffness * weight / GRAVITY))
+
+    def damping_ratio(self, mass: float) -> float:
+        """Damping of a mass (kg) on one contact point, relative to critical damping."""
+        _positive("mass", mass, "kg")
+        return self.damping / (2.0 * sqrt(self.stiffness * mass))
+
+    def restitution(self, mass: float) -> float:
+        """Ratio of the speeds after and before an impact of a free mass (kg).
+
+        With damping ratio ζ: ``exp(−2 ζ acos ζ / √(1 − ζ²))``, since the force has fallen to zero
+        after ``2 acos ζ / ω`` at the damped frequency ω. Beyond critical damping both the
+        arc cosine and the root turn hyperbolic.
+        """
+        return _linear_restitution(self.damping_ratio(mass))
+
+    def contact_time(self, mass: float) -> float:
+        """Duration in seconds of an impact of a free mass (kg), without gravity."""
+        ratio = self.damping_ratio(mass)
+        return 2.0 * _arc_over_root(ratio) * sqrt(mass / self.stiffness)
+
+    def sink(self, weight: float) -> float:
+        """Penetration in metres of a contact point at rest under a load in newtons."""
+        return weight / self.stiffness
+
+    def stored_energy(self, gap: Floats) -> Floats:
+        """Elastic energy in joules at the given gaps (m)."""
+        depth = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0)
+        energy: Floats = 0.5 * self.stiffness * depth**2
+        return energy
+
+    @property
+    def kind(self) -> int:
+        """What the kernels call this law."""
+        return KELVIN_VOIGT
+
+    def write(self, numbers: Floats) -> None:
+        """Write the parameters where the kernels look for them."""
+        numbers[STIFFNESS] = self.stiffness
+        numbers[DISSIPATION] = self.damping
+
+
+@dataclass(frozen=True, kw_only=True)
+class RegularisedFriction:
+    """Coulomb friction smoothed around zero speed: ``F_t = −μ F_n v / √(v² + v_s²)``.
+
+    It never holds: what should stick creeps, at ``v_s r / √(1 − r²)`` when it needs the fraction r
+    of the friction there is.
+
+    Parameters
+    ----------
+    speed : float
+        v_s in m/s, at which 71 % of the friction is there.
+
+    Raises
+    ------
+    SimulationError
+        If the speed is not positive.
+    """
+
+    speed: float = 1e-4
+
+    def __post_init__(self) -> None:
+        _positive("regularisation speed", self.speed, "m/s")
+
+    def creep(self, use: float) -> float:
+        """Speed (m/s) at which a contact creeps that needs the given fraction of the friction."""
+        if not 0.0 <= use < 1.0:
+            raise SimulationError(f"the use of friction must lie in [0, 1), got {use}")
+        return self.speed * use / sqrt(1.0 - use * use)
+
+    @property
+    def kind(self) -> int:
+        """What the kernels call this law."""
+        return REGULARISED
+
+    def write(self, numbers: Floats) -> None:
+        """Write the parameters where the kernels look for them."""
+        numbers[SLIP_SCALE] = self.speed
+        numbers[JOINT_SCALE] = self.speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class BristleFriction:
+    """Coulomb friction with true stiction: a bristle that bends, and slides when bent too far.
+
+    The bristle is a spring and damper between the contact point and an anchor on the ground. While
+    ``|k s + c v| ≤ μ F_n`` the anchor holds and the bend s grows with the speed v of the point;
+    beyond, the force is μ F_n against the motion and the anchor is dragged along. A point at rest
+    stays at rest.
+
+    Parameters
+    ----------
+    stiffness : float
+        k in N/m, for each contact point.
+    damping : float
+        c in N s/m, for each contact point; it must not be zero.
+
+    Raises
+    ------
+    SimulationError
+        If a parameter is not positive.
+    """
+
+    stiffness: float = 5e6
+    damping: float = 1e4
+
+    def __post_init__(self) -> None:
+        _positive("bristle stiffness", self.stiffness, "N/m")
+        _positive("bristle damping", self.damping, "N s/m")
+
+    @property
+    def kind(self) -> int:
+        """What the kernels call this law."""
+        return BRISTLE
+
+    def write(self, numbers: Floats) -> None:
+        """Write the parameters where the kernels look for them."""
+        numbers[BRISTLE_STIFFNESS] = self.stiffness
+        numbers[BRISTLE_DAMPING] = self.damping
+        numbers[JOINT_SCALE] = JOINT_SPEED
+
+
+NormalLaw = HuntCrossley | KelvinVoigt
+FrictionLaw = RegularisedFriction | BristleFriction
+
+
+def _root(function: Callable[[float], float], low: float, high: float) -> float:
+    """Zero of a function between two numbers, to the last digits."""
+    from scipy.optimize import brentq  # takes half a second to import
+
+    return float(brentq(function, low, high, xtol=1e-15, rtol=1e-14))
+
+
+def _positive(name: str, value: float, unit: str) -> None:
+    if not 0.0 < value < np.inf:
+        raise SimulationError(f"the {name} must be a positive number of {unit}, got {value}")
+
+
+def _not_negative(name: str, value: float, unit: str) -> None:
+    if not 0.0 <= value < np.inf:
+        raise SimulationError(f"the {name} must be a number ≥ 0 of {unit}, got {value}")
+
+
+def _restitution(value: float) -> None:
+    if not 0.0 < value <= 1.0:
+        raise SimulationError(
+            f"a compliant contact has a restitution in (0, 1], got {value}; it leaves the ground "
+            f"at some speed however strong its damping"
+        )
+
+
+def _arc_over_root(ratio: float) -> float:
+    """Return acos ζ / √(1 − ζ²), continued beyond ζ = 1."""
+    if abs(ratio - 1.0) < 1e-8:
+        return 1.0
+    if ratio < 1.0:
+        return acos(ratio) / sqrt(1.0 - ratio * ratio)
+    return acosh(ratio) / sqrt(ratio * ratio - 1.0)
+
+
+def _linear_restitution(ratio: float) -> float:
+    return exp(-2.0 * ratio * _arc_over_root(ratio))
+
+
+@kernel
+def normal_force(
+    kind: int, numbers: Floats, gap: float, normal_speed: float, partial: Floats
+) -> float:
+    """Normal force of a contact point; writes its derivatives by gap and speed."""
+    partial[NORMAL_BY_GAP] = 0.0
+    partial[NORMAL_BY_SPEED] = 0.0
+    if gap >= 0.0:
+        return 0.0
+    if kind == KELVIN_VOIGT:
+        force = -numbers[STIFFNESS] * gap - numbers[DISSIPATION] * normal_speed
+        if force <= 0.0:
+            return 0.0
+        partial[NORMAL_BY_GAP] = -numbers[STIFFNESS]
+        partial[NORMAL_BY_SPEED] = -numbers[DISSIPATION]
+        return force
+    factor = 1.0 - numbers[DISSIPATION] * normal_speed
+    if factor <= 0.0:
+        return 0.0
+    spring = numbers[STIFFNESS] * (-gap) ** numbers[EXPONENT]
+    partial[NORMAL_BY_GAP] = numbers[EXPONENT] * spring * factor / gap
+    partial[NORMAL_BY_SPEED] = -numbers[DISSIPATION] * spring
+    return spring * factor
+
+
+@kernel
+def friction_force(
+    kind: int,
+    numbers: Floats,
+    friction: float,
+    normal: float,
+    speed: float,
+    bristle: float,
+    partial: Floats,
+) -> tuple[float, float]:
+    """Tangential force of a contact point and the rate of its bristle; writes the derivatives.
+
+    Parameters
+    ----------
+    friction, normal, speed, bristle : float
+        Friction coefficient, normal force, tangential speed, bend of the bristle.
+    """
+    for i in range(TANGENT_BY_NORMAL, PARTIALS):
+        partial[i] = 0.0
+    limit = friction * normal
+    if kind == REGULARISED:
+        if normal <= 0.0:
+            return 0.0, 0.0
+        size = np.sqrt(speed * speed + numbers[SLIP_SCALE] * numbers[SLIP_SCALE])
+        share = speed / size
+        rest = numbers[SLIP_SCALE] / size
+        partial[TANGENT_BY_NORMAL] = -friction * share
+        partial[TANGENT_BY_SPEED] = -limit * rest * rest / size
+        return -limit * share, 0.0
+    spring = numbers[BRISTLE_STIFFNESS] * bristle
+    damper = numbers[BRISTLE_DAMPING]
+    wanted = spring + damper * speed
+    if abs(wanted) <= limit:
+        partial[TANGENT_BY_SPEED] = -damper
+        partial[TANGENT_BY_BRISTLE] = -numbers[BRISTLE_STIFFNESS]
+        partial[BRISTLE_BY_SPEED] = 1.0
+        return -wanted, speed
+    side = 1.0 if wanted > 0.0 else -1.0
+    partial[TANGENT_BY_NORMAL] = -side * friction
+    partial[BRISTLE_BY_NORMAL] = side * friction / damper
+    partial[BRISTLE_BY_BRISTLE] = -numbers[BRISTLE_STIFFNESS] / damper
+    return -side * limit, (side * limit - spring) / damper
+
+
+@kernel
+def slips(kind: int, numbers: Floats, limit: float, speed: float, bristle: float) -> bool:
+    """Whether a contact point slides: its anchor is dragged, or it is faster than v_s."""
+    if kind == REGULARISED:
+        return abs(speed) > numbers[SLIP_SCALE]
+    wanted = numbers[BRISTLE_STIFFNESS] * bristle + numbers[BRISTLE_DAMPING] * speed
+    return abs(wanted) > limit
+
+
+@kernel
+def joint_friction(limit: float, scale: float, speed: float) -> tuple[float, float]:
+    """Dry friction of a joint, smoothed around zero speed, and its derivative by the speed."""
+    size = np.sqrt(speed * speed + scale * scale)
+    return -limit * speed / size, -limit * (scale / size) ** 2 / size

@@ -1,0 +1,683 @@
+"""One step of the compliant ground's equations of motion, linearly implicit in what is stiff.
+
+State: positions q, velocities v and the bends s of the bristles, one a contact point::
+
+    q' = v,   A v' = f,   f = B Γ + passive − H + Jᵀ F(gap, J v, s),   s' = S(F_n, J v, s)
+
+A stage of :mod:`heelstrike.sim.compliant.rosenbrock` linearises what can be stiff in f: contact
+forces, joint springs and dampers, and the gains of a controller that acts continuously. With
+g = γ h, u_q = g (r_q + u_v) and the bristles, each its own equation, eliminated, a stage is::
+
+    (A − g ∂f/∂v − g² ∂f/∂q) u_v = g A r_v + g² ∂f/∂q r_q + g Jᵀ ∂F/∂s (…)
+
+which stays well conditioned however stiff the ground. A controller's gains matter as much as the
+ground's stiffness: computed torque on a foot that is not quite flat damps the light foot with the
+inertia of the whole robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel
+from heelstrike.dynamics.kernels import (
+    bias_force,
+    factorize,
+    forward_kinematics,
+    link_velocities,
+    mass_matrix,
+    passive_force,
+    solve_factorized,
+)
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.compliant.contact_law import (
+    BRISTLE_BY_BRISTLE,
+    BRISTLE_BY_NORMAL,
+    BRISTLE_BY_SPEED,
+    JOINT_SCALE,
+    NORMAL_BY_GAP,
+    NORMAL_BY_SPEED,
+    PARTIALS,
+    TANGENT_BY_BRISTLE,
+    TANGENT_BY_NORMAL,
+    TANGENT_BY_SPEED,
+    friction_force,
+    joint_friction,
+    normal_force,
+)
+from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
+from heelstrike.sim.contact_geometry import contact_rows, observe, row_product
+from heelstrike.sim.controller.asking import ask
+from heelstrike.sim.controller.guard import guarded
+from heelstrike.sim.memory import Memory
+from heelstrike.sim.push import add_pushes
+from heelstrike.sim.recording import try_torque
+
+# Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
+# They only steer the linear systems: their error costs steps, not accuracy.
+PERTURBATION = 1e-6
+
+# Steps for which the gains of a controller are taken to last, as long as none fails.
+GAINS_LAST = 20
+
+# In steps shorter than this (s), which only a controller that changes its mind can bring about, it
+# is taken at its word wherever it is asked: it decides once, not to and fro.
+DECISIVE = 1e-8
+
+# A bristle bent less than this (m) is straight.
+NO_BEND = 1e-30
+
+
+class Laws(Bundle):
+    """The contact laws as the kernels see them.
+
+    Attributes
+    ----------
+    normal, friction : int
+        Which laws; constants of :mod:`heelstrike.sim.compliant.contact_law`.
+    numbers : (7,) float
+        Their parameters.
+    stop : int
+    stop_numbers : (7,) float
+        The law of the joint stops.
+    """
+
+    normal: int
+    friction: int
+    numbers: Floats
+    stop: int
+    stop_numbers: Floats
+
+
+class Control(NamedTuple):
+    """The controller as the integration sees it.
+
+    Attributes
+    ----------
+    continuous : bool
+        Whether it acts at every instant; otherwise its torques are held.
+    kernel : compiled function
+    parameters, memory : float arrays
+        The controller and its numbers.
+    trial : float array
+        Copy of its memory for the calls within a step.
+    """
+
+    continuous: bool
+    kernel: Callable[..., None]
+    parameters: Floats
+    memory: Floats
+    trial: Floats
+
+
+class CompliantWorkspace(Bundle):
+    """State of the bristles and the scratch of a step.
+
+    Attributes
+    ----------
+    bristle : (nc,) float
+        Bend of each bristle now, in metres.
+    acceleration, bristle_rate : (nv,), (nc,) float
+        Rates of v and of the bristles at the state evaluated last.
+    force : (nc, 2) float
+        Contact forces of the law at the state evaluated last, in newtons.
+    partial : (nc, 8) float
+        Their derivatives.
+    stop_force : (nv,) float
+        Forces of the joint stops at the state evaluated last.
+    dry_force : (nv,) float
+        Dry friction of the joints at the state evaluated last.
+    stop_partial : (nv, 2) float
+        Derivatives of both by q and v of the joint.
+    torque_by_q, torque_by_v : (nu, nv) float
+        Derivatives of the controller's torques.
+    age : (1,) int
+        Steps since these were found.
+    trial_torque : (nu,) float
+        Torques of a perturbed state.
+    base_q, base_v, base_acceleration : (nv,) float
+    base_bristle, base_rate, base_gap : (nc,) float
+    base_force : (nc, 2) float
+    base_stop_force, base_dry_force : (nv,) float
+    base_stop_partial : (nv, 2) float
+    base_partial : (nc, 8) float
+    base_rows : (2 nc, nv) float
+    base_matrix : (nv, nv) float
+        State, rates, gaps, forces, contact Jacobian and A at the start of the step.
+    force_by_q : (nv, nv) float
+        ∂f/∂q of a step, bristles eliminated.
+    system : (nv, nv) float
+        A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors.
+    order : (nv,) int
+        Row exchanges of the factors.
+    stage_q, stage_v : (4, nv) float
+    stage_bristle : (4, nc) float
+        The stages u_i.
+    right_q, right_v : (nv,) float
+    right_bristle : (nc,) float
+        Right-hand side of a stage.
+    impulse : (nc, 2) float
+    stop_impulse, dry_impulse : (nv,) float
+        Impulses of contacts, joint stops and dry friction since the last sample, in N s (N m s).
+    touched, left : (nc,) float
+        When a contact point last came to the ground and left it since the last sample; negative
+        if it did not.
+    """
+
+    bristle: Floats
+    acceleration: Floats
+    bristle_rate: Floats
+    force: Floats
+    partial: Floats
+    stop_force: Floats
+    dry_force: Floats
+    stop_partial: Floats
+    torque_by_q: Floats
+    torque_by_v: Floats
+    trial_torque: Floats
+    age: Integers
+    base_q: Floats
+    base_v: Floats
+    base_acceleration: Floats
+    base_bristle: Floats
+    base_rate: Floats
+    base_gap: Floats
+    base_force: Floats
+    base_stop_force: Floats
+    base_dry_force: Floats
+    base_stop_partial: Floats
+    base_partial: Floats
+    base_rows: Floats
+    base_matrix: Floats
+    force_by_q: Floats
+    system: Floats
+    order: Integers
+    stage_q: Floats
+    stage_v: Floats
+    stage_bristle: Floats
+    right_q: Floats
+    right_v: Floats
+    right_bristle: Floats
+    impulse: Floats
+    stop_impulse: Floats
+    dry_impulse: Floats
+    touched: Floats
+    left: Floats
+
+
+def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
+    """Allocate the scratch for a robot of the given numbers of coordinates, motors, contacts."""
+    return CompliantWorkspace(
+        bristle=np.zeros(nc),
+        acceleration=np.zeros(nv),
+        bristle_rate=np.zeros(nc),
+        force=np.zeros((nc, 2)),
+        partial=np.zeros((nc, PARTIALS)),
+        stop_force=np.zeros(nv),
+        dry_force=np.zeros(nv),
+        stop_partial=np.zeros((nv, 2)),
+        torque_by_q=np.zeros((nu, nv)),
+        torque_by_v=np.zeros((nu, nv)),
+        trial_torque=guarded(np.zeros(nu)),
+        age=np.full(1, GAINS_LAST, dtype=np.int64),
+        base_q=np.zeros(nv),
+        base_v=np.zeros(nv),
+        base_acceleration=np.zeros(nv),
+        base_bristle=np.zeros(nc),
+        base_rate=np.zeros(nc),
+        base_gap=np.zeros(nc),
+        base_force=np.zeros((nc, 2)),
+        base_stop_force=np.zeros(nv),
+        base_dry_force=np.zeros(nv),
+        base_stop_partial=np.zeros((nv, 2)),
+        base_partial=np.zeros((nc, PARTIALS)),
+        base_rows=np.zeros((2 * nc, nv)),
+        base_matrix=np.zeros((nv, nv)),
+        force_by_q=np.zeros((nv, nv)),
+        system=np.zeros((nv, nv)),
+        order=np.zeros(nv, dtype=np.int64),
+        stage_q=np.zeros((STAGES, nv)),
+        stage_v=np.zeros((STAGES, nv)),
+        stage_bristle=np.zeros((STAGES, nc)),
+        right_q=np.zeros(nv),
+        right_v=np.zeros(nv),
+        right_bristle=np.zeros(nc),
+        impulse=np.zeros((nc, 2)),
+        stop_impulse=np.zeros(nv),
+        dry_impulse=np.zeros(nv),
+        touched=np.zeros(nc),
+        left=np.zeros(nc),
+    )
+
+
+@kernel
+def command(
+    control: Control, memory_now: Floats, time: float, model: Model, memory: Memory, torque: Floats
+) -> None:
+    """Torques of a controller at the state now, within their limits."""
+    ask(
+        control.kernel,
+        time,
+        memory.q,
+        memory.v,
+        model,
+        memory,
+        control.parameters,
+        memory_now,
+        torque,
+    )
+    try_torque(model, memory.q, memory.v, torque, memory)
+
+
+@kernel
+def try_command(
+    control: Control, time: float, model: Model, memory: Memory, torque: Floats
+) -> None:
+    """Torques that a controller would ask for, were this its next call; it remembers nothing."""
+    for i in range(control.memory.shape[0]):
+        control.trial[i] = control.memory[i]
+    command(control, control.trial, time, model, memory, torque)
+
+
+@kernel
+def find_gains(
+    control: Control, time: float, model: Model, memory: Memory, work: CompliantWorkspace
+) -> None:
+    """Derivatives of the controller's torques at the start of the step, by differences."""
+    for j in range(model.parent.shape[0]):
+        memory.q[j] = work.base_q[j]
+        memory.v[j] = work.base_v[j]
+    forward_kinematics(model, memory.q, memory.tree)
+    link_velocities(model, memory.v, memory.tree)
+    try_command(control, time, model, memory, memory.torque)
+    for j in range(model.parent.shape[0]):
+        difference(control, time, model, memory, memory.q, j, work.trial_torque, work.torque_by_q)
+        difference(control, time, model, memory, memory.v, j, work.trial_torque, work.torque_by_v)
+    work.age[0] = 0
+
+
+@kernel
+def difference(
+    control: Control,
+    time: float,
+    model: Model,
+    memory: Memory,
+    varied: Floats,
+    j: int,
+    trial: Floats,
+    gains: Floats,
+) -> None:
+    """Change of the torques per unit of component j of `varied`, ``memory.q`` or ``memory.v``.
+
+    The smaller of the differences to either side: where the torque jumps, as when a controller
+    changes its mind, the other would be the jump over the perturbation.
+    """
+    kept = varied[j]
+    for side in range(2):
+        change = PERTURBATION if side == 0 else -PERTURBATION
+        varied[j] = kept + change
+        forward_kinematics(model, memory.q, memory.tree)
+        link_velocities(model, memory.v, memory.tree)
+        try_command(control, time, model, memory, trial)
+        for i in range(trial.shape[0]):
+            slope = (trial[i] - memory.torque[i]) / change
+            if side == 0 or abs(slope) < abs(gains[i, j]):
+                gains[i, j] = slope
+    varied[j] = kept
+
+
+@kernel
+def evaluate(
+    model: Model,
+    ground: GroundModel,
+    laws: Laws,
+    control: Control,
+    accepted: bool,
+    decisive: bool,
+    time: float,
+    memory: Memory,
+    work: CompliantWorkspace,
+) -> None:
+    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.bristle``.
+
+    A controller that acts continuously is called: for good, with the contact forces of this very
+    state, if the state is `accepted`; for good also if it must be `decisive`; otherwise to see what
+    it would do.
+    """
+    observe(model, ground, memory)
+    push_contacts(model, laws, memory, work)
+    push_stops(model, laws, memory, work)
+    rub_joints(model, laws.numbers[JOINT_SCALE], memory, work)
+    if control.continuous:
+        if accepted:
+            for contact in range(model.contact_link.shape[0]):
+                memory.contacts.force[contact, 0] = work.force[contact, 0]
+                memory.contacts.force[contact, 1] = work.force[contact, 1]
+        if accepted or decisive:
+            command(control, control.memory, time, model, memory, memory.torque)
+        else:
+            try_command(control, time, model, memory, memory.torque)
+    mass_matrix(model, memory.tree, memory.mass_matrix)
+    factorize(model, memory.mass_matrix, memory.factor)
+    bias_force(model, memory.tree, memory.rate)
+    passive_force(model, memory.q, memory.v, memory.force)
+    add_pushes(model, memory.tree, memory.pushes, memory.force)
+    for i in range(model.actuator_joint.shape[0]):
+        memory.force[model.actuator_joint[i]] += memory.torque[i]
+    rate = work.acceleration
+    nv = model.parent.shape[0]
+    for j in range(nv):
+        rate[j] = memory.force[j] - memory.rate[j] + work.stop_force[j] + work.dry_force[j]
+    for contact in range(model.contact_link.shape[0]):
+        normal = work.force[contact, 0]
+        tangent = work.force[contact, 1]
+        if normal > 0.0:
+            for j in range(nv):
+                rate[j] += (
+                    memory.jacobian[2 * contact, j] * normal
+                    + memory.jacobian[2 * contact + 1, j] * tangent
+                )
+    solve_factorized(model, memory.factor, rate)
+
+
+@kernel
+def push_contacts(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
+    """Forces of the contacts and rates of the bristles at the state now."""
+    for contact in range(model.contact_link.shape[0]):
+        partial = work.partial[contact]
+        gap = memory.contacts.gap[contact]
+        normal = 0.0
+        memory.slip[contact] = 0.0
+        if gap < 0.0:
+            contact_rows(model, memory, contact, contact)
+            memory.slip[contact] = row_product(memory, 2 * contact + 1, memory.v)
+            normal_speed = row_product(memory, 2 * contact, memory.v)
+            normal = normal_force(laws.normal, laws.numbers, gap, normal_speed, partial)
+        tangent, bristle_rate = friction_force(
+            laws.friction,
+            laws.numbers,
+            memory.friction[contact],
+            normal,
+            memory.slip[contact],
+            work.bristle[contact],
+            partial,
+        )
+        work.force[contact, 0] = normal
+        work.force[contact, 1] = tangent
+        work.bristle_rate[contact] = bristle_rate
+
+
+@kernel
+def push_stops(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
+    """Forces of the joint stops at the state now."""
+    for j in range(model.parent.shape[0]):
+        work.stop_force[j] = 0.0
+        work.stop_partial[j, 0] = 0.0
+        work.stop_partial[j, 1] = 0.0
+        below = memory.q[j] - model.lower[j]
+        above = model.upper[j] - memory.q[j]
+        if below < 0.0:
+            work.stop_force[j] = normal_force(
+                laws.stop, laws.stop_numbers, below, memory.v[j], work.stop_partial[j]
+            )
+        elif above < 0.0:
+            work.stop_force[j] = -normal_force(
+                laws.stop, laws.stop_numbers, above, -memory.v[j], work.stop_partial[j]
+            )
+
+
+@kernel
+def rub_joints(model: Model, scale: float, memory: Memory, work: CompliantWorkspace) -> None:
+    """Dry friction of the joints at the state now, after :func:`push_stops`."""
+    for place in range(memory.dry_joint.shape[0]):
+        j = memory.dry_joint[place]
+        work.dry_force[j], slope = joint_friction(model.dry_friction[j], scale, memory.v[j])
+        work.stop_partial[j, NORMAL_BY_SPEED] += slope
+
+
+@kernel
+def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
+    """Make the state evaluated last the start of the next step."""
+    nv = model.parent.shape[0]
+    for i in range(nv):
+        work.base_q[i] = memory.q[i]
+        work.base_v[i] = memory.v[i]
+        work.base_acceleration[i] = work.acceleration[i]
+        work.base_stop_force[i] = work.stop_force[i]
+        work.base_dry_force[i] = work.dry_force[i]
+        for k in range(2):
+            work.base_stop_partial[i, k] = work.stop_partial[i, k]
+        for j in range(nv):
+            work.base_matrix[i, j] = memory.mass_matrix[i, j]
+    for contact in range(model.contact_link.shape[0]):
+        work.base_bristle[contact] = work.bristle[contact]
+        work.base_rate[contact] = work.bristle_rate[contact]
+        work.base_gap[contact] = memory.contacts.gap[contact]
+        for k in range(2):
+            work.base_force[contact, k] = work.force[contact, k]
+            for j in range(nv):
+                work.base_rows[2 * contact + k, j] = memory.jacobian[2 * contact + k, j]
+        for k in range(PARTIALS):
+            work.base_partial[contact, k] = work.partial[contact, k]
+
+
+@kernel
+def tangent_gains(partial: Floats, g: float) -> tuple[float, float, float]:
+    """Change of the tangential force by normal force, by speed and by the bristle's residual.
+
+    The bristle's own equation, ``(1/g − ∂S/∂s) u_s = r + ∂S/∂F_n dF_n + ∂S/∂v a``, is eliminated.
+    """
+    bend = partial[TANGENT_BY_BRISTLE] / (1.0 / g - partial[BRISTLE_BY_BRISTLE])
+    by_normal = partial[TANGENT_BY_NORMAL] + bend * partial[BRISTLE_BY_NORMAL]
+    by_speed = partial[TANGENT_BY_SPEED] + bend * partial[BRISTLE_BY_SPEED]
+    return by_normal, by_speed, bend
+
+
+@kernel
+def factorize_step(model: Model, control: Control, g: float, work: CompliantWorkspace) -> None:
+    """Factorise the linear system of all stages of a step of length g / γ."""
+    nv = model.parent.shape[0]
+    system = work.system
+    by_q = work.force_by_q
+    for i in range(nv):
+        for j in range(nv):
+            system[i, j] = work.base_matrix[i, j]
+            by_q[i, j] = 0.0
+        system[i, i] += g * (model.damping[i] - work.base_stop_partial[i, NORMAL_BY_SPEED])
+        by_q[i, i] = work.base_stop_partial[i, NORMAL_BY_GAP] - model.stiffness[i]
+    if control.continuous:
+        for i in range(model.actuator_joint.shape[0]):
+            joint = model.actuator_joint[i]
+            for j in range(nv):
+                system[joint, j] -= g * work.torque_by_v[i, j]
+                by_q[joint, j] += work.torque_by_q[i, j]
+    for contact in range(model.contact_link.shape[0]):
+        if work.base_force[contact, 0] <= 0.0:
+            continue
+        partial = work.base_partial[contact]
+        by_normal, by_speed, _ = tangent_gains(partial, g)
+        normal_row = work.base_rows[2 * contact]
+        tangent_row = work.base_rows[2 * contact + 1]
+        for i in range(nv):
+            # What normal force and sliding speed do to coordinate i.
+            pressing = normal_row[i] + by_normal * tangent_row[i]
+            rubbing = by_speed * tangent_row[i]
+            for j in range(nv):
+                system[i, j] -= g * (
+                    pressing * partial[NORMAL_BY_SPEED] * normal_row[j] + rubbing * tangent_row[j]
+                )
+                by_q[i, j] += pressing * partial[NORMAL_BY_GAP] * normal_row[j]
+    for i in range(nv):
+        for j in range(nv):
+            system[i, j] -= g * g * by_q[i, j]
+    eliminate(nv, system, work.order)
+
+
+@kernel
+def eliminate(size: int, matrix: Floats, order: Integers) -> None:
+    """Replace a matrix by its triangular factors, exchanging rows."""
+    for k in range(size):
+        best = k
+        for i in range(k + 1, size):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        order[k] = best
+        if best != k:
+            for j in range(size):
+                kept = matrix[k, j]
+                matrix[k, j] = matrix[best, j]
+                matrix[best, j] = kept
+        for i in range(k + 1, size):
+            matrix[i, k] /= matrix[k, k]
+            for j in range(k + 1, size):
+                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+
+
+@kernel
+def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
+    """Replace x by the solution of the system that was eliminated."""
+    for k in range(size):
+        best = order[k]
+        if best != k:
+            kept = x[k]
+            x[k] = x[best]
+            x[best] = kept
+    for i in range(size):
+        for j in range(i):
+            x[i] -= matrix[i, j] * x[j]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] /= matrix[i, i]
+
+
+@kernel
+def dot(a: Floats, b: Floats) -> float:
+    """Scalar product."""
+    total = 0.0
+    for j in range(b.shape[0]):
+        total += a[j] * b[j]
+    return total
+
+
+@kernel
+def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) -> None:
+    """Solve for a stage from its right-hand side."""
+    nv = model.parent.shape[0]
+    u_q = work.stage_q[stage]
+    u_v = work.stage_v[stage]
+    u_s = work.stage_bristle[stage]
+    for i in range(nv):
+        u_v[i] = g * (
+            dot(work.base_matrix[i], work.right_v) + g * dot(work.force_by_q[i], work.right_q)
+        )
+    for contact in range(u_s.shape[0]):
+        if work.base_force[contact, 0] <= 0.0:
+            continue
+        _, _, bend = tangent_gains(work.base_partial[contact], g)
+        push = g * bend * work.right_bristle[contact]
+        for j in range(nv):
+            u_v[j] += push * work.base_rows[2 * contact + 1, j]
+    substitute(nv, work.system, work.order, u_v)
+    for j in range(nv):
+        u_q[j] = g * (work.right_q[j] + u_v[j])
+    for contact in range(u_s.shape[0]):
+        partial = work.base_partial[contact]
+        change = work.right_bristle[contact]
+        if work.base_force[contact, 0] > 0.0:
+            normal_row = work.base_rows[2 * contact]
+            pressing = partial[NORMAL_BY_SPEED] * dot(normal_row, u_v) + partial[
+                NORMAL_BY_GAP
+            ] * dot(normal_row, u_q)
+            sliding = dot(work.base_rows[2 * contact + 1], u_v)
+            change += partial[BRISTLE_BY_NORMAL] * pressing + partial[BRISTLE_BY_SPEED] * sliding
+        u_s[contact] = change / (1.0 / g - partial[BRISTLE_BY_BRISTLE])
+
+
+@kernel
+def attempt_step(
+    model: Model,
+    ground: GroundModel,
+    laws: Laws,
+    control: Control,
+    time: float,
+    h: float,
+    rtol: float,
+    atol: float,
+    memory: Memory,
+    work: CompliantWorkspace,
+) -> float:
+    """Go from the start of the step, at `time`, to its end; return the error over the tolerance."""
+    nv = model.parent.shape[0]
+    nc = model.contact_link.shape[0]
+    g = GAMMA * h
+    factorize_step(model, control, g, work)
+    for stage in range(STAGES):
+        if stage > 0:
+            for i in range(nv):
+                memory.q[i] = work.base_q[i]
+                memory.v[i] = work.base_v[i]
+                for k in range(stage):
+                    memory.q[i] += A[stage, k] * work.stage_q[k, i]
+                    memory.v[i] += A[stage, k] * work.stage_v[k, i]
+            for i in range(nc):
+                work.bristle[i] = work.base_bristle[i]
+                for k in range(stage):
+                    work.bristle[i] += A[stage, k] * work.stage_bristle[k, i]
+            evaluate(
+                model,
+                ground,
+                laws,
+                control,
+                False,
+                h <= DECISIVE,
+                time + TIMES[stage] * h,
+                memory,
+                work,
+            )
+        for i in range(nv):
+            work.right_q[i] = work.base_v[i] if stage == 0 else memory.v[i]
+            work.right_v[i] = work.base_acceleration[i] if stage == 0 else work.acceleration[i]
+            for k in range(stage):
+                work.right_q[i] += C[stage, k] / h * work.stage_q[k, i]
+                work.right_v[i] += C[stage, k] / h * work.stage_v[k, i]
+        for i in range(nc):
+            work.right_bristle[i] = work.base_rate[i] if stage == 0 else work.bristle_rate[i]
+            for k in range(stage):
+                work.right_bristle[i] += C[stage, k] / h * work.stage_bristle[k, i]
+        solve_stage(model, g, stage, work)
+    worst = 0.0
+    for i in range(nv):
+        worst = larger(worst, finish(work.base_q, work.stage_q, rtol, atol, memory.q, i))
+        worst = larger(worst, finish(work.base_v, work.stage_v, rtol, atol, memory.v, i))
+    for i in range(nc):
+        worst = larger(
+            worst, finish(work.base_bristle, work.stage_bristle, rtol, atol, work.bristle, i)
+        )
+        # A bristle in the air goes to zero; spare the processor the numbers next to it.
+        if abs(work.bristle[i]) < NO_BEND:
+            work.bristle[i] = 0.0
+    return worst
+
+
+@kernel
+def finish(base: Floats, stages: Floats, rtol: float, atol: float, result: Floats, i: int) -> float:
+    """Write one component at the end of the step; return its error over the tolerance."""
+    change = 0.0
+    error = 0.0
+    for k in range(STAGES):
+        change += M[k] * stages[k, i]
+        error += E[k] * stages[k, i]
+    result[i] = base[i] + change
+    return abs(error) / (atol + rtol * max(abs(base[i]), abs(result[i])))
+
+
+@kernel
+def larger(a: float, b: float) -> float:
+    """Maximum that keeps a NaN, wherever it stands."""
+    return b if not b <= a else a

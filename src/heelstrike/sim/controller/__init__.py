@@ -1,0 +1,1 @@
+"""What a controller is to a simulation, and what it may do."""

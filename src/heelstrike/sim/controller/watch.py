@@ -1,0 +1,95 @@
+"""Whether a controller kept to what it may do: it owns its torques and its memory, no more."""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.guard import trespasses
+from heelstrike.sim.engine import Engine
+from heelstrike.sim.memory import CHANGED, CONDUCT, OVERRAN, TRUSTED, Memory
+
+
+class Watch:
+    """What a compiled controller was handed, to be looked at while it runs.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot, whose numbers are copied.
+    engine : Engine
+    memory : Memory
+        What simulates, and its memory.
+    parameters, controller_memory : float arrays
+        The controller's own; guarded.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        engine: Engine,
+        memory: Memory,
+        parameters: Floats,
+        controller_memory: Floats,
+    ) -> None:
+        self._robot = robot
+        self._engine = engine
+        self._memory = memory
+        self._numbers = numbers_of(robot)
+        self._arrays = {
+            "torque": memory.torque,
+            "parameters": parameters,
+            "memory": controller_memory,
+            "q": memory.q,
+            "v": memory.v,
+        }
+        for name in ("contacts", "tree", "scratch"):
+            for field, array in getattr(memory, name).members().items():
+                self._arrays[f"{name}.{field}"] = array
+
+    def misdeed(self) -> str | None:
+        """Say what the controller did that it may not, and undo what can be undone."""
+        if self._memory.tally[CONDUCT] == TRUSTED:
+            return None
+        changed = restored(self._robot, self._numbers)
+        if changed:
+            return f"changed the robot: {changed}"
+        arrays = [*self._arrays.items(), ("memory", self._engine.spare)]
+        places = [place for name, array in arrays for place in trespasses(name, array)]
+        if places:
+            more = f" (and {len(places) - 1} more)" if len(places) > 1 else ""
+            return f"wrote beyond its arrays, to {places[0]}{more}"
+        if self._memory.tally[CONDUCT] == OVERRAN:
+            return "wrote beyond its arrays"
+        if self._memory.tally[CONDUCT] == CHANGED:
+            return "changed the state or the contacts it was shown, which are the simulation's"
+        return None
+
+
+def numbers_of(robot: Robot) -> dict[str, Any]:
+    """Copy all numbers of a robot."""
+    return {
+        name: array.copy()
+        for name, array in robot.model.members().items()
+        if isinstance(array, np.ndarray)
+    }
+
+
+def restored(robot: Robot, numbers: dict[str, Any]) -> str:
+    """Put numbers of a robot back; say which had changed, nothing if none had."""
+    first = ""
+    for name, kept in numbers.items():
+        now = getattr(robot.model, name)
+        if now.tobytes() == kept.tobytes():
+            continue
+        places = np.argwhere(~((now == kept) | ((now != now) & (kept != kept))))
+        if not first and len(places):
+            place = tuple(places[0].tolist())
+            index = ", ".join(map(str, place))
+            first = f"model.{name}[{index}] from {kept[place]:.9g} to {now[place]:.9g}"
+        ctypes.memmove(now.ctypes.data, kept.ctypes.data, kept.nbytes)  # read-only to numpy
+    return first

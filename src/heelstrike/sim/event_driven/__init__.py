@@ -1,0 +1,1 @@
+"""Smooth phases between events, impacts at events."""

@@ -1,0 +1,1 @@
+"""Runs as labelled datasets and as files."""

@@ -1,0 +1,161 @@
+"""Runs as NetCDF files.
+
+A file holds the dataset of :func:`~heelstrike.sim.files.dataset.to_dataset`, readable by any NetCDF
+or HDF5 tool, and in the group ``robot`` the numbers of the robot, so that a run can be read again
+without the robot's own file. Everything in it is numbers and text: reading never executes anything.
+Its last line is a seal by which damage is seen before the HDF5 library sees the file.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+
+from heelstrike.errors import RunFileError, WriteError
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.files.dataset import METHODS, ROBOT_GROUP, to_dataset
+from heelstrike.sim.files.hdf5_contents import (
+    Contents,
+    HostileFileError,
+    contents,
+    contents_of_stranger,
+)
+from heelstrike.sim.files.robot_dataset import robot_to_dataset
+from heelstrike.sim.files.seal import seal, seal_holds
+from heelstrike.sim.files.stored_run import stored_run
+from heelstrike.sim.run import Run
+from heelstrike.whole_file import write_whole
+
+
+def save(run: Run, path: str | os.PathLike[str]) -> Path:
+    """Write a run as NetCDF. The file appears whole or not at all.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    path : str or path
+        File to write, by custom ``.nc``; an existing one is replaced.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    RunFileError
+        If the folder does not exist, cannot be written to or is full. The run is as it was, and so
+        is an older file.
+    """
+    kept = "the run is still in memory, to be saved elsewhere"
+    if METHODS.get(type(run.method).__name__) is not type(run.method):
+        raise RunFileError(
+            f"cannot write {path}: a run by {type(run.method).__name__} could not be read again, "
+            f"only one by {', '.join(METHODS)}; {kept}, as run.to_dataset() or array by array"
+        )
+    try:
+        # HDF5 crashes on a disk that is full. In memory it never meets one.
+        image = _image(run)
+    except MemoryError as error:
+        raise RunFileError(
+            f"cannot write {path}: no memory left to make the file in; {kept}"
+        ) from error
+    except Exception as error:  # names that NetCDF cannot hold, arrays of other shapes
+        raise RunFileError(
+            f"cannot write {path}: {type(error).__name__}: {error}; {kept}"
+        ) from error
+    try:
+        return write_whole(path, image.getbuffer())
+    except WriteError as error:
+        raise RunFileError(f"{error}; {kept}") from error
+
+
+def _image(run: Run) -> io.BytesIO:
+    """Return the bytes of the file."""
+    import h5netcdf
+    from xarray.backends import H5NetCDFStore
+
+    dataset = to_dataset(run)
+    compression = {"zlib": True, "complevel": 1, "shuffle": True}
+    encoding = {
+        name: {"_FillValue": None, **(compression if dataset[name].size > 1000 else {})}
+        for name in dataset.variables
+        if dataset[name].dtype.kind == "f"
+    }
+    image = io.BytesIO()
+    with h5netcdf.File(image, "w") as file:
+        dataset.dump_to_store(H5NetCDFStore(file, mode="w"), encoding=encoding)
+        robot_to_dataset(run.robot).dump_to_store(H5NetCDFStore(file, group=ROBOT_GROUP, mode="a"))
+    line = seal(image.getbuffer())
+    image.seek(0, io.SEEK_END)
+    image.write(line)
+    return image
+
+
+def load_run(path: str | os.PathLike[str], robot: Robot | None = None) -> Run:
+    """Read a run that was saved with :meth:`Run.save`.
+
+    Parameters
+    ----------
+    path : str or path
+        The NetCDF file.
+    robot : Robot, optional
+        Robot to attach to the run, instead of the one the file describes. Its coordinates,
+        actuators and contact points must have the names of the file's.
+
+    Returns
+    -------
+    Run
+        The run as it was saved; of an exception of the controller only the message remains.
+
+    Raises
+    ------
+    RunFileError
+        If there is no such file, it is not a run of heelstrike, or it is damaged.
+
+    Notes
+    -----
+    A file ends with a checksum of its bytes, and a file that has changed since is refused. One
+    without a checksum, written by an earlier version or changed by another program, is read by
+    another process first, because bytes that are no HDF5 can make the library crash or hang.
+    """
+    source = Path(path)
+    try:
+        if source.is_dir():
+            raise RunFileError(f"{source} is a folder; give the name of a saved run")
+        if not source.exists():
+            raise RunFileError(f"there is no file {source}")
+        if not source.is_file():
+            raise RunFileError(f"{source}: not a run of heelstrike: it is not a regular file")
+        found = _contents(source)
+    except RunFileError:
+        raise
+    except PermissionError as error:
+        raise RunFileError(f"{source}: no permission to read it") from error
+    except (OSError, ValueError) as error:  # also a path with a null character
+        raise RunFileError(f"{source}: cannot be read ({error})") from error
+    try:
+        return stored_run(source, found, robot)
+    except MemoryError as error:
+        raise RunFileError(f"{source}: the run does not fit into memory") from error
+
+
+def _contents(source: Path) -> Contents:
+    sealed = seal_holds(source)
+    if sealed is False:
+        raise RunFileError(
+            f"{source}: damaged: its bytes are not those that were written (their checksum differs)"
+        )
+    read = contents if sealed else contents_of_stranger
+    try:
+        return read(source, (ROBOT_GROUP,))
+    except HostileFileError as error:
+        raise RunFileError(f"{source}: not a run of heelstrike, or damaged: {error}") from error
+    except MemoryError as error:
+        raise RunFileError(f"{source}: the run does not fit into memory") from error
+    except Exception as error:  # whatever the HDF5 library makes of it
+        raise RunFileError(
+            f"{source}: not a run of heelstrike, or damaged ({type(error).__name__}: {error})"
+        ) from error

@@ -1,0 +1,1 @@
+"""Fixed steps whose contact impulses decide the next velocity."""

@@ -1,0 +1,608 @@
+"""Time stepping: contact impulses decide the velocity at the end of each step (paper section 3).
+
+One step of length h from (q, v), with λ the contact impulses of the step::
+
+    v_free = v + h A⁻¹ (B Γ + passive − H)          motion without contact
+    w      = G λ + b,   G = J A⁻¹ Jᵀ                contact velocities at the end of the step
+    v⁺     = v_free + A⁻¹ Jᵀ λ
+
+The gap-linearised scheme asks ``gap + h J_n v⁺ ≥ 0``, that is b_n = J_n v_free + gap / h, for
+every contact point that could close within the step, and moves on with the new velocity. The
+paper's own ordering (eq. 23-26) asks ``J_n v⁺ ≥ 0`` of the points whose gap is not positive; as
+printed it moves the positions with the old velocity. Its text has the old velocity move the
+positions first and the new velocity computed there, which is the same sequence of states as moving
+them with the new velocity at the end of each step.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numba import types
+
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, loop_for, type_of
+from heelstrike.compiler.straight_line import play
+from heelstrike.contact.ground import Ground, GroundModel
+from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.modes import STICK as STICKING
+from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.solvers.search import try_solvers
+from heelstrike.dynamics.kernels import passive_force
+from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.contact_geometry import (
+    add_impulse,
+    assemble_delassus,
+    contact_rows,
+    contact_velocity,
+    evaluate_equations,
+    locate_contacts,
+    solve_mass_matrix,
+    weigh,
+    write_unit_row,
+)
+from heelstrike.sim.controller.asking import ask
+from heelstrike.sim.controller.guard import guarded
+from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE, example_model
+from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
+from heelstrike.sim.engine import (
+    BAD_CONTROLLER,
+    DIVERGED,
+    DONE,
+    FELL,
+    PAUSED,
+    RECORD_FULL,
+    SOLVER_FAILED,
+    Engine,
+    Setting,
+    solver_order,
+    whole_steps,
+)
+from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
+from heelstrike.sim.point_contacts import point_velocities
+from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
+from heelstrike.sim.push import add_pushes, share_over_step
+from heelstrike.sim.record_size import check_room, check_steps
+from heelstrike.sim.recording import (
+    center_height,
+    limit_torque,
+    note_events,
+    note_extremes,
+    note_row,
+    sound,
+)
+from heelstrike.sim.status import Scheme
+
+GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
+PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
+PAPER_SYMPLECTIC = int(Scheme.PAPER_SYMPLECTIC)
+MOREAU_JEAN = int(Scheme.MOREAU_JEAN)
+LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
+
+# A contact point enters the problem when it could close within a step at this speed (m/s) or at
+# twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
+# costs time but not the answer. Gaps that would take 100 m/s to close are not looked at.
+CLOSING_SPEED = 5.0
+FAR_STEPS = 20.0
+# The same for joint stops (rad/s or m/s).
+CLOSING_RATE = 20.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TimeStepping:
+    """Fixed steps whose contact impulses decide the velocity at the end of the step.
+
+    Parameters
+    ----------
+    step : float
+        Length of the step h in seconds.
+    scheme : Scheme
+        Discretisation; see :class:`~heelstrike.sim.status.Scheme`.
+    solver : str
+        Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``;
+        the others follow as fallbacks, each use counted in the run.
+    activation : float
+        Gap in metres up to which a contact point takes part, for the schemes that decide by the
+        gap alone (the paper's two and Moreau-Jean). With the literal zero, a foot at rest loses
+        and regains the ground through round-off.
+
+    Raises
+    ------
+    SimulationError
+        If the step is not a positive finite number, the activation is negative, or scheme or
+        solver are unknown.
+
+    Notes
+    -----
+    First order in the step, whatever the scheme.
+    """
+
+    step: float = 1e-3
+    scheme: Scheme = Scheme.GAP_LINEARISED
+    solver: str = "lemke"
+    activation: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.step < float("inf"):
+            raise SimulationError(f"the time step must be a positive number, got {self.step}")
+        if not 0.0 <= self.activation < float("inf"):
+            raise SimulationError(f"the activation gap must be ≥ 0, got {self.activation}")
+        try:
+            object.__setattr__(self, "scheme", Scheme(self.scheme))
+        except ValueError:
+            names = ", ".join(str(scheme) for scheme in Scheme)
+            raise SimulationError(
+                f"unknown scheme {self.scheme!r}; choose one of {names}"
+            ) from None
+        solver_order(self.solver)
+
+    def engine(self, setting: Setting) -> Engine:
+        """Return this way through time, compiled and ready to run.
+
+        Raises
+        ------
+        SimulationError
+            If the ground has restitution and the scheme knows plastic impacts only.
+        """
+        return _TimeSteppingEngine(self, setting)
+
+
+@dissolved_kernel
+def evaluate_state(model: Model, ground: GroundModel, memory: Memory) -> None:
+    """Kinematics, contact points, mass matrix and bias force of the state now."""
+    evaluate_equations(model, memory.q, memory.v, memory)
+    locate_contacts(model, ground, memory)
+
+
+@dissolved_kernel
+def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
+    """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
+
+    The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
+    order that adds h D + h² K to the mass matrix, as if it were armature, and −h K v to the force.
+    """
+    nv = model.parent.shape[0]
+    passive_force(model, memory.q, memory.v, memory.force)
+    for i in range(model.actuator_joint.shape[0]):
+        memory.force[model.actuator_joint[i]] += memory.torque[i]
+    if scheme == LINEARLY_IMPLICIT:
+        for i in range(nv):
+            memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
+        if memory.programs[SOLVE] != 0:
+            weigh(model, memory)  # the program has not heard of it
+    for i in range(nv):
+        memory.rate[i] = step * (memory.force[i] - memory.bias[i])
+    solve_mass_matrix(model, memory, memory.rate)
+    for i in range(nv):
+        memory.next_v[i] = memory.v[i] + memory.rate[i]
+
+
+@dissolved_kernel
+def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
+    """Add to the free velocity what pushes do in this step."""
+    if not share_over_step(memory.pushes, time, step):
+        return
+    nv = model.parent.shape[0]
+    for i in range(nv):
+        memory.rate[i] = 0.0
+    add_pushes(model, memory.tree, memory.pushes, memory.rate)
+    solve_mass_matrix(model, memory, memory.rate)
+    for i in range(nv):
+        memory.next_v[i] += step * memory.rate[i]
+
+
+@dissolved_kernel
+def select_candidates(
+    model: Model, step: float, scheme: int, activation: float, memory: Memory
+) -> int:
+    """List the contact points that could act in this step, with their free terms."""
+    contacts = memory.contacts
+    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    farthest = FAR_STEPS * CLOSING_SPEED * step
+    if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
+        farthest = activation
+    count = 0
+    usual = memory.programs[VELOCITIES] != 0
+    for contact in range(model.contact_link.shape[0]):
+        if contacts.gap[contact] <= farthest:
+            memory.candidate[count] = contact
+            usual = usual and memory.usual_place[contact] >= 0
+            count += 1
+    if count == 0:
+        return 0
+    near = count
+    velocity = memory.point_velocity
+    if usual:
+        play(
+            memory.programs[VELOCITIES],
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                memory.next_v, velocity,
+            ),
+        )  # fmt: skip
+    else:
+        point_velocities(
+            model, memory.every_point, memory.tree, contacts.position, contacts.normal,
+            memory.next_v, velocity,
+        )  # fmt: skip
+    count = 0
+    for place in range(near):
+        contact = memory.candidate[place]
+        gap = contacts.gap[contact]
+        normal = velocity[contact, 0]
+        if linearised:
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+                continue
+            normal += gap / step
+        elif scheme == MOREAU_JEAN:
+            before, _ = contact_velocity(
+                model.contact_link[contact],
+                contacts.position[contact],
+                contacts.normal[contact],
+                memory.tree,
+            )
+            if gap + 0.5 * step * before > activation:
+                continue
+            normal += memory.restitution[contact] * before
+        memory.free[2 * count] = normal
+        memory.free[2 * count + 1] = velocity[contact, 1]
+        memory.problem_friction[count] = memory.friction[contact]
+        memory.problem_mode[count] = memory.mode[contact]
+        memory.candidate[count] = contact
+        count += 1
+    return count
+
+
+@dissolved_kernel
+def select_stops(
+    model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
+) -> int:
+    """Append the joint stops that could act in this step: contacts without friction."""
+    points = model.contact_link.shape[0]
+    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    for joint in range(model.parent.shape[0]):
+        for end in range(2):
+            sign = 1.0 - 2.0 * end
+            limit = model.upper[joint] if end == 1 else model.lower[joint]
+            gap = sign * (memory.q[joint] - limit)
+            normal = sign * memory.next_v[joint]
+            before = sign * memory.v[joint]
+            if linearised:
+                if not gap < step * max(CLOSING_RATE, -2.0 * normal):
+                    continue
+                normal += gap / step
+            elif scheme == MOREAU_JEAN:
+                if not gap + 0.5 * step * before <= activation:
+                    continue
+            elif not gap <= activation:
+                continue
+            memory.free[2 * count] = normal
+            memory.free[2 * count + 1] = 0.0
+            memory.problem_friction[count] = 0.0
+            pressed = sign * memory.stop_torque[joint] > 0.0
+            memory.problem_mode[count] = STICKING if pressed else 0
+            memory.candidate[count] = points + 2 * joint + end
+            count += 1
+    return count
+
+
+@kernel
+def write_rows(model: Model, memory: Memory, count: int) -> None:
+    """Write the Jacobian rows of contact points and stops; those of dry joints are written.
+
+    A stop has a normal row ±1 at its joint and a tangent row of zeros.
+    """
+    points = model.contact_link.shape[0]
+    for place in range(count - memory.dry_joint.shape[0]):
+        candidate = memory.candidate[place]
+        if candidate < points:
+            contact_rows(model, memory, candidate, place)
+            continue
+        stop = candidate - points
+        write_unit_row(memory, stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2))
+
+
+@dissolved_kernel
+def are_usual(memory: Memory, count: int) -> bool:
+    """Whether there are programs for all candidates."""
+    if memory.programs[DELASSUS] == 0:
+        return False
+    for place in range(count):
+        candidate = memory.candidate[place]
+        if candidate >= memory.usual_place.shape[0] or memory.usual_place[candidate] < 0:
+            return False
+    return True
+
+
+@dissolved_kernel
+def gather_delassus(model: Model, memory: Memory, count: int) -> None:
+    """Delassus matrix of all usual points; that of the candidates too, if they are fewer."""
+    contacts = memory.contacts
+    play(
+        memory.programs[DELASSUS],
+        (
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_rows, memory.point_delassus,
+        ),
+    )  # fmt: skip
+    if count == memory.usual_points.shape[0]:
+        return
+    for place in range(count):
+        row = 2 * memory.usual_place[memory.candidate[place]]
+        for other in range(count):
+            column = 2 * memory.usual_place[memory.candidate[other]]
+            for i in range(2):
+                for j in range(2):
+                    entry = memory.point_delassus[row + i, column + j]
+                    memory.delassus[2 * place + i, 2 * other + j] = entry
+
+
+@dissolved_kernel
+def push_candidates(model: Model, memory: Memory, count: int) -> None:
+    """Add what the impulses of the candidates, usual points all, do to the velocity."""
+    contacts = memory.contacts
+    for contact in range(model.contact_link.shape[0]):
+        memory.point_impulse[contact, 0] = 0.0
+        memory.point_impulse[contact, 1] = 0.0
+    for place in range(count):
+        memory.point_impulse[memory.candidate[place], 0] = memory.impulse[2 * place]
+        memory.point_impulse[memory.candidate[place], 1] = memory.impulse[2 * place + 1]
+    play(
+        memory.programs[PUSH],
+        (
+            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+            memory.factor, memory.point_impulse, memory.rate, memory.next_v,
+        ),
+    )  # fmt: skip
+
+
+@dissolved_kernel
+def solve_contacts(
+    model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
+) -> bool:
+    """Turn the free velocity into the velocity at the end of the step; return success."""
+    count = select_candidates(model, step, scheme, activation, memory)
+    count = select_stops(model, step, scheme, activation, count, memory)
+    count = select_dry_joints(model, count, memory)
+    nv = model.parent.shape[0]
+    points = model.contact_link.shape[0]
+    dry = points + 2 * nv
+    for j in range(nv):
+        memory.stop_torque[j] = 0.0
+    contacts = memory.contacts
+    for contact in range(model.contact_link.shape[0]):
+        contacts.force[contact, 0] = 0.0
+        contacts.force[contact, 1] = 0.0
+        memory.slip[contact] = 0.0
+        memory.mode[contact] = 0
+    for i in range(3):
+        memory.residual[i] = 0.0
+    if count == 0:
+        return True
+    straight = are_usual(memory, count)
+    delassus = memory.delassus
+    if straight:
+        gather_delassus(model, memory, count)
+        if count == memory.usual_points.shape[0]:
+            delassus = memory.point_delassus
+    else:
+        write_rows(model, memory, count)
+        assemble_delassus(model, memory, count)
+        press_dry_joints(model, step, count, memory)
+    status = solve_contact_kernel(
+        count,
+        delassus,
+        memory.free,
+        memory.problem_friction,
+        order,
+        memory.problem_mode,
+        memory.impulse,
+        memory.velocity,
+        memory.residual,
+        memory.solver,
+    )
+    if straight:
+        push_candidates(model, memory, count)
+    else:
+        add_impulse(model, memory, count, memory.next_v)
+    for place in range(count):
+        contact = memory.candidate[place]
+        if contact >= dry:
+            impulse = memory.impulse[2 * place + 1]
+            note_dry_joint(contact - dry, impulse, step, memory.problem_mode[place], memory)
+            continue
+        if contact >= points:
+            joint = (contact - points) // 2
+            sign = 1.0 - 2.0 * ((contact - points) % 2)
+            memory.stop_torque[joint] += sign * memory.impulse[2 * place] / step
+            continue
+        contacts.force[contact, 0] = memory.impulse[2 * place] / step
+        contacts.force[contact, 1] = memory.impulse[2 * place + 1] / step
+        memory.slip[contact] = memory.velocity[2 * place + 1]
+        memory.mode[contact] = memory.problem_mode[place]
+    return status == SOLVED
+
+
+def _advance(
+    controller: Any,
+    model: Model,
+    ground: GroundModel,
+    parameters: Floats,
+    controller_memory: Floats,
+    memory: Memory,
+    record: Record,
+    clock: Floats,
+    span: Integers,
+    order: Integers,
+) -> int:
+    """Advance a simulation by time stepping until its span ends or something stops it.
+
+    Parameters
+    ----------
+    clock : (4,) float
+        Time of step 0, step length, height of the centre of mass below which it fell, and the
+        activation gap.
+    span : (6,) int
+        Step now, last step, step to pause before, steps between controller calls, steps between
+        rows, scheme. At the last step everything is decided and recorded, but time does not move
+        on.
+    """
+    start = clock[0]
+    step = clock[1]
+    fallen = clock[2]
+    last = span[1]
+    control_every = span[3]
+    record_every = span[4]
+    scheme = span[5]
+    nv = model.parent.shape[0]
+    for i in range(nv):
+        memory.added[i] = 0.0
+        if scheme == LINEARLY_IMPLICIT:
+            memory.added[i] = step * (memory.damping[i] + step * memory.stiffness[i])
+    while True:
+        if (
+            record.row_count[0] >= record.time.shape[0]
+            or record.event_count[0] + 2 * (model.contact_link.shape[0] + nv)
+            > record.event_time.shape[0]
+        ):
+            return RECORD_FULL
+        k = span[0]
+        if k == span[2]:
+            return PAUSED
+        time = start + k * step
+        if not sound(memory):
+            return DIVERGED
+        evaluate_state(model, ground, memory)
+        if k % control_every == 0:
+            ask(
+                controller,
+                time,
+                memory.q,
+                memory.v,
+                model,
+                memory,
+                parameters,
+                controller_memory,
+                memory.torque,
+            )
+            if not limit_torque(model, memory):
+                return BAD_CONTROLLER
+        free_velocity(model, step, scheme, memory)
+        push_robot(model, time, step, memory)
+        solved = solve_contacts(model, step, scheme, clock[3], order, memory)
+        note_extremes(model, memory)
+        note_events(model, record, time, step, memory)
+        if k % record_every == 0 or k == last:
+            note_row(record, time, memory)
+        if not solved:
+            return SOLVER_FAILED
+        if center_height(model, ground, memory) < fallen:
+            return FELL
+        if k == last:
+            return DONE
+        memory.tally[STEPS] += 1
+        for i in range(nv):
+            if scheme == PAPER_EXPLICIT:
+                memory.q[i] += step * memory.v[i]
+            elif scheme == MOREAU_JEAN:
+                memory.q[i] += 0.5 * step * (memory.v[i] + memory.next_v[i])
+            else:
+                memory.q[i] += step * memory.next_v[i]
+            memory.v[i] = memory.next_v[i]
+        span[0] = k + 1
+
+
+@lru_cache(maxsize=1)
+def compiled_advance() -> tuple[Any, float]:
+    """Compile the loop or load it from the cache; return it with the seconds that took."""
+    begin = perf_counter()
+    robot = Robot("", example_model(), (), (), (), (), (), None, False)
+    vector = types.float64[::1]
+    integers = types.int64[::1]
+    signature = types.int64(
+        CONTROLLER_TYPE,
+        MODEL_TYPE,
+        type_of(Ground().model()),
+        vector,
+        vector,
+        type_of(allocate_memory(robot)),
+        type_of(allocate_record(robot, 1, 1)),
+        vector,
+        integers,
+        integers,
+    )
+    try_solvers.begin()
+    compiled = loop_for(signature, _advance)
+    try_solvers.finish()
+    return compiled, perf_counter() - begin
+
+
+class _TimeSteppingEngine:
+    """Time stepping of one simulation."""
+
+    def __init__(self, method: TimeStepping, setting: Setting) -> None:
+        check_steps(setting, "step", method.step)
+        check_room(setting, "step", method.step)
+        self._advance, self.compile_s = compiled_advance()
+        if method.scheme is not Scheme.MOREAU_JEAN and np.any(setting.ground.restitution > 0.0):
+            raise SimulationError(
+                f"{method.scheme.name} knows plastic impacts only, and this ground has "
+                f"restitution; use Scheme.MOREAU_JEAN"
+            )
+        self._setting = setting
+        self.solver = method.solver
+        self.spare = guarded(())
+        self._order = solver_order(method.solver)
+        self._control_every = 1
+        if setting.control_period is not None:
+            self._control_every = whole_steps("control_period", setting.control_period, method.step)
+        self._clock = np.array([0.0, method.step, setting.fallen_height, method.activation])
+        self._span = np.array(
+            [
+                0,
+                round(setting.duration / method.step),
+                0,
+                self._control_every,
+                setting.record_every,
+                int(method.scheme),
+            ]
+        )
+
+    @property
+    def time(self) -> float:
+        return float(self._clock[0] + self._span[0] * self._clock[1])
+
+    @property
+    def rows_left(self) -> int:
+        return int(self._span[1] - self._span[0]) // self._setting.record_every + 1
+
+    def pause_after(self, steps: int | None) -> None:
+        self._span[2] = self._span[0] + (self._control_every if steps is None else steps)
+
+    def advance(
+        self,
+        controller: Any,
+        parameters: Floats,
+        controller_memory: Floats,
+        record: Record,
+    ) -> int:
+        setting = self._setting
+        return int(
+            self._advance(
+                controller,
+                setting.robot.model,
+                setting.ground,
+                parameters,
+                controller_memory,
+                setting.memory,
+                record,
+                self._clock,
+                self._span,
+                self._order,
+            )
+        )

@@ -1,0 +1,215 @@
+"""Straight-line code computes what the kernels compute, for every robot it is made for."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from llvmlite import ir
+from robot_cases import NAMED, RANDOM, RobotCase
+
+from heelstrike.compiler import machine_code, trigonometry
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.straight_line import Recording, add_function, play
+from heelstrike.compiler.tape import Tape, Value
+from heelstrike.dynamics.workspace import workspace
+from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs, usual_points
+
+# Both sides do the same few hundred operations in another order, with products and sums fused.
+ROUNDING = 1e-11
+
+
+@numba.njit
+def called(address: int, *arguments: Any) -> None:
+    play(address, arguments)
+
+
+def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
+    """Arguments of all kernels at a random state; the arrays that carry results are shared."""
+    rng = np.random.default_rng(seed)
+    model, nv, nc = case.robot().model, case.robot().nv, case.robot().nc
+    tree, matrix, factor = workspace(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
+    q = model.reference + rng.uniform(-1.0, 1.0, nv)
+    v = rng.uniform(-3.0, 3.0, nv)
+    position, normal = rng.uniform(-1.0, 1.0, (nc, 2)), rng.normal(size=(nc, 2))
+    impulse = rng.uniform(-1.0, 1.0, (nc, 2))
+    x, w = rng.uniform(-1.0, 1.0, (2, nv))
+    points = usual_points(case.robot())
+    size = 2 * len(points)
+    rows, delassus = np.zeros((size, nv)), np.zeros((size, size))
+    return [
+        (model, q, v, tree, matrix, factor, np.zeros(nv)),
+        (model, factor, x),
+        (model, points, tree, position, normal, factor, rows, delassus),
+        (model, points, tree, position, normal, v, np.zeros((nc, 2))),
+        (model, points, tree, position, normal, factor, impulse, np.zeros(nv), w),
+    ]
+
+
+def results(arguments: list[tuple[Any, ...]]) -> dict[str, Any]:
+    (_, _, _, tree, _, factor, bias), (*_, x), (*_, delassus), (*_, velocity), (*_, w) = arguments
+    scratch = ("acceleration", "force", "composite", "zero")
+    kept = {name: array for name, array in tree.members().items() if name not in scratch}
+    return kept | {
+        "factor": factor, "bias": bias, "solved": x, "delassus": delassus, "velocity": velocity,
+        "pushed": w,
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("case", [*NAMED, *RANDOM[:6]], ids=lambda case: case.name)
+def test_equals_the_kernels(case: RobotCase) -> None:
+    programs = straight_line_programs(case.robot().model, usual_points(case.robot()))
+    if case.robot().nv > MOST_COORDINATES:
+        assert not programs.any()
+        return
+    assert programs[0]
+    for seed in range(3):
+        loops, straight = arguments(case, seed), arguments(case, seed)
+        for place, loop in enumerate(KERNELS):
+            loop(*loops[place])
+            if programs[place]:
+                called(programs[place], *straight[place])
+            else:
+                kernel(*straight[place])
+        expected, found = results(loops), results(straight)
+        for name, value in expected.items():
+            size = max(1.0, np.abs(value).max(initial=0.0))
+            np.testing.assert_allclose(found[name], value, atol=ROUNDING * size, err_msg=name)
+
+
+def test_robots_that_differ_in_numbers_share_their_code() -> None:
+    model, points = NAMED[0].robot().model, usual_points(NAMED[0].robot())
+    heavier = dataclasses.replace(model, mass=1.5 * model.mass)
+    np.testing.assert_array_equal(
+        straight_line_programs(model, points), straight_line_programs(heavier, points)
+    )
+
+
+@pytest.mark.parametrize("fused", [False, True], ids=["rounded twice", "fused"])
+def test_sine_and_cosine_to_the_last_digits(fused: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    if fused and not machine_code.can_fuse():
+        pytest.skip("the processor has no fused multiply-add")
+    monkeypatch.setattr(trigonometry, "can_fuse", lambda: fused)
+    lanes = 8
+    vector = ir.VectorType(ir.DoubleType(), lanes)
+    module = ir.Module("trigonometry")
+    pointers = [vector.as_pointer()] * 3
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), pointers), "both")
+    builder = ir.IRBuilder(function.append_basic_block())
+    values = trigonometry.sine_and_cosine(builder, builder.load(function.args[0], align=8))
+    for value, place in zip(values, function.args[1:], strict=True):
+        builder.store(value, place, align=8)
+    builder.ret_void()
+    (address,) = machine_code.addresses(["both"], b"trigonometry %d" % fused, lambda: module)
+
+    rng = np.random.default_rng(0)
+    quarters = np.arange(-400, 400) * (np.pi / 4.0)
+    spread = [rng.uniform(-size, size, 4000) for size in (1e-9, 1e-3, 1.0, 10.0, 1e3, 1e6)]
+    angles = np.concatenate([quarters, *spread, [0.0, -0.0, 5e-324, np.nan, np.inf, 1e300, 0, 0]])
+    sine, cosine = np.empty_like(angles), np.empty_like(angles)
+    for begin in range(0, len(angles), lanes):
+        part = slice(begin, begin + lanes)
+        called(address, angles[part], sine[part], cosine[part])
+    usual = np.abs(angles) <= 1e6
+    for found, exact in ((sine, np.sin(angles[usual])), (cosine, np.cos(angles[usual]))):
+        # NumPy's own are right to half a unit in the last place or a little more.
+        error = np.abs(found[usual] - exact) / np.spacing(np.abs(exact))
+        assert error.max() <= 2.0
+    assert np.isnan(sine[np.isnan(angles)]).all()
+    assert np.isnan(cosine[np.isnan(angles)]).all()
+
+
+def test_a_tape_folds_zeros_and_ones_and_does_nothing_twice() -> None:
+    tape = Tape()
+    a, b = tape.array("x", (2,))
+    assert a * 0.0 == 0.0
+    assert 0.0 * a == 0.0
+    assert a + 0.0 is a
+    assert 1.0 * a is a
+    product = a * b
+    count = len(tape.operations)
+    assert isinstance(b * a, Value)
+    assert (b * a).place == product.place
+    assert len(tape.operations) == count
+
+
+def test_a_tape_tells_a_number_from_the_place_of_a_value() -> None:
+    tape = Tape()
+    _, second, third = tape.array("x", (3,))
+    assert second.place == 1
+    assert (third + second).place != (third + 1.0).place
+
+
+@kernel
+def exchange(x: np.ndarray, y: np.ndarray) -> None:
+    first = x[0]
+    x[0] = x[1]
+    x[1] = y[0]
+    y[0] = first
+
+
+def test_everything_is_read_before_anything_is_written() -> None:
+    x, y = np.array([1.0, 2.0]), np.array([3.0])
+    module = ir.Module("exchange")
+    add_function(module, Recording(exchange, {"x": x, "y": y}))
+    (address,) = machine_code.addresses(["exchange"], b"test of exchange", lambda: module)
+    called(address, x, y)
+    assert (x.tolist(), y.tolist()) == ([2.0, 3.0], [1.0])
+
+
+def constant(number: float) -> ir.Module:
+    """Module of a function that writes a number."""
+    module = ir.Module("constant")
+    pointer = ir.DoubleType().as_pointer()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer]), "constant")
+    builder = ir.IRBuilder(function.append_basic_block())
+    builder.store(ir.Constant(ir.DoubleType(), number), function.args[0])
+    builder.ret_void()
+    return module
+
+
+def test_threads_that_ask_at_once_get_one_engine(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """The engine holds the code: a second one in its place would free what others are to call."""
+    monkeypatch.setattr(machine_code, "directories", lambda _: [tmp_path])
+    written = []
+
+    def write() -> ir.Module:
+        written.append(time.sleep(0.1))
+        return constant(1.0)
+
+    with ThreadPoolExecutor(2) as pool:
+        first, second = pool.map(
+            lambda _: machine_code.addresses(["constant"], b"test of threads", write), range(2)
+        )
+    assert first == second
+    assert len(written) == 1
+
+
+def test_code_is_kept_for_the_next_process(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(machine_code, "directories", lambda _: [tmp_path])
+
+    def loaded(described: bytes, number: float) -> float:
+        machine_code._loaded.clear()
+        (address,) = machine_code.addresses(["constant"], described, lambda: constant(number))
+        result = np.zeros(1)
+        called(address, result)
+        return float(result[0])
+
+    monkeypatch.setattr(machine_code, "_loaded", {})
+    assert loaded(b"one", 1.0) == 1.0
+    assert loaded(b"one", 2.0) == 1.0  # from the file
+    assert loaded(b"two", 2.0) == 2.0
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_arrays_with_gaps_are_refused() -> None:
+    with pytest.raises(TypeError, match="C-contiguous"):
+        called(0, np.zeros((3, 2))[:, 0])

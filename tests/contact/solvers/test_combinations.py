@@ -1,0 +1,130 @@
+"""The last resort counts modes; each is tried once, near ones first. And what has no answer."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+
+import numpy as np
+import pytest
+
+from heelstrike.compiler.compilation import uncompiled
+from heelstrike.contact import combinations as modes_in_turn
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, STICK
+from heelstrike.contact.solvers.combinations import MOST
+from heelstrike.contact.solvers.search import contact_workspace, nearly_singular
+from heelstrike.contact.workspace import BASE_MODE, SCALE, SOURCE, TANGENT, TRIAL_MODE
+
+begin = uncompiled(modes_in_turn.begin_combinations)
+following = uncompiled(modes_in_turn.next_combination)
+note = uncompiled(modes_in_turn.note_residual)
+
+ALL = range(OPEN, SLIP_BACKWARD + 1)
+
+
+def workspace(count: int, *, smooth: tuple[int, ...] = ()) -> object:
+    work = contact_workspace(count)
+    for contact in range(count):
+        work.labels[TANGENT, contact] = -1 if contact in smooth else 2 * contact + 1
+    return work
+
+
+def trial(count: int, work: object) -> tuple[int, ...]:
+    return tuple(int(mode) for mode in work.labels[TRIAL_MODE, :count])  # type: ignore[attr-defined]
+
+
+def test_few_contacts_get_every_combination_once() -> None:
+    """Four modes a contact, two without friction."""
+    work = workspace(3, smooth=(1,))
+    begin(3, np.zeros(3, np.int64), 1.0, work)
+    found = []
+    while following(3, work):
+        found.append(trial(3, work))
+    assert sorted(found) == sorted(product(ALL, (OPEN, STICK), ALL))
+
+
+def neighbours(base: tuple[int, ...]) -> set[tuple[int, ...]]:
+    """Modes that differ from some in two contacts at most."""
+    found = set()
+    for places in combinations(range(len(base)), 2):
+        for changed in product(ALL, ALL):
+            near = list(base)
+            for place, mode in zip(places, changed, strict=True):
+                near[place] = mode
+            found.add(tuple(near))
+    return found
+
+
+def test_many_contacts_change_by_two_at_first() -> None:
+    """All changes of two of six contacts, which are 154, then somewhere else; 8000 in all."""
+    count, base = 6, (STICK, OPEN, STICK, SLIP_BACKWARD, STICK, OPEN)
+    work = workspace(count)
+    begin(count, np.array(base), 1.0, work)
+    first = set()
+    for _ in range(16 * count * 4):
+        assert following(count, work)
+        first.add(trial(count, work))
+    assert first == neighbours(base)
+    assert len(first) == 1 + 6 * 3 + 15 * 9
+    assert following(count, work)
+    elsewhere = tuple(int(mode) for mode in work.labels[BASE_MODE, :count])  # type: ignore[attr-defined]
+    assert elsewhere != base
+    assert trial(count, work) in neighbours(elsewhere)
+    left = 0
+    while following(count, work):
+        left += 1
+    assert 16 * count * 4 + 1 + left == MOST
+
+
+def test_the_better_becomes_the_base() -> None:
+    count, base = 6, (STICK,) * 6
+    work = workspace(count)
+    begin(count, np.array(base), 1.0, work)
+    for _ in range(5):
+        following(count, work)
+    better = trial(count, work)
+    assert better != base
+    note(count, 1.0, work)  # as good is not better
+    assert tuple(work.labels[BASE_MODE, :count]) == base  # type: ignore[attr-defined]
+    note(count, 0.5, work)
+    assert tuple(work.labels[BASE_MODE, :count]) == better  # type: ignore[attr-defined]
+    following(count, work)
+    assert trial(count, work) in neighbours(better)
+
+
+SINE = float(np.sin(0.3))
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-12, 3e10])
+@pytest.mark.parametrize(
+    ("matrix", "doubtful"),
+    [
+        (np.eye(3), False),
+        ([[2.0, 1.0], [1.0, 2.0]], False),
+        # Two walls that face each other: singular, and no operation is rounded.
+        ([[1.0, -1.0], [-1.0, 1.0]], False),
+        # Singular but for the last digits.
+        ([[1.0, SINE], [SINE, SINE * SINE * (1.0 + 2e-16)]], True),
+        ([[1.0, 1.0], [1.0, 1.0 + 3e-16]], True),
+        ([[1.0, 1.0], [1.0, 1.0 + 1e-3]], False),
+    ],
+)
+def test_what_rounding_decides(matrix: object, size: float, doubtful: bool) -> None:
+    delassus = np.array(matrix)
+    work = contact_workspace(2)
+    number = len(delassus)
+    unit = 2.0 ** np.round(np.log2(size))
+    work.labels[SOURCE, :number] = np.arange(number)
+    work.vectors[SCALE, :number] = 1.0 / np.sqrt(unit * np.diag(delassus))
+    assert uncompiled(nearly_singular)(number, unit * delassus, work) == doubtful
+
+
+def test_contacts_without_friction_never_slip() -> None:
+    count = 6
+    work = workspace(count, smooth=(1, 4))
+    begin(count, np.full(count, STICK), 1.0, work)
+    met = set()
+    while following(count, work):
+        modes = trial(count, work)
+        met.update(modes[:1])
+        assert max(modes[1], modes[4]) <= STICK
+    assert met == set(ALL)
