@@ -88,7 +88,9 @@ def test_the_figure_of_a_promise_is_asked_for_by_its_test(what: str) -> None:
 
 
 def test_counts_are_those_of_the_tests() -> None:
-    spoilt = (ROOT / "tests" / "robot" / "test_spoilt_files.py").read_text(encoding="utf-8")
+    spoilt = (ROOT / "tests" / "robot" / "files" / "test_spoilt_files.py").read_text(
+        encoding="utf-8"
+    )
     each = re.search(r"^EACH = (\d+)", spoilt, re.MULTILINE)
     assert each is not None
     files = int(each[1]) * len(builtin_robots()) * 2  # MJCF and URDF

@@ -85,8 +85,8 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
         [("compiler/tape.py", "repr(entry[2]) < repr(entry[1])", "False")],
         {"loop", "solvers", "programs", "elimination"},
     ),
-    "what compiles": ([("linking.py", "preserve=True", "preserve=False")], ALL),
-    "how bundles are read": ([("bundle.py", "_BYTES = 8", "_BYTES = 4 + 4")], ALL),
+    "what compiles": ([("compiler/linking.py", "preserve=True", "preserve=False")], ALL),
+    "how bundles are read": ([("compiler/bundle.py", "_BYTES = 8", "_BYTES = 4 + 4")], ALL),
 }  # fmt: skip
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.contact import combinations as modes_in_turn
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, STICK
+from heelstrike.contact.solvers import combinations as modes_in_turn
 from heelstrike.contact.solvers.combinations import MOST
 from heelstrike.contact.solvers.search import contact_workspace, nearly_singular
 from heelstrike.contact.workspace import BASE_MODE, SCALE, SOURCE, TANGENT, TRIAL_MODE

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.contact import fischer_burmeister as fb
+from heelstrike.contact.solvers import fischer_burmeister as fb
 from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import (
     CONE,

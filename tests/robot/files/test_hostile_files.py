@@ -23,8 +23,9 @@ from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.errors import RobotError
-from heelstrike.robot import Robot, RobotWarning, builtin_robots, load_robot, trial
+from heelstrike.robot import Robot, RobotWarning, builtin_robots, load_robot
 from heelstrike.robot.files.mujoco_file import parse
+from heelstrike.robot.files.screening import trial
 from heelstrike.robot.files.screening.trial import try_apart
 
 MOST_CALLS = 1_000_000  # of Python functions; a robot of the library takes 5000

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from heelstrike.errors import SimulationError
-from heelstrike.sim import contact_law as cl
+from heelstrike.sim.compliant import contact_law as cl
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heelstrike.sim import rosenbrock as rb
+from heelstrike.sim.compliant import rosenbrock as rb
 
 
 def test_order_conditions_for_any_jacobian() -> None:

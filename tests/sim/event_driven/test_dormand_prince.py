@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.sim import dormand_prince as dp
+from heelstrike.sim.event_driven import dormand_prince as dp
 
 stage_point = uncompiled(dp.stage_point)
 error_norm = uncompiled(dp.error_norm)

@@ -18,8 +18,9 @@ from stored_files import run_file
 from synthetic_runs import box, make_run
 
 import heelstrike as hs
-from heelstrike.sim import BristleFriction, RegularisedFriction, RunStatus, Scheme, hdf5_contents
-from heelstrike.sim import run_file as run_file_module
+from heelstrike.sim import BristleFriction, RegularisedFriction, RunStatus, Scheme
+from heelstrike.sim.files import hdf5_contents
+from heelstrike.sim.files import run_file as run_file_module
 from heelstrike.sim.files.hdf5_contents import contents
 from heelstrike.sim.files.run_file import load_run, save
 from heelstrike.sim.files.seal import LENGTH, seal_holds
@@ -84,7 +85,7 @@ def test_every_method_comes_back(name: str, tmp_path: Path) -> None:
 
 
 def test_there_is_no_method_without_a_round_trip() -> None:
-    from heelstrike.sim import dataset
+    from heelstrike.sim.files import dataset
 
     assert {type(method) for method in METHODS.values()} == set(dataset.METHODS.values())
     laws = {
