@@ -150,7 +150,7 @@ class Bundle:
                 setattr(self, name, value)
                 continue
             if member.role == "array":
-                _check_shape(f"{type(self).__name__}.{name}", member, value.shape, extents)
+                _check_shape(f"{type(self).__name__}.{name}", member, np.shape(value), extents)
             elif member.role == "number":
                 value = member.kind(value)
             elif not isinstance(value, member.kind):
@@ -162,7 +162,7 @@ class Bundle:
     def __setattr__(self, name: str, value: Any) -> None:
         member = self.declared.get(name)
         if member is None or member.role != "cell":
-            raise AttributeError(f"{type(self).__name__}.{name} is not a cell, and stays what it is")
+            raise AttributeError(f"{type(self).__name__}.{name} is no cell, and stays what it is")
         object.__setattr__(self, name, value)
 
     @classmethod
@@ -199,7 +199,8 @@ class Bundle:
     @classmethod
     def compiled_type(cls) -> Any:
         """Return its type to Numba."""
-        return _bundle_type(cls)
+        kind: Any = cls
+        return _bundle_type(kind)
 
     @property
     def _numba_type_(self) -> Any:
@@ -257,21 +258,19 @@ class Bundle:
     def storage(self, prefix: str = "") -> Iterator[tuple[str, np.ndarray[Any, Any]]]:
         """Yield the arrays behind it by name, ``part.array`` those of its parts.
 
-        Those that others own, which are read-only, and addresses are left out; its cells are one
-        array.
+        Addresses are left out; its cells are one array.
         """
         if self._cell_count():
             yield f"{prefix}cells", self.__dict__["_cells"]
         for name, member in self.declared.items():
-            value = getattr(self, name)
             if member.role == "part":
-                yield from value.storage(f"{prefix}{name}.")
-            elif member.role == "array" and value.flags.writeable and not member.address:
-                yield prefix + name, value
+                yield from getattr(self, name).storage(f"{prefix}{name}.")
+            elif member.role == "array" and not member.address:
+                yield prefix + name, getattr(self, name)
 
     def contents(self) -> dict[str, np.ndarray[Any, Any]]:
-        """Copy what is in its storage, by name."""
-        return {name: value.copy() for name, value in self.storage()}
+        """Copy what is its own in its storage, by name: read-only arrays are shared with others."""
+        return {name: value.copy() for name, value in self.storage() if value.flags.writeable}
 
     def fill(self, contents: Mapping[str, np.ndarray[Any, Any]]) -> None:
         """Put contents of a bundle of the same kind and shapes in the place of its own.
@@ -281,7 +280,7 @@ class Bundle:
         ValueError
             If something is missing, or of another shape or kind; nothing has changed then.
         """
-        storage = dict(self.storage())
+        storage = {name: mine for name, mine in self.storage() if mine.flags.writeable}
         for name, mine in storage.items():
             its = contents.get(name)
             if its is None or its.shape != mine.shape or its.dtype != mine.dtype:
@@ -367,7 +366,7 @@ class BundleType(types.Type):
 
 
 @lru_cache
-def _bundle_type(cls: type[Bundle]) -> BundleType:
+def _bundle_type(cls: Any) -> BundleType:
     return BundleType(
         cls.__name__,
         tuple(
