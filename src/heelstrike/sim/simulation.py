@@ -54,8 +54,9 @@ CHUNK = 4096
 # Steps before the first look, and seconds that should pass between two.
 FIRST_LOOK = 256
 LOOK_EVERY = 0.05
-# A pause that never comes.
+# A pause that never comes, and a time (s).
 NEVER = 2**62
+FAR = 1e300
 # Points deeper than this (m) in ground that is laid under them are in it.
 LAID = 1e-6
 
@@ -193,6 +194,7 @@ class Simulation:
         self._keeps_rows = keep_rows
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
+        self._complaint = ""
         self.status = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
@@ -289,7 +291,7 @@ class Simulation:
         SimulationError
             If the simulation has come to its end.
         """
-        return self._advance(np.inf, self._clock.index + 1)
+        return self._advance(FAR, self._clock.index + 1)
 
     def advance(
         self, until: float, *, progress: Callable[[float], None] | None = None
