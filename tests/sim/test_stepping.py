@@ -250,9 +250,8 @@ def test_a_snapshot_of_something_else_is_refused(change: dict[str, Any], words: 
     other = hs.Simulation(walking.bravo7(), computed_torque(), **options)  # type: ignore[arg-type]
     with pytest.raises(hs.SimulationError, match=words):
         other.restore(kept)
-    heavier = hs.Simulation(
-        hs.load_robot("rabbit"), state=hs.load_robot("rabbit").reference_state()
-    )
+    rabbit = hs.load_robot("rabbit")
+    another = hs.Simulation(rabbit, state=rabbit.reference_state())
     with pytest.raises(hs.SimulationError, match="another robot"):
         another.restore(kept)
 
