@@ -16,7 +16,6 @@ from functools import cache, cached_property, update_wrapper
 from typing import Any, TypeVar
 
 import numba
-from numba.extending import is_jitted
 
 from heelstrike.compiler.documented_numba import DocumentedNumba
 
@@ -40,8 +39,8 @@ def numba_in_use() -> DocumentedNumba:
         private.test()
     except Exception as error:
         warnings.warn(
-            f"Numba {numba.__version__} is not one that heelstrike knows how to hurry: kernels take "
-            f"about twice as long to compile, and compute the same. ({error!r})",
+            f"Numba {numba.__version__} is not one that heelstrike knows how to hurry: kernels "
+            f"take about twice as long to compile, and compute the same. ({error!r})",
             CompilerWarning,
             stacklevel=2,
         )
@@ -182,4 +181,5 @@ def _twin(function: Any, replace: dict[int, Any], twins: dict[int, Any]) -> Any:
 
 
 def _is_compiled(value: Any) -> bool:
-    return isinstance(value, Kernel) or is_jitted(value)
+    """Whether it is a kernel, or a function compiled by Numba."""
+    return hasattr(value, "py_func")

@@ -106,5 +106,7 @@ class DocumentedNumba:
 
     def _place(self, function: Callable[..., Any], kind: str) -> Path | None:
         source = Path(function.__code__.co_filename)
-        place = kept_code.place(kept_code.directories(source if source.is_file() else None))
+        place = kept_code.first_writable(
+            kept_code.directories(source if source.is_file() else None)
+        )
         return place and place / f"{function.__name__}.{kind}.{self.made_of(function)[:32]}"

@@ -30,8 +30,8 @@ _BY_VERSION = {"numpy", "numba", "llvmlite"} | sys.stdlib_module_names
 
 _VERSIONS = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
+_METHOD = (types.FunctionType, classmethod, staticmethod)
 _HAS_DOCSTRING = 0x4000000  # since Python 3.13
-_OF_EVERY_CLASS = {"__doc__", "__module__", "__dict__", "__weakref__", "__firstlineno__"}
 
 
 def fingerprint(*parts: Any) -> str:
@@ -113,7 +113,8 @@ class _Account:
             return
         self.add(kind.__bases__)
         for name, member in sorted(vars(kind).items()):
-            if name not in _OF_EVERY_CLASS:
+            # Python keeps its own notes in a class, of other kinds and some of them later.
+            if not name.startswith("__") or isinstance(member, _METHOD):
                 self._write(name)
                 self.add(member)
 
@@ -172,7 +173,7 @@ def _begins_with_docstring(code: types.CodeType) -> bool:
     if sys.version_info >= (3, 13):
         return bool(code.co_flags & _HAS_DOCSTRING)
     # Functions have a docstring there or None, and comprehensions whatever comes first.
-    return code.co_name[0] != "<" and isinstance(code.co_consts[0], str)
+    return code.co_name[0] != "<" and isinstance(next(iter(code.co_consts), None), str)
 
 
 def _wrapped(value: Any) -> Any:
@@ -200,6 +201,8 @@ def _syntax(file: str) -> bytes:
     except (SyntaxError, ValueError):
         return content
     for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(node):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
+            node
+        ):
             node.body[0] = ast.Pass()
     return ast.dump(tree).encode()

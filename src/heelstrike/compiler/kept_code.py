@@ -95,7 +95,7 @@ def write(places: Sequence[Path], name: str, key: bytes, code: bytes) -> None:
     _anywhere(places, keep)
 
 
-def place(places: Sequence[Path]) -> Path | None:
+def first_writable(places: Sequence[Path]) -> Path | None:
     """Return the first place that files can be written to; say so if there is none."""
     return _anywhere(places, lambda unfinished: unfinished.write_bytes(b"?"))
 

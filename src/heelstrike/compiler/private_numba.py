@@ -5,8 +5,8 @@ calls it. For kernels nested six deep that is a third of the time to compile. He
 only other kernels call stays an unfinished module until an outer kernel has taken in everything it
 needs and is optimised as a whole, once. Another fifth goes into asking what ``a + b`` may mean.
 
-The next Numba may know these names no more, or mean something else by them; :meth:`PrivateNumba.test`
-finds out.
+The next Numba may know these names no more, or mean something else by them;
+:meth:`PrivateNumba.test` finds out.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class PrivateNumba(DocumentedNumba):
     def compile(self, call: Callable[[], Result]) -> Result:
         """Make a call that compiles something."""
         with ExitStack() as stack:
-            # Machine code is handed over in a callback of LLVM's, which swallows what Ctrl-C raises.
+            # LLVM hands machine code over in a callback, which swallows what Ctrl-C raises.
             stack.enter_context(kept_interrupts())
             stack.enter_context(global_compiler_lock)  # one at a time, as Numba compiles anyway
             stack.enter_context(_remembered_typings())
@@ -106,7 +106,7 @@ class PrivateNumba(DocumentedNumba):
     def is_kept(self, signature: Any, function: Callable[..., Any]) -> bool:
         """Whether :meth:`separate` would find machine code, or has no disk to look on."""
         cache: _Cache = self.kept(function, address=True)._cache
-        return cache.read(signature) is not None or kept_code.place(cache.places) is None
+        return cache.read(signature) is not None or kept_code.first_writable(cache.places) is None
 
     def test(self) -> None:
         """Compile a small kernel, keep and load it, and compare with Python; raise if it differs.

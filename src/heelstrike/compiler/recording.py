@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,7 @@ class Program:
     kernel: Callable[..., None]
     arguments: Mapping[str, Any]
     scratch: tuple[str, ...] = ()
-    name: str = field(default="")
+    name: str = ""
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -119,7 +119,7 @@ class Recording:
             structural = _structural(value)
             array[structural] = value[structural].astype(float)
         elif name in known:
-            for index, entry in enumerate(known[name].flat):
+            for index, entry in enumerate(known[name].astype(object).flat):
                 if not isinstance(entry, Value):
                     array.flat[index] = entry
         self.arrays[name] = array

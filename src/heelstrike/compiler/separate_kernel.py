@@ -43,7 +43,7 @@ from {module} import {name}
 """
 
 
-class SeparateKernel(types.WrapperAddressProtocol):  # type: ignore[misc]
+class SeparateKernel(types.WrapperAddressProtocol):
     """A kernel that is compiled when it is needed, or in another process until then.
 
     Parameters

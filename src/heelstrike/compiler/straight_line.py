@@ -98,8 +98,9 @@ class _Writer:
         if not isinstance(value, Entry | Result):
             return ir.Constant(_DOUBLE, float(value))
         if value not in self._values:
-            emit = self._read if isinstance(value, Entry) else self._emit
-            self._values[value] = emit(value)
+            self._values[value] = (
+                self._read(value) if isinstance(value, Entry) else self._emit(value)
+            )
         return self._values[value]
 
     def _read(self, entry: Entry) -> Any:
