@@ -46,7 +46,7 @@ class Program:
         Name of the function that is made of it; else the kernel's.
     """
 
-    kernel: Callable[..., None]
+    kernel: Callable[..., Any]
     arguments: Mapping[str, Any]
     scratch: tuple[str, ...] = ()
     name: str = ""
