@@ -275,6 +275,7 @@ import sys
 import numpy as np
 from numba import njit
 from apart import doubled
+from heelstrike.compiler.compilation import numba_in_use
 from heelstrike.compiler.separate_kernel import call_at
 
 @njit
@@ -284,11 +285,11 @@ def call(address, x, written):
 sys.executable = sys.argv[1] if len(sys.argv) > 1 else sys.executable
 doubled.begin()
 helped = doubled._helper is not None
-compiled = doubled.finish()
+if helped:
+    doubled._helper.wait()
+hits = int(numba_in_use().is_kept(doubled.signature(), doubled._function))
+doubled.finish()
 written = np.zeros(1)
-hits = getattr(compiled, "cache_hits", None)
-if hits is None:
-    hits = sum(compiled.stats.cache_hits.values())
 assert doubled.__wrapper_address__() == doubled.address[0] != 0  # as Numba asks for functions
 print(call(doubled.address, 21, written), written[0], helped, hits)
 """

@@ -5,8 +5,10 @@
 
 from __future__ import annotations
 
+import gc
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -25,6 +27,9 @@ OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 _SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
 """Settings of Numba (``NUMBA_OPT`` and so on) that shape machine code."""
+
+_alive: list[Any] = []
+"""Functions whose addresses are known: they hold the code."""
 
 _directory = threading.RLock()
 """Held while Numba is told where to keep what."""
@@ -58,7 +63,7 @@ class DocumentedNumba:
 
     def compile(self, call: Callable[[], Result]) -> Result:
         """Make a call that compiles something."""
-        with kept_interrupts():
+        with kept_interrupts(), no_garbage_collection():
             try:
                 return call()
             except OSError as error:  # it is compiled, but could not be kept
@@ -75,10 +80,14 @@ class DocumentedNumba:
         return entry
 
     def separate(self, signature: Any, function: Callable[..., Any]) -> tuple[Any, int]:
-        """Compile a function for the C calling convention; return it and its address."""
+        """Compile a function for the C calling convention; return it and its address.
+
+        What is returned is compiled once more if it is called in another way.
+        """
         decorator = partial(cfunc, signature)
         made = self.compile(lambda: self._kept(decorator, function, "cfunc", OPTIONS))
-        return made, int(made.address)
+        _alive.append(made)
+        return self.kept(function), int(made.address)
 
     def is_kept(self, signature: Any, function: Callable[..., Any]) -> bool:  # noqa: ARG002
         """Whether :meth:`separate` would find machine code, or has no disk to look on."""
@@ -110,3 +119,16 @@ class DocumentedNumba:
             kept_code.directories(source if source.is_file() else None)
         )
         return place and place / f"{function.__name__}.{kind}.{self.made_of(function)[:32]}"
+
+
+@contextmanager
+def no_garbage_collection() -> Iterator[None]:
+    """Spare the collector the compiler's many live objects, through which it would go often."""
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

@@ -11,7 +11,6 @@ The next Numba may know these names no more, or mean something else by them;
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import importlib
 import pickle
@@ -41,7 +40,12 @@ from numba.core.untyped_passes import InlineClosureLikes
 from numba.np import linalg
 
 from heelstrike.compiler import bundle, kept_code
-from heelstrike.compiler.documented_numba import OPTIONS, DocumentedNumba, Result
+from heelstrike.compiler.documented_numba import (
+    OPTIONS,
+    DocumentedNumba,
+    Result,
+    no_garbage_collection,
+)
 from heelstrike.compiler.fingerprint import fingerprint, is_ours
 from heelstrike.compiler.machine_code import processor
 from heelstrike.interruption import kept_interrupts
@@ -76,7 +80,7 @@ class PrivateNumba(DocumentedNumba):
             stack.enter_context(kept_interrupts())
             stack.enter_context(global_compiler_lock)  # one at a time, as Numba compiles anyway
             stack.enter_context(_remembered_typings())
-            stack.enter_context(_no_garbage_collection())
+            stack.enter_context(no_garbage_collection())
             return call()
 
     def known(self, compiled: Any, signature: Any) -> Any:
@@ -352,16 +356,3 @@ _PLAIN = (types.Number, types.Boolean, types.Array, types.SliceType, types.NoneT
 def _is_plain(kind: Any) -> bool:
     members = kind.types if isinstance(kind, types.Tuple | types.UniTuple) else (kind,)
     return all(isinstance(member, _PLAIN) for member in members)
-
-
-@contextmanager
-def _no_garbage_collection() -> Iterator[None]:
-    """Spare the collector the compiler's many live objects, through which it would go often."""
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()
