@@ -110,6 +110,9 @@ class DocumentedNumba:
                 return decorator(cache=True, **options)(function)
             except RuntimeError:  # Numba finds no file that the function stands in
                 return decorator(**options)(function)
+            except OSError as error:  # a full disk
+                kept_code.say_nowhere([str(error)])
+                return decorator(**options)(function)
             finally:
                 settings.CACHE_DIR = usual
 
