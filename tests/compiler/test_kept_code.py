@@ -134,7 +134,9 @@ matrix, x, pivot = np.array([2.0]), np.array([6.0]), np.zeros(1)
 kind = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 program = kind(_programs()[0])  # 2 x = 6
 program(matrix.ctypes.data, x.ctypes.data, pivot.ctypes.data)
-print(compiled(1.0), from_python(5.0), apart.finish()(4), x[0])
+apart.finish()
+tripled = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)(int(apart.address[0]))
+print(compiled(1.0), from_python(5.0), tripled(4), x[0])
 """
 
 ANSWER = "3.0 10.0 12 3.0"
