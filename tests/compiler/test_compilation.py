@@ -201,6 +201,7 @@ print(told, sum(compiled.stats.cache_hits.values()))
 def test_code_made_with_other_settings_is_not_taken(tmp_path: Path, documented: str) -> None:
     def answer(check: str, address: bool = False) -> str:
         (tmp_path / "checked.py").write_text(CHECKED.replace("ADDRESS", str(address)))
+        os.utime(tmp_path / "checked.py", (address, address))
         told = subprocess.run(
             [sys.executable, "-B", "checked.py"],
             cwd=tmp_path,
