@@ -51,7 +51,7 @@ test-sample: $(VENV)/installed-dev
 	$(PYTEST) --perturb-gaits 1e-12 $(SAMPLE)
 
 bench: $(VENV)/installed
-	$(BIN)/heelstrike bench --out bench
+	$(BIN)/python benchmarks/speed run --out bench
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff format --check .

@@ -78,15 +78,11 @@ class Counted:
 
 def scenarios() -> dict[str, Counted]:
     """What is counted, by name."""
+    from speed.scenarios import falling, plank, standing, walking, walking_law
+
     from heelstrike import State, load_robot
     from heelstrike.control.joint_feedback import JointFeedback
-    from heelstrike.experiments.benchmark.scenarios import (
-        Scenario,
-        falling,
-        plank,
-        standing,
-        walking,
-    )
+    from heelstrike.experiments.engines import Scenario
     from heelstrike.robot import Robot, read_mjcf
 
     def at_reference(robot: Robot, speed: float, feedback: JointFeedback | None = None) -> Scenario:
@@ -114,7 +110,7 @@ def scenarios() -> dict[str, Counted]:
         )
         return replace(still, feedback=law)
 
-    walk = replace(walking(), feedback=walking().own)
+    walk = replace(walking(), feedback=walking_law())
     bent = standing("bravo7")
     sliding = replace(bent, state=State(bent.state.q, 0.5 * np.eye(bent.robot.nv)[0]))
     walker, eight = load_robot("walker2d"), read_mjcf(plank(8))
@@ -147,7 +143,7 @@ def scenarios() -> dict[str, Counted]:
 
 def prepare(folder: Path) -> None:
     """Write down what the counted process needs, and compile everything it will run."""
-    from heelstrike.experiments.benchmark.scenarios import plank
+    from speed.scenarios import plank
 
     (folder / "plank.xml").write_text(plank(8))
     for number, (name, counted) in enumerate(scenarios().items()):

@@ -72,9 +72,9 @@ print(json.dumps(result))
 """
 
 
-def measure_footprint(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: ARG001
+def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: ARG001
     """Seconds to import and to the first step, with and without compiled code; memory in MiB."""
-    from heelstrike.experiments.benchmark.scenarios import walk_gait
+    from speed.scenarios import walk_gait
 
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "gait.json"

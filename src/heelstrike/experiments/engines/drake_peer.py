@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,21 +12,21 @@ from pydrake.multibody import plant as plants
 from pydrake.multibody import tree
 from pydrake.systems import analysis, framework, primitives
 
-from heelstrike.experiments.benchmark.links import links
-from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
-from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
+from heelstrike.experiments.engines.links import links
+from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
 
 FASTEST = "tamsi" if hasattr(plants.DiscreteContactApproximation, "kTamsi") else "lagged"
 """Drake calls TAMSI deprecated; it is several times as fast as what is to take its place."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """How Drake is asked to simulate.
+class DrakePeer(Peer):
+    """A scenario in Drake. Springs and dampers are elements of its plant, within its solver.
 
-    Attributes
+    Parameters
     ----------
+    scenario : Scenario
     step : float
         Seconds.
     approximation : str
@@ -42,33 +40,41 @@ class Options:
         None for the default of 1.
     """
 
-    step: float
-    approximation: str = FASTEST
-    stiffness: float | None = None
-    dissipation: float | None = None
-    stiction: float | None = None
-    near_rigid: float | None = None
-
-    @property
-    def label(self) -> str:
-        """Name in tables and figures."""
-        contacts = "default contacts"
-        if self.stiffness is not None:
-            contacts = f"contacts of {self.stiffness:.0e} N/m"
-        return f"Drake {self.approximation}, {contacts}"
-
-
-class DrakePeer(Peer):
-    """A scenario in Drake. Springs and dampers are elements of its plant, within its solver."""
-
     settling = 1.0
 
-    def __init__(self, scenario: Scenario, options: Options) -> None:
-        super().__init__(scenario, options.step)
+    def __init__(
+        self,
+        scenario: Scenario,
+        step: float,
+        *,
+        approximation: str = FASTEST,
+        stiffness: float | None = None,
+        dissipation: float | None = None,
+        stiction: float | None = None,
+        near_rigid: float | None = None,
+    ) -> None:
+        super().__init__(scenario, step)
+        config = plants.MultibodyPlantConfig(
+            time_step=step,
+            contact_model="point",
+            discrete_contact_approximation=approximation,
+            use_sampled_output_ports=False,  # they cost time and nobody reads them
+        )
+        if stiction is not None:
+            config.stiction_tolerance = stiction
+        if near_rigid is not None:
+            config.sap_near_rigid_threshold = near_rigid
+        material = geometry.ProximityProperties()
+        geometry.AddContactMaterial(
+            properties=material,
+            friction=plants.CoulombFriction(scenario.friction, scenario.friction),
+            point_stiffness=stiffness,
+            dissipation=dissipation,
+        )
         logging.getLogger("drake").setLevel(logging.ERROR)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the deprecated approximation
-            self._simulator, self._plant = _simulator(scenario, options)
+            self._simulator, self._plant = _simulator(scenario, config, material)
         self._context: Any = None
         self._step = 0
 
@@ -104,28 +110,11 @@ class DrakePeer(Peer):
         return Touching(number, force, depth)
 
 
-def _simulator(scenario: Scenario, options: Options) -> tuple[Any, Any]:
+def _simulator(scenario: Scenario, config: Any, material: Any) -> tuple[Any, Any]:
     model = scenario.robot.model
     builder = framework.DiagramBuilder()
-    config = plants.MultibodyPlantConfig(
-        time_step=options.step,
-        contact_model="point",
-        discrete_contact_approximation=options.approximation,
-        use_sampled_output_ports=False,  # they cost time and nobody reads them
-    )
-    if options.stiction is not None:
-        config.stiction_tolerance = options.stiction
-    if options.near_rigid is not None:
-        config.sap_near_rigid_threshold = options.near_rigid
     plant, scene = plants.AddMultibodyPlant(config, builder)
     plant.mutable_gravity_field().set_gravity_vector([model.gravity[0], 0.0, model.gravity[1]])
-    material = geometry.ProximityProperties()
-    geometry.AddContactMaterial(
-        properties=material,
-        friction=plants.CoulombFriction(FRICTION, FRICTION),
-        point_stiffness=options.stiffness,
-        dissipation=options.dissipation,
-    )
     bodies = _add_robot(plant, scenario, material)
     plant.RegisterCollisionGeometry(
         plant.world_body(), math.RigidTransform(), geometry.HalfSpace(), "ground", material
@@ -204,33 +193,8 @@ def _commands(scenario: Scenario) -> Any:
     return primitives.TrajectorySource(trajectories.PiecewisePolynomial(pieces, breaks))
 
 
-def _settings(quick: bool) -> Iterator[Setting]:
-    # Contacts as rigid as SAP makes them come nearest: in a search over the approximations,
-    # stiffness from 1e5 to 1e12 N/m, dissipation from 1 to 1000 s/m, stiction speed, SAP's
-    # relaxation time and threshold of near rigidity.
-    rigid = {"approximation": "sap", "stiffness": 1e12, "near_rigid": 0.1}
-    ways: list[tuple[dict[str, Any], Sequence[float]]] = [(rigid, (1e-3,))]
-    if not quick:
-        stiff = {"approximation": "lagged", "stiffness": 1e10, "dissipation": 30.0}
-        ways = [
-            ({"approximation": FASTEST}, (1e-3, 2e-4)),
-            ({"approximation": "lagged"}, (1e-3, 2e-4)),
-            ({**stiff, "stiction": 1e-5}, (1e-3, 1e-4)),
-            (rigid, (1e-3, 1e-4, 5e-6)),
-        ]
-    for way, steps in ways:
-        for step in steps:
-            options = Options(step=step, **way)
-            yield Setting(
-                options.label,
-                f"h {step:.0e} s",
-                lambda scenario, options=options: DrakePeer(scenario, options),  # type: ignore[misc]
-            )
-
-
 ENGINE = Engine(
     label=f"Drake {FASTEST.upper() if FASTEST == 'tamsi' else FASTEST}",
     note="in its own loop, AdvanceTo; springs and dampers in its plant, torques without limits",
-    peer=lambda scenario, step: DrakePeer(scenario, Options(step=step)),
-    settings=_settings,
+    peer=DrakePeer,
 )

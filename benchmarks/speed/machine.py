@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+import heelstrike
 
 
 def machine() -> dict[str, Any]:
     """Processor, system and versions."""
-    from heelstrike import __version__
-
+    packages = {name: version(name) for name in ("numpy", "numba", "llvmlite")}
     return {
         "processor": _processor(),
         "processors": os.cpu_count(),
         "system": platform.platform(),
         "python": platform.python_version(),
-        "versions": {
-            "heelstrike": __version__,
-            **{name: _version(name) for name in ("numpy", "numba", "llvmlite")},
-        },
-        "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
+        "versions": {"heelstrike": heelstrike.__version__, **packages},
     }
+
+
+def words(about: dict[str, Any], peers: dict[str, str]) -> str:
+    """Return all of it in words, with the engines that took part."""
+    versions = ", ".join(f"{name} {number}" for name, number in about["versions"].items())
+    return (
+        f"{about['processor']} ({about['processors']} processors), {about['system']}, "
+        f"Python {about['python']}, {versions}. "
+        f"Peers: {'; '.join(f'{name} {state}' for name, state in peers.items())}."
+    )
 
 
 def _processor() -> str:
@@ -33,10 +40,3 @@ def _processor() -> str:
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
-
-
-def _version(distribution: str) -> str:
-    try:
-        return version(distribution)
-    except PackageNotFoundError:
-        return "unknown version"

@@ -1,8 +1,7 @@
-"""What is timed: robots, postures and laws of control that every engine can have alike."""
+"""What is timed and counted: robots, postures and laws of control for every engine alike."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
@@ -15,11 +14,10 @@ from heelstrike.contact.queries.inverse_dynamics import contact_inverse_dynamics
 from heelstrike.control.computed_torque import ComputedTorque
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.dynamics import center_of_mass, contact_positions
+from heelstrike.experiments.engines import Scenario
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
-from heelstrike.sim import EventDriven, simulate
-from heelstrike.sim.controller.interface import Controller
-from heelstrike.sim.whole_run import whole
+from heelstrike.sim import EventDriven
 
 Floats = NDArray[np.float64]
 
@@ -36,40 +34,6 @@ STEP_LENGTH, STEP_DURATION = 0.30, 0.45
 """The steps of the walk of the work-precision study: touchdowns at 0.45 and 0.90 s."""
 FEEDFORWARD_ORDER = 9
 """Degree of the polynomials that stand for the torques of a step."""
-
-
-@dataclass(frozen=True, eq=False)
-class Scenario:
-    """Something for every engine to simulate.
-
-    Attributes
-    ----------
-    name : str
-    robot : Robot
-    state : State
-        Where it starts.
-    duration : float
-        Seconds.
-    feedback : JointFeedback or None
-        Its control, for every engine; None for none.
-    own : controller, optional
-        What heelstrike does instead, if it is more than the others are asked.
-    contacts : int or None
-        Contact points that must be active throughout.
-    """
-
-    name: str
-    robot: Robot
-    state: State
-    duration: float
-    feedback: JointFeedback | None
-    own: Controller | None = None
-    contacts: int | None = None
-
-    @property
-    def ground(self) -> Ground:
-        """Level ground."""
-        return Ground(friction=FRICTION)
 
 
 def posture(robot: Robot, thigh: float, shank: float) -> Floats:
@@ -122,7 +86,7 @@ def falling(name: str, *, duration: float = 0.5) -> Scenario:
     """Return a robot left alone on bent knees, moving forward: it folds up and falls."""
     robot = load_robot(name)
     v = np.zeros(robot.nv)
-    return Scenario(f"{name} falling", robot, State(posture(robot, *BENT[name]), v), duration, None)
+    return Scenario(f"{name} falling", robot, State(posture(robot, *BENT[name]), v), duration)
 
 
 @cache
@@ -138,25 +102,20 @@ def walk_gait() -> tuple[Robot, Gait]:
     return robot, gait
 
 
+def walking_law() -> ComputedTorque:
+    """Return what heelstrike walks by: its own law asks more of it than that of the others."""
+    return ComputedTorque(*walk_gait())
+
+
 @cache
 def walking(*, duration: float = 1.0) -> Scenario:
     """Return bravo7 on a walk that springs, dampers and a torque schedule keep going for 1 s.
 
-    heelstrike walks it by computed torque; what the law of the others needs of the dynamics is
-    precomputed for them.
+    What their law needs of the dynamics is precomputed.
     """
     robot, gait = walk_gait()
-    own = ComputedTorque(robot, gait)
-    model_walk = whole(
-        simulate(
-            robot,
-            own,
-            state=gait.initial_state,
-            duration=1.98 * STEP_DURATION,
-            method=EventDriven(),
-            ground=Ground(friction=FRICTION),
-        )
-    )
+    model = Scenario("the model", robot, gait.initial_state, 1.98 * STEP_DURATION)
+    model_walk = model.run(EventDriven(), controller=walking_law(), record_every=1)
     begins = STEP_DURATION * np.arange(3)
     sides = [gait.coefficients, gait.mirrored_coefficients(robot)]
     pieces = []
@@ -175,7 +134,7 @@ def walking(*, duration: float = 1.0) -> Scenario:
         kd=WALKING_DAMPING,
         begins=begins,
     )
-    return Scenario("bravo7 walking", robot, gait.initial_state, duration, feedback, own=own)
+    return Scenario("bravo7 walking", robot, gait.initial_state, duration, feedback)
 
 
 def chain(joints: int) -> str:

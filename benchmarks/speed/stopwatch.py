@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Mapping
 from time import perf_counter
+from typing import Any
 
 Work = Callable[[], float]
 """Something to be timed; returns its own seconds, or what should count as such."""
@@ -49,3 +50,10 @@ def best_of(
         if enabled:
             gc.enable()
     return best
+
+
+def timed(function: Callable[..., Any], *args: Any, **options: Any) -> tuple[Any, float]:
+    """Call a function once; return what it returned, and the seconds it took."""
+    begin = perf_counter()
+    result = function(*args, **options)
+    return result, perf_counter() - begin

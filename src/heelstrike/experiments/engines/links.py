@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.experiments.benchmark.own import InvalidRunError
+from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.robot import Robot
 
 Floats = NDArray[np.float64]

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import dartpy
 import numpy as np
 
-from heelstrike.experiments.benchmark.links import links, space
-from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
-from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
+from heelstrike.experiments.engines.links import links, space
+from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
 
 RADIUS = 1e-4
@@ -20,31 +18,24 @@ MASSLESS = 1e-12
 """Mass (kg) and inertia (kg m²) that stand for none."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """How DART is asked to simulate.
+class DartPeer(Peer):
+    """A scenario in DART. Springs and dampers are those of its joints.
 
-    Attributes
+    Parameters
     ----------
+    scenario : Scenario
     step : float
         Seconds.
     detector : str
         Of collisions: ``"DART"``, its own and the quickest, ``"FCL"``, ``"ODE"`` or ``"BULLET"``.
     """
 
-    step: float
-    detector: str = "DART"
-
-
-class DartPeer(Peer):
-    """A scenario in DART. Springs and dampers are those of its joints."""
-
     settling = 0.2
     lacks = ("armature",)
 
-    def __init__(self, scenario: Scenario, options: Options) -> None:
-        super().__init__(scenario, options.step)
-        self._world, self._robot = _world(scenario, options)
+    def __init__(self, scenario: Scenario, step: float, *, detector: str = "DART") -> None:
+        super().__init__(scenario, step)
+        self._world, self._robot = _world(scenario, step, detector)
         model = scenario.robot.model
         self._forces = np.zeros((len(self.commands), scenario.robot.nv))
         self._forces[:, model.actuator_joint] = self.commands
@@ -84,27 +75,27 @@ class DartPeer(Peer):
         return Touching(len(contacts), force, depth)
 
 
-def _world(scenario: Scenario, options: Options) -> tuple[Any, Any]:
+def _world(scenario: Scenario, step: float, detector: str) -> tuple[Any, Any]:
     world = dartpy.simulation.World()
     world.setGravity(space(scenario.robot.model.gravity))
-    world.setTimeStep(options.step)
+    world.setTimeStep(step)
     awake = dartpy.simulation.DeactivationOptions()
     awake.mEnabled = False  # what rests would be skipped
     world.setDeactivationOptions(awake)
     detectors = dartpy.simulation.CollisionDetectorType
-    world.setCollisionDetector(getattr(detectors, options.detector))
+    world.setCollisionDetector(getattr(detectors, detector))
     skeleton = _skeleton(scenario)
-    world.addSkeleton(_ground())
+    world.addSkeleton(_ground(scenario.friction))
     world.addSkeleton(skeleton)
     return world, skeleton
 
 
-def _ground() -> Any:
+def _ground(friction: float) -> Any:
     ground = dartpy.dynamics.Skeleton("ground")
     _, floor = ground.createWeldJointAndBodyNodePair()
     block = floor.createShapeNode(dartpy.dynamics.BoxShape([100.0, 10.0, 1.0]))
     block.setRelativeTranslation([0.0, 0.0, -0.5])
-    _touch(block)
+    _touch(block, friction)
     ground.setMobile(False)
     return ground
 
@@ -139,7 +130,7 @@ def _skeleton(scenario: Scenario) -> Any:
         for center, radius in link.points:
             shape = body.createShapeNode(dynamics.SphereShape(radius))
             shape.setRelativeTranslation(center)
-            _touch(shape)
+            _touch(shape, scenario.friction)
         bodies.append(body)
     if feedback is not None:
         for i, driven in enumerate(model.actuator_joint):
@@ -151,29 +142,13 @@ def _skeleton(scenario: Scenario) -> Any:
     return skeleton
 
 
-def _touch(shape: Any) -> None:
+def _touch(shape: Any, friction: float) -> None:
     shape.createCollisionAspect()
-    shape.createDynamicsAspect().setFrictionCoeff(FRICTION)
-
-
-def _settings(quick: bool) -> Iterator[Setting]:
-    # With its own detector the error grows again below 20 µs; with FCL it falls on with the step.
-    ways: dict[str, Sequence[float]] = {"DART": (1e-3,)}
-    if not quick:
-        ways = {"DART": (1e-3, 1e-4, 2e-5), "FCL": (1e-3, 1e-4, 3e-6)}
-    for detector, steps in ways.items():
-        for step in steps:
-            options = Options(step=step, detector=detector)
-            yield Setting(
-                f"DART, collisions by {detector}",
-                f"h {step:.0e} s",
-                lambda scenario, options=options: DartPeer(scenario, options),  # type: ignore[misc]
-            )
+    shape.createDynamicsAspect().setFrictionCoeff(friction)
 
 
 ENGINE = Engine(
     label="DART",
     note="a call from Python a step, for want of another way, two when walking, timed too",
-    peer=lambda scenario, step: DartPeer(scenario, Options(step=step)),
-    settings=_settings,
+    peer=DartPeer,
 )

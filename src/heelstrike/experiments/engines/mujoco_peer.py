@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -14,9 +13,8 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
-from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
-from heelstrike.experiments.benchmark.stopwatch import Work
+from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
 
 Floats = NDArray[np.float64]
@@ -24,12 +22,12 @@ Floats = NDArray[np.float64]
 KIND = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
-@dataclass(frozen=True, kw_only=True)
-class Options:
-    """How MuJoCo is asked to simulate.
+class MuJoCoPeer(Peer):
+    """A scenario in MuJoCo, which reads the robot from its file and runs in its own `rollout`.
 
-    Attributes
+    Parameters
     ----------
+    scenario : Scenario
     step : float
         Seconds.
     integrator : str
@@ -41,27 +39,31 @@ class Options:
         Tolerance of its contact solver; None for the default.
     """
 
-    step: float
-    integrator: str = "euler"
-    stiff: float | None = None
-    tolerance: float | None = None
-
-    @property
-    def label(self) -> str:
-        """Name in tables and figures."""
-        if self.stiff is None:
-            return f"MuJoCo {self.integrator}, default contacts"
-        return f"MuJoCo {self.integrator}, contacts stiff to {self.stiff:g} steps"
-
-
-class MuJoCoPeer(Peer):
-    """A scenario in MuJoCo, which reads the robot from its file and runs in its own `rollout`."""
-
     settling = 3.0
 
-    def __init__(self, scenario: Scenario, options: Options) -> None:
-        super().__init__(scenario, options.step)
-        self.model = _model(scenario, options)
+    def __init__(
+        self,
+        scenario: Scenario,
+        step: float,
+        *,
+        integrator: str = "euler",
+        stiff: float | None = None,
+        tolerance: float | None = None,
+    ) -> None:
+        super().__init__(scenario, step)
+        spec = _spec(scenario)
+        spec.option.timestep = step
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+        if tolerance is not None:
+            spec.option.tolerance = tolerance
+            spec.option.iterations = 200
+        if stiff is not None:
+            spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+            spec.option.impratio = 10.0
+            for geom in spec.geoms:
+                geom.solref = stiff * step, 1.0
+                geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
+        self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self._step = 0
         self._make_room(self.steps)
@@ -124,8 +126,8 @@ class MuJoCoPeer(Peer):
         depth = max((-contact.dist for contact in self.data.contact), default=0.0)
         return Touching(self.data.ncon, total, depth)
 
-    def batch_work(self, starts: Sequence[State], threads: int) -> Work:
-        """Work that simulates from several states on several threads."""
+    def batch_work(self, starts: Sequence[State], threads: int) -> Callable[[], float]:
+        """Return what simulates from several states on threads and returns the seconds it took."""
         states = np.concatenate([self._packed(start) for start in starts])
         data = [mujoco.MjData(self.model) for _ in range(threads)]
         out = np.zeros((len(starts), self.steps, states.shape[1]))
@@ -148,7 +150,7 @@ class MuJoCoPeer(Peer):
         return work
 
 
-def _model(scenario: Scenario, options: Options) -> Any:
+def _spec(scenario: Scenario) -> Any:
     with tempfile.TemporaryDirectory() as folder:
         file = scenario.robot.save(Path(folder) / "robot.xml")
         spec = mujoco.MjSpec.from_file(str(file))
@@ -165,44 +167,12 @@ def _model(scenario: Scenario, options: Options) -> Any:
         if not geom.contype and not geom.conaffinity:
             spec.delete(geom)  # bones, which are only looked at
         else:
-            geom.friction = FRICTION, 0.0, 0.0
-    spec.option.timestep = options.step
-    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{options.integrator.upper()}")
-    if options.tolerance is not None:
-        spec.option.tolerance = options.tolerance
-        spec.option.iterations = 200
-    if options.stiff is not None:
-        spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-        spec.option.impratio = 10.0
-        for geom in spec.geoms:
-            geom.solref = options.stiff * options.step, 1.0
-            geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
-    return spec.compile()
-
-
-def _settings(quick: bool) -> Iterator[Setting]:
-    small = (1e-3, 1e-4) if quick else (2e-3, 1e-3, 5e-4, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5, 5e-6)
-    # The settings that came nearest in a search over time constants from 2 to 10 steps, friction
-    # impedance ratios from 1 to 1000, both cones, and direct stiffness of the contacts.
-    ways: list[tuple[str, float | None]] = [("euler", None), ("euler", 5.0), ("rk4", 2.0)]
-    if not quick:
-        ways += [("euler", 2.0), ("euler", 10.0), ("implicitfast", 5.0), ("rk4", None)]
-    for integrator, stiff in ways:
-        for step in small:
-            if stiff is None and step < 5e-5:
-                continue  # softness is all of the error long before
-            tolerance = None if stiff is None else 1e-10
-            options = Options(step=step, integrator=integrator, stiff=stiff, tolerance=tolerance)
-            yield Setting(
-                options.label,
-                f"h {step:.0e} s",
-                lambda scenario, options=options: MuJoCoPeer(scenario, options),  # type: ignore[misc]
-            )
+            geom.friction = scenario.friction, 0.0, 0.0
+    return spec
 
 
 ENGINE = Engine(
     label="MuJoCo Euler",
     note="in its own loop, rollout, with its controls handed over",
-    peer=lambda scenario, step: MuJoCoPeer(scenario, Options(step=step)),
-    settings=_settings,
+    peer=MuJoCoPeer,
 )

@@ -1,4 +1,4 @@
-"""Each engine of the benchmark has our robot, contacts and law of control; who has not, is refused.
+"""Each engine has our robot, contacts and law of control; who has not, is refused.
 
 Engines that are not installed are left out (``pip install heelstrike[peers]`` brings them). All of
 them integrate as our time stepping does, velocity first; what they treat otherwise are dampers and
@@ -7,24 +7,26 @@ springs, explicitly or implicitly, which are differences of first order in the s
 
 from __future__ import annotations
 
-import io
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from rich.console import Console
+from speed import scenarios
 
 from heelstrike.control.joint_feedback import JointFeedback
-from heelstrike.experiments.benchmark import engines, own, peer, precision, scenarios, steps
-from heelstrike.experiments.benchmark.engines import PACKAGES, PARTS_OF_STEPS, simulators
-from heelstrike.experiments.benchmark.figures import draw
-from heelstrike.experiments.benchmark.own import InvalidRunError
-from heelstrike.experiments.benchmark.peer import Engine, Setting, check_flight, flight
-from heelstrike.experiments.benchmark.tables import tables
+from heelstrike.experiments.engines import (
+    Engine,
+    InvalidRunError,
+    check_flight,
+    compared,
+    packages,
+    peer,
+    peers,
+    simulators,
+)
+from heelstrike.experiments.engines.packages import PACKAGES, PARTS_OF_STEPS
+from heelstrike.experiments.engines.peer import flight
 from heelstrike.robot import State, load_robot
 from heelstrike.sim import TimeStepping
 
@@ -83,8 +85,8 @@ def test_the_law_of_control_is_ours(engine: Engine) -> None:
     for step in (1e-3, 1e-4):
         there = engine.peer(scenario, step)
         there.run()
-        ours = own.run(scenario, TimeStepping(step=step)).position[-1]
-        moved = np.abs(ours - own.run(start, TimeStepping(step=step)).position[-1]).max()
+        ours = scenario.run(TimeStepping(step=step)).position[-1]
+        moved = np.abs(ours - start.run(TimeStepping(step=step)).position[-1]).max()
         errors.append(np.abs(there.state().q - ours).max())
     assert moved > 0.05  # it does something
     assert errors[0] <= 2e-2
@@ -122,71 +124,19 @@ def test_it_falls_as_ours_onto_the_stops_of_its_knees(engine: Engine) -> None:
     scenario = scenarios.falling("bravo7")
     there = engine.peer(scenario, STEP)
     there.run()
-    ours = own.run(scenario, TimeStepping(step=STEP)).position[-1]
+    ours = scenario.run(TimeStepping(step=STEP)).position[-1]
     assert ours[4] == pytest.approx(np.deg2rad(130.0), abs=1e-6)
     np.testing.assert_allclose(there.state().q, ours, rtol=0.0, atol=0.1)
 
 
-def test_who_ends_elsewhere_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    engine = simulators(["mujoco"])["mujoco"]
-    held = replace(engine, peer=lambda scenario, step: engine.peer(_held(scenario), step))
-    monkeypatch.setattr(steps, "simulators", lambda names: {"mujoco": held})
-    monkeypatch.setattr(steps, "check_flight", lambda engine, robot: 0.0)
-    monkeypatch.setattr(steps, "_scenarios", lambda: [scenarios.falling("bravo7")])
-    (row,) = steps.measure_steps(quick=True, peers=("mujoco",))["rows"]
-    assert "from where it should" in row["mujoco_invalid"]
-    assert "mujoco_us" not in row
-
-
-def _held(scenario: scenarios.Scenario) -> scenarios.Scenario:
-    """Return the scenario with joints that are held."""
-    standing = scenarios.standing("bravo7", duration=scenario.duration)
-    return replace(scenario, feedback=standing.feedback)
-
-
 def test_pinocchio_has_our_dynamics() -> None:
     pytest.importorskip("pinocchio")
-    from heelstrike.experiments.benchmark.pinocchio_peer import ForwardDynamics
+    from heelstrike.experiments.engines.pinocchio_peer import ForwardDynamics
 
     for name in ("bravo7", "walker2d"):
         part = ForwardDynamics(scenarios.falling(name))
         assert part.check()["acceleration_error"] <= 1e-9
         assert part.run() > 0.0
-
-
-def test_an_engine_that_breaks_does_not_lose_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
-    def breaks(scenario: Any, step: float) -> Any:
-        raise OSError("no such world")
-
-    working = simulators(["mujoco"])["mujoco"]
-    both = {"drake": replace(working, peer=breaks), "mujoco": working}
-    monkeypatch.setattr(steps, "simulators", lambda names: both)
-    monkeypatch.setattr(steps, "_scenarios", lambda: [scenarios.falling("bravo7", duration=0.05)])
-    part = steps.measure_steps(quick=True, peers=("drake", "mujoco"))
-    (row,) = part["rows"]
-    assert row["drake_invalid"] == "OSError: no such world"
-    assert "drake_us" not in row
-    assert row["times_faster"].keys() == {"mujoco"}
-    console = Console(file=io.StringIO(), width=200)
-    console.print(*tables({"steps": part}))
-    assert "does not count: OSError: no such world" in console.file.getvalue()  # type: ignore[attr-defined]
-    (figure,) = draw({"steps": part}).values()
-    assert {text.get_text() for text in figure.axes[0].texts} >= {"–"}
-
-
-def test_a_setting_that_breaks_is_told_with_its_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    def breaks(scenario: Any) -> Any:
-        raise OSError("no such world")
-
-    working = simulators(["mujoco"])["mujoco"]
-    bad = replace(working, settings=lambda quick: iter([Setting("broken", "h 1e-03 s", breaks)]))
-    monkeypatch.setattr(precision, "simulators", lambda names: {"mujoco": bad})
-    monkeypatch.setattr(scenarios, "walking", lambda: scenarios.falling("bravo7", duration=0.02))
-    part = precision.measure_precision(quick=True, peers=("mujoco",))
-    (failure,) = part["failures"]
-    assert failure["reason"] == "OSError: no such world"
-    assert {point["side"] for point in part["points"]} == {"heelstrike"}
-    assert part["to_goal"]["times_less"] == {}
 
 
 def test_an_engine_that_cannot_be_loaded_is_named_and_left_out(
@@ -196,28 +146,8 @@ def test_an_engine_that_cannot_be_loaded_is_named_and_left_out(
         if package.title == "MuJoCo":
             raise ImportError("libmujoco.so: cannot open shared object file")
 
-    monkeypatch.setattr(engines, "_adapter", adapter)
-    monkeypatch.setattr(engines.importlib.util, "find_spec", lambda name: name)
-    found = engines.peers()
+    monkeypatch.setattr(packages, "_adapter", adapter)
+    monkeypatch.setattr(packages.importlib.util, "find_spec", lambda name: name)
+    found = peers()
     assert "cannot be loaded: ImportError: libmujoco.so" in found["mujoco"]
-    assert engines.compared(found) == ["drake", "bullet", "dart", "pinocchio"]
-
-
-def test_what_engines_print_stays_out_of_the_results() -> None:
-    """From Python, too, where standard output is a file and has a buffer."""
-    told = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "from heelstrike.experiments.benchmark.engines import output_diverted as diverted\n"
-            "with diverted():\n"
-            "    print('noise')\n"
-            "print('result')",
-        ],
-        env={name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert told.stdout == "result\n"
-    assert "noise" in told.stderr
+    assert compared(found) == ["drake", "bullet", "dart", "pinocchio"]

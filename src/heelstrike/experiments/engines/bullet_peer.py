@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 import numpy as np
 import pybullet
 
-from heelstrike.experiments.benchmark.links import Link, links
-from heelstrike.experiments.benchmark.peer import Engine, Peer, Setting, Touching
-from heelstrike.experiments.benchmark.scenarios import FRICTION, Scenario
+from heelstrike.experiments.engines.links import Link, links
+from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
 
 RADIUS = 1e-4
@@ -107,7 +105,7 @@ class BulletPeer(Peer):
             body,
             i,
             localInertiaDiagonal=[link.inertia] * 3,
-            lateralFriction=FRICTION,
+            lateralFriction=self.scenario.friction,
             spinningFriction=0.0,
             rollingFriction=0.0,
             restitution=0.0,
@@ -212,14 +210,8 @@ class BulletPeer(Peer):
         return Touching(len(contacts), sum(contact[9] for contact in contacts), depth)
 
 
-def _settings(quick: bool) -> Iterator[Setting]:
-    for step in (1e-3,) if quick else (1e-3, 1e-4, 1e-5):
-        yield Setting("Bullet", f"h {step:.0e} s", partial(BulletPeer, step=step))
-
-
 ENGINE = Engine(
     label="Bullet",
     note="a call from Python a step where its joints are controlled, two when walking, timed too",
     peer=BulletPeer,
-    settings=_settings,
 )

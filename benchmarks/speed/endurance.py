@@ -9,19 +9,19 @@ import numpy as np
 
 from heelstrike.contact.ground import Ground
 from heelstrike.control.computed_torque import ComputedTorque
-from heelstrike.experiments.benchmark.scenarios import FRICTION
 from heelstrike.gait import optimize_gait
 from heelstrike.robot import load_robot
 from heelstrike.sim import Push, RunStatus, TimeStepping, simulate_batch
+from speed.race import STEP
+from speed.scenarios import FRICTION
 
 STEPS = 1_000_000
-STEP = 1e-3
 DURATION = 7.0
 STRONGEST = 60.0
 """Of a push, in N, over 0.1 s, in any direction; some of the robots fall."""
 
 
-def measure_endurance(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: ARG001
+def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: ARG001
     """Walk bravo7 until there are a million steps in all."""
     robot = load_robot("bravo7")
     gait = optimize_gait(robot, step_length=0.30, step_duration=0.70, friction=0.8 * FRICTION)

@@ -15,9 +15,9 @@ import pinocchio
 from numpy.typing import NDArray
 
 from heelstrike.dynamics import forward_dynamics
-from heelstrike.experiments.benchmark.links import links, space
-from heelstrike.experiments.benchmark.own import InvalidRunError
-from heelstrike.experiments.benchmark.scenarios import Scenario
+from heelstrike.experiments.engines.links import links, space
+from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.experiments.engines.scenario import Scenario
 
 Floats = NDArray[np.float64]
 

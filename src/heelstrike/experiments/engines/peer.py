@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any, ClassVar
@@ -11,9 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.experiments.benchmark import own
-from heelstrike.experiments.benchmark.own import InvalidRunError
-from heelstrike.experiments.benchmark.scenarios import Scenario
+from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import Robot, State
 from heelstrike.sim import TimeStepping
 
@@ -32,6 +30,10 @@ FLIGHT_ERROR = 1e-3
 Two methods of first order differ by ½ h t |a|: 5e-4 at 10 m/s² or rad/s². A wrong mass, axis or
 direction of gravity moves them by ½ t² a, 5e-2.
 """
+
+
+class InvalidRunError(Exception):
+    """A run that does not count, and why."""
 
 
 @dataclass(frozen=True)
@@ -152,23 +154,6 @@ class Peer(ABC):
         return found
 
 
-@dataclass(frozen=True)
-class Setting:
-    """One point of a curve of work and precision.
-
-    Attributes
-    ----------
-    series, knob : str
-        Curve, and place on it.
-    make : callable
-        Makes the peer of a scenario.
-    """
-
-    series: str
-    knob: str
-    make: Callable[[Scenario], Peer]
-
-
 @dataclass(frozen=True, kw_only=True)
 class Engine:
     """An engine that simulates.
@@ -180,15 +165,13 @@ class Engine:
     note : str
         What its times include.
     peer : callable
-        Makes the peer of a scenario with a step, in the fastest way that is valid.
-    settings : callable
-        The settings of a study of work and precision; fewer if its argument is true.
+        Makes the peer of a scenario with a step, in the fastest way that is valid, or another way
+        that further keywords name.
     """
 
     label: str
     note: str
-    peer: Callable[[Scenario, float], Peer]
-    settings: Callable[[bool], Iterator[Setting]]
+    peer: Callable[..., Peer]
 
 
 def check_flight(engine: Engine, robot: Robot) -> float:
@@ -209,7 +192,7 @@ def check_flight(engine: Engine, robot: Robot) -> float:
         scenario = replace(scenario, robot=robot)
         peer = engine.peer(scenario, FLIGHT_STEP)
     peer.run()
-    ours = own.run(scenario, TimeStepping(step=FLIGHT_STEP)).position[-1]
+    ours = scenario.run(TimeStepping(step=FLIGHT_STEP)).position[-1]
     error = float(np.max(np.abs(peer.state().q - ours)))
     if not error <= FLIGHT_ERROR:
         raise InvalidRunError(f"in free flight it is {error:.1e} m or rad away after {FLIGHT} s")
@@ -225,7 +208,7 @@ def flight(robot: Robot) -> Scenario:
     if robot.floating:
         q[1] += 5.0
     v = np.where(np.arange(robot.nv) % 2, 1.0, -1.0)
-    return Scenario(f"{robot.name} flying", robot, State(q, v), FLIGHT, None)
+    return Scenario(f"{robot.name} flying", robot, State(q, v), FLIGHT)
 
 
 def _commands(scenario: Scenario, step: float, steps: int) -> Floats:
@@ -235,10 +218,3 @@ def _commands(scenario: Scenario, step: float, steps: int) -> Floats:
     if feedback.coefficients.shape[2] == 1 and len(feedback.begins) == 1:
         return feedback.command([0.0])  # it never changes
     return feedback.command(step * np.arange(steps))
-
-
-def reason(error: Exception) -> str:
-    """Why a run of an engine does not count, in words."""
-    if isinstance(error, InvalidRunError):
-        return str(error)
-    return f"{type(error).__name__}: {error}"

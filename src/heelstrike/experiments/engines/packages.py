@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import ctypes
 import importlib
 import importlib.util
-import os
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from heelstrike.experiments.benchmark.peer import Engine
+    from heelstrike.experiments.engines.peer import Engine
 
 
 @dataclass(frozen=True)
@@ -66,7 +62,7 @@ def _state(package: Package) -> str:
     except PackageNotFoundError:
         found = "unknown version"
     if package.adapter is None:
-        return f"{found}, but this suite cannot run it"
+        return f"{found}, but there is no adapter for it"
     try:
         _adapter(package)
     except Exception as error:  # whatever a broken installation raises
@@ -89,20 +85,4 @@ def simulators(names: Sequence[str]) -> dict[str, Engine]:
 
 
 def _adapter(package: Package) -> ModuleType:
-    return importlib.import_module(f"heelstrike.experiments.benchmark.{package.adapter}")
-
-
-@contextmanager
-def output_diverted() -> Iterator[None]:
-    """Send what engines print by themselves to standard error: standard output is for results."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    try:
-        yield
-    finally:
-        sys.stdout.flush()
-        with suppress(OSError, TypeError):  # C keeps a buffer of its own; not so on all systems
-            ctypes.CDLL(None).fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
+    return importlib.import_module(f"heelstrike.experiments.engines.{package.adapter}")
