@@ -10,22 +10,24 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 
 
 class Inner(Bundle):
-    values: np.ndarray
+    values: np.ndarray = array("n")
 
 
 class Outer(Bundle):
-    count: int
-    scale: float
-    row: np.ndarray
-    matrix: np.ndarray
-    cube: np.ndarray
-    labels: np.ndarray
-    inner: Inner
+    count: int = number(int)
+    scale: float = number(float)
+    turns: int = cell(int)
+    row: np.ndarray = array("columns + 1")
+    matrix: np.ndarray = array("rows", "columns")
+    cube: np.ndarray = array("rows", 3, "2 rows")
+    labels: np.ndarray = array(2, of=int)
+    angle: float = cell(float)
+    inner: Inner = part(Inner)
 
 
 @kernel
@@ -40,6 +42,8 @@ def everything(bundle: Outer, result: np.ndarray) -> int:
     result[7] = bundle.matrix[1].sum()
     bundle.inner.values[0] += 1.0
     bundle.cube[1, :, 0] = 7.0
+    bundle.turns += 2
+    bundle.angle = 0.5 * bundle.turns
     return bundle.matrix.shape[0] * bundle.cube.size
 
 
@@ -51,7 +55,8 @@ def make() -> Outer:
         matrix=np.arange(6.0).reshape(2, 3),
         cube=np.arange(24.0).reshape(2, 3, 4),
         labels=np.array([5, -6]),
-        inner=Inner(np.array([11.0])),
+        angle=-8.0,
+        inner=Inner(values=np.array([11.0])),
     )
 
 
@@ -61,6 +66,10 @@ def test_members_read_and_written_in_compiled_code() -> None:
     assert result.tolist() == [-3.0, 0.1, 3.0, 5.0, 15.0, -6.0, 11.0, 12.0]
     assert bundle.inner.values[0] == 12.0
     assert np.all(bundle.cube[1, :, 0] == 7.0)
+    assert (bundle.turns, bundle.angle) == (2, 1.0)
+    bundle.turns = 5
+    everything(bundle, result)
+    assert (bundle.turns, bundle.angle) == (7, 3.5)
 
 
 @pytest.mark.parametrize("clone", [copy.deepcopy, lambda b: pickle.loads(pickle.dumps(b))])
@@ -71,6 +80,7 @@ def test_a_copy_has_arrays_of_its_own(clone) -> None:
     everything(other, result)
     assert bundle.inner.values[0] == 12.0
     assert other.inner.values[0] == 13.0
+    assert (bundle.turns, other.turns) == (2, 4)
 
 
 @pytest.mark.parametrize("row", [np.arange(8.0)[::2], np.arange(4, dtype=np.float32)])
@@ -89,7 +99,7 @@ def test_threads_that_ask_at_once_get_one_table(monkeypatch: pytest.MonkeyPatch)
         return make_table(bundle)
 
     monkeypatch.setattr(Bundle, "_new_table", together)
-    bundle = Inner(np.arange(3.0))
+    bundle = Inner(values=np.arange(3.0))
     with ThreadPoolExecutor(2) as pool:
         first, second = pool.map(lambda _: bundle.table, range(2))
     assert first is second is bundle.table
@@ -100,8 +110,63 @@ def test_what_bundles_share_is_not_copied() -> None:
     """Addresses of machine code are read-only; a copy may be from before they were known."""
     shared = np.arange(3.0)
     shared.flags.writeable = False
-    bundle, other = Inner(shared), Inner(np.zeros(3))
+    bundle, other = Inner(values=shared), Inner(values=np.zeros(3))
     bundle.become(other)
     assert shared.tolist() == [0.0, 1.0, 2.0]
     other.become(bundle)
     assert other.values.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_allocation_follows_the_declaration() -> None:
+    bundle = Outer.allocate(rows=2, columns=5, n=1, count=4, matrix=np.ones((2, 5)), turns=3)
+    shapes = {name: values.shape for name, values in bundle.storage()}
+    assert shapes == {
+        "cells": (2,), "row": (6,), "matrix": (2, 5), "cube": (2, 3, 4), "labels": (2,),
+        "inner.values": (1,),
+    }  # fmt: skip
+    assert bundle.labels.dtype == np.int64
+    assert (bundle.count, bundle.scale, bundle.turns, bundle.angle) == (4, 0.0, 3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"matrix": np.zeros((2, 4))}, r"Outer.matrix has shape \(2, 4\) .*columns = 3"),
+        ({"cube": np.zeros((2, 3, 5))}, r"Outer.cube has shape .*rows = 2"),
+        ({"labels": np.zeros(3, dtype=np.int64)}, r"Outer.labels has shape \(3,\)"),
+        ({"row": np.zeros((4, 1))}, r"Outer.row has shape \(4, 1\)"),
+        ({"inner": 3.0}, "Outer.inner is a Inner"),
+        ({"other": 3.0}, "Outer has no other"),
+    ],
+)
+def test_members_that_do_not_fit_are_refused(change: dict[str, object], words: str) -> None:
+    with pytest.raises(TypeError, match=words):
+        Outer(**make().members() | change)
+
+
+def test_what_is_missing_is_named() -> None:
+    members = make().members()
+    del members["inner"]
+    with pytest.raises(TypeError, match="Outer is made with inner, which is missing"):
+        Outer(**members)
+
+
+def test_only_cells_can_be_set() -> None:
+    bundle = make()
+    for name in ("count", "row", "rwo"):
+        with pytest.raises(AttributeError, match=f"Outer.{name} is no cell"):
+            setattr(bundle, name, 1)
+
+
+def test_contents_put_back_are_the_bundle_as_it_was() -> None:
+    bundle, result = make(), np.zeros(8)
+    before = bundle.contents()
+    everything(bundle, result)
+    after = bundle.contents()
+    bundle.fill(before)
+    assert (bundle.turns, bundle.inner.values[0]) == (0, 11.0)
+    everything(bundle, result)
+    assert all(np.array_equal(after[name], now) for name, now in bundle.contents().items())
+    for spoilt in (before | {"row": np.zeros(3)}, {"cells": before["cells"]}):
+        with pytest.raises(ValueError, match="missing, or of another shape"):
+            bundle.fill(spoilt)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -85,7 +84,7 @@ def test_equals_the_kernels(case: RobotCase) -> None:
 
 def test_robots_that_differ_in_numbers_share_their_code() -> None:
     model, points = NAMED[0].robot().model, usual_points(NAMED[0].robot())
-    heavier = dataclasses.replace(model, mass=1.5 * model.mass)
+    heavier = model.replaced(mass=1.5 * model.mass)
     np.testing.assert_array_equal(
         straight_line_programs(model, points), straight_line_programs(heavier, points)
     )

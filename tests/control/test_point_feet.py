@@ -52,8 +52,7 @@ def step_error(run: hs.Run) -> float:
 def springy() -> hs.Robot:
     """Rabbit with springs, dampers and rotors in its joints."""
     joints = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
-    model = dataclasses.replace(
-        rabbit().model,
+    model = rabbit().model.replaced(
         stiffness=80.0 * joints,
         rest=0.3 * joints,
         damping=3.0 * joints,
@@ -87,10 +86,10 @@ def test_the_joints_accelerate_as_asked(seed: int, make: Callable[[], hs.Robot])
     kinematics = hs.contact_kinematics(robot, q, v, ground)
     assert kinematics.gap[1 - stance] > 1e-3
     contacts = Contacts(
-        dynamics.contact_positions(robot, q),
-        np.tile([0.0, 1.0], (2, 1)),
-        kinematics.gap,
-        np.zeros((2, 2)),
+        position=dynamics.contact_positions(robot, q),
+        normal=np.tile([0.0, 1.0], (2, 1)),
+        gap=kinematics.gap,
+        force=np.zeros((2, 2)),
     )
     torque = hs.ComputedTorque(robot, gait(), kp=kp, kd=kd).torque(t, hs.State(q, v), contacts)
     wanted = (

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +18,7 @@ def test_step_of_a_robot_twice_as_large(bravo7: hs.Robot) -> None:
     large = replace(
         bravo7,
         name="large",
-        model=dataclasses.replace(
-            model,
+        model=model.replaced(
             offset=2.0 * model.offset,
             center_of_mass=2.0 * model.center_of_mass,
             contact_position=2.0 * model.contact_position,
@@ -42,8 +40,7 @@ def test_no_step_suits_a_robot_without_feet(bravo7: hs.Robot) -> None:
     footless = replace(
         bravo7,
         name="footless",
-        model=dataclasses.replace(
-            model,
+        model=model.replaced(
             contact_link=model.contact_link[:0],
             contact_position=model.contact_position[:0],
             contact_radius=model.contact_radius[:0],

@@ -71,12 +71,10 @@ def test_the_wrong_robot_is_refused(
 ) -> None:
     with pytest.raises(GaitError, match=r"gait\.json: is a gait of robot 'bravo7'"):
         hs.load_gait(saved, spring_flamingo)
-    heavier = dataclasses.replace(bravo7.model, mass=1.1 * bravo7.model.mass)
+    heavier = bravo7.model.replaced(mass=1.1 * bravo7.model.mass)
     with pytest.raises(GaitError, match="another version of robot 'bravo7'"):
         hs.load_gait(saved, dataclasses.replace(bravo7, model=heavier))
-    reordered = dataclasses.replace(
-        bravo7.model, actuator_joint=bravo7.model.actuator_joint[::-1].copy()
-    )
+    reordered = bravo7.model.replaced(actuator_joint=bravo7.model.actuator_joint[::-1].copy())
     with pytest.raises(GaitError, match="has actuators at"):
         hs.load_gait(saved, dataclasses.replace(bravo7, model=reordered))
 

@@ -70,9 +70,9 @@ def test_a_gait_does_not_fit_another_robot(gait: hs.Gait, bravo7: hs.Robot) -> N
 def test_fingerprint_tells_robots_apart(bravo7: hs.Robot, spring_flamingo: hs.Robot) -> None:
     assert fingerprint(bravo7) == fingerprint(hs.load_robot("bravo7"))
     assert fingerprint(bravo7) != fingerprint(spring_flamingo)
-    heavier = dataclasses.replace(bravo7.model, mass=bravo7.model.mass * (1.0 + 1e-6))
+    heavier = bravo7.model.replaced(mass=bravo7.model.mass * (1.0 + 1e-6))
     assert fingerprint(dataclasses.replace(bravo7, model=heavier)) != fingerprint(bravo7)
-    rounded = dataclasses.replace(bravo7.model, mass=bravo7.model.mass * (1.0 + 1e-14))
+    rounded = bravo7.model.replaced(mass=bravo7.model.mass * (1.0 + 1e-14))
     assert fingerprint(dataclasses.replace(bravo7, model=rounded)) == fingerprint(bravo7)
 
 

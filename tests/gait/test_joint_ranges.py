@@ -54,8 +54,7 @@ def test_a_counterpart_that_turns_the_other_way_gets_the_mirrored_range() -> Non
     turned = dataclasses.replace(
         robot,
         mirror=dataclasses.replace(mirror, sign=sign),
-        model=dataclasses.replace(
-            robot.model,
+        model=robot.model.replaced(
             reference=reference,
             lower=np.full(robot.nv, -3.0),
             upper=np.full(robot.nv, 3.0),
@@ -73,9 +72,7 @@ def test_a_counterpart_that_turns_the_other_way_gets_the_mirrored_range() -> Non
 def test_an_infinite_end_leaves_the_robot_s_own() -> None:
     robot = hs.load_robot("bravo7")
     knee = robot.joint_names.index("right_knee")
-    model = dataclasses.replace(
-        robot.model, lower=np.full(robot.nv, -0.5), upper=np.full(robot.nv, 2.0)
-    )
+    model = robot.model.replaced(lower=np.full(robot.nv, -0.5), upper=np.full(robot.nv, 2.0))
     lower, upper = ranges_kept(
         dataclasses.replace(robot, model=model), {"right_knee": (-np.inf, 1.0)}
     )

@@ -105,8 +105,7 @@ def test_where_a_joint_counts_from_is_nothing_to_the_gait(bravo7: hs.Robot, gait
     """One knee's angle is zero elsewhere than the other's: the same walk in other numbers."""
     shift = np.zeros(9)
     shift[4] = 0.3
-    model = dataclasses.replace(
-        bravo7.model,
+    model = bravo7.model.replaced(
         reference=bravo7.model.reference + shift,
         lower=bravo7.model.lower + shift,
         upper=bravo7.model.upper + shift,
@@ -415,20 +414,16 @@ def robot_without(robot: hs.Robot, what: str) -> hs.Robot:
     if what == "symmetry":
         return dataclasses.replace(robot, mirror=None)
     if what == "motor":
-        model = dataclasses.replace(
-            robot.model,
+        model = robot.model.replaced(
             actuator_joint=robot.model.actuator_joint[:-1],
             torque_lower=robot.model.torque_lower[:-1],
             torque_upper=robot.model.torque_upper[:-1],
         )
         return dataclasses.replace(robot, model=model)
     if what == "gravity":
-        return dataclasses.replace(
-            robot, model=dataclasses.replace(robot.model, gravity=np.zeros(2))
-        )
+        return dataclasses.replace(robot, model=robot.model.replaced(gravity=np.zeros(2)))
     assert what == "contact points"
-    model = dataclasses.replace(
-        robot.model,
+    model = robot.model.replaced(
         contact_link=np.zeros(0, np.int64),
         contact_position=np.zeros((0, 2)),
         contact_radius=np.zeros(0),

@@ -37,7 +37,7 @@ def rabbit() -> hs.Robot:
 @pytest.fixture(scope="module")
 def round_rabbit(rabbit: hs.Robot) -> hs.Robot:
     """The same robot on discs of 5 cm: its feet roll."""
-    model = dataclasses.replace(rabbit.model, contact_radius=np.full(2, 0.05))
+    model = rabbit.model.replaced(contact_radius=np.full(2, 0.05))
     return dataclasses.replace(rabbit, model=model)
 
 
@@ -280,8 +280,7 @@ def test_where_a_joint_counts_from_is_nothing_to_the_gait(
 ) -> None:
     """One knee's angle is zero elsewhere than the other's: the same walk in other numbers."""
     shift = np.array([0.0, 0.0, 0.0, 0.0, 0.3, 0.0, 0.0])
-    model = dataclasses.replace(
-        rabbit.model,
+    model = rabbit.model.replaced(
         reference=rabbit.model.reference + shift,
         lower=rabbit.model.lower + shift,
         upper=rabbit.model.upper + shift,
@@ -340,7 +339,7 @@ def test_a_robot_s_own_speed_limits_hold(rabbit: hs.Robot, rabbit_gait: hs.Piece
         return float(np.abs(gait.in_step(times, order=1)).max())
 
     limit = 0.9 * fastest(rabbit_gait)
-    model = dataclasses.replace(rabbit.model, speed_limit=np.full(rabbit.nv, limit))
+    model = rabbit.model.replaced(speed_limit=np.full(rabbit.nv, limit))
     gait = hs.optimize_gait(dataclasses.replace(rabbit, model=model), **STEP)
     # Not only at the Gauss points, between which and the end the gait without limits is fastest.
     assert fastest(gait) <= limit * (1.0 + 1e-6)

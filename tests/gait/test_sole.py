@@ -15,8 +15,7 @@ from heelstrike.gait.sole import sole
 def with_contacts(robot: hs.Robot, position: list[list[float]], radius: list[float]) -> hs.Robot:
     """Return the robot with other contact points on its first foot, and none elsewhere."""
     count = len(position)
-    model = dataclasses.replace(
-        robot.model,
+    model = robot.model.replaced(
         contact_link=np.full(count, robot.feet[0].link),
         contact_position=np.array(position),
         contact_radius=np.array(radius),

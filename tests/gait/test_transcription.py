@@ -28,8 +28,7 @@ def robot(request: pytest.FixtureRequest) -> hs.Robot:
     bravo7 = hs.load_robot("bravo7")
     if request.param == "corners":
         return bravo7
-    model = dataclasses.replace(
-        bravo7.model,
+    model = bravo7.model.replaced(
         contact_radius=np.full(4, RADIUS),
         contact_position=bravo7.model.contact_position + np.array([0.0, RADIUS]),
     )

@@ -56,7 +56,7 @@ def test_a_robot_with_dampers_flies_as_ours(engine: Engine) -> None:
 
 def test_another_robot_is_refused(engine: Engine, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = load_robot("bravo7")
-    heavier = replace(robot, model=replace(robot.model, inertia=2.0 * robot.model.inertia))
+    heavier = replace(robot, model=robot.model.replaced(inertia=2.0 * robot.model.inertia))
     wrong = replace(
         engine, peer=lambda scenario, step: engine.peer(replace(scenario, robot=heavier), step)
     )

@@ -358,7 +358,7 @@ def test_a_biped_stands_on_its_dry_joints(method: object) -> None:
     weight = G * robot.model.mass.sum()
     for share in (5.0, 1.5, 1.01, 0.99):
         friction = np.concatenate((np.zeros(3), np.full(6, share * least)))
-        model = dataclasses.replace(robot.model, dry_friction=friction)
+        model = robot.model.replaced(dry_friction=friction)
         dry = dataclasses.replace(robot, model=model)
         run = hs.simulate(dry, state=state, duration=0.2, method=method)  # type: ignore[arg-type]
         assert run.completed, run.message

@@ -29,7 +29,7 @@ def controller() -> hs.ComputedTorque:
 
 def heavier(factor: float) -> hs.Robot:
     robot = walking.bravo7()
-    model = dataclasses.replace(robot.model, mass=factor * robot.model.mass)  # type: ignore[type-var]
+    model = robot.model.replaced(mass=factor * robot.model.mass)
     return dataclasses.replace(robot, model=model)
 
 
@@ -364,8 +364,7 @@ def test_robots_of_one_size_and_another_structure(threads: int) -> None:
     robot = hs.load_robot("compass_gait")
 
     def other(leg: float, dry: float) -> hs.Robot:
-        model: Model = dataclasses.replace(  # type: ignore[type-var]
-            robot.model,
+        model: Model = robot.model.replaced(
             mass=np.array([0.0, 10.0, leg, leg]),
             dry_friction=np.array([0.0, 0.0, 0.0, dry]),
         )

@@ -4,16 +4,20 @@ A kernel needs some hundred arrays. Passed by value, as Numba passes a tuple, ea
 handful of arguments at every call: slow to compile and slow to call. A bundle is one argument, the
 address of a table with the places and shapes of its arrays, and ``bundle.name`` reads the same in
 compiled code as in Python.
+
+What a bundle holds is declared once, where its class is written: shapes by the names of their
+extents, from which follow its allocation, its compiled type, its checks and its contents by name.
 """
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, dataclass_transform
+from typing import Any, ClassVar, TypeVar, dataclass_transform
 
-import numba
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -24,6 +28,7 @@ from numba.extending import (
     NativeValue,
     infer_getattr,
     lower_getattr_generic,
+    lower_setattr_generic,
     register_model,
     unbox,
 )
@@ -31,59 +36,206 @@ from numba.np.arrayobj import populate_array
 
 _WORD = ir.IntType(64)
 _BYTES = 8
+_EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
+
+_Some = TypeVar("_Some", bound="Bundle")
 
 
-@dataclass_transform(frozen_default=True, eq_default=False)
+@dataclass(frozen=True)
+class Member:
+    """What a bundle says of one of its members.
+
+    Attributes
+    ----------
+    role : str
+        ``"array"``, ``"cell"`` (a number that changes), ``"number"`` (one that does not) or
+        ``"part"`` (another bundle).
+    kind : type
+        ``float`` or ``int``, or the class of a part.
+    shape : tuple of str and int
+        Extents of an array: ``"nv"``, ``"2 nc"``, ``"nc + 1"``, 3.
+    address : bool
+        Whether it holds places in this process, which mean nothing in another.
+    """
+
+    role: str
+    kind: type
+    shape: tuple[str | int, ...] = ()
+    address: bool = False
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Of its numbers: 64 bits."""
+        return np.dtype(np.float64 if self.kind is float else np.int64)
+
+
+def array(*shape: str | int, of: type = float, address: bool = False) -> Any:
+    """Declare an array of a bundle by its extents, of ``float`` or ``int``."""
+    return Member("array", of, shape, address)
+
+
+def cell(of: type) -> Any:
+    """Declare a number of a bundle, ``float`` or ``int``, that kernels may change."""
+    return Member("cell", of)
+
+
+def number(of: type) -> Any:
+    """Declare a number of a bundle, ``float`` or ``int``, that stays as it is."""
+    return Member("number", of)
+
+
+def part(kind: type[Bundle]) -> Any:
+    """Declare a bundle within a bundle."""
+    return Member("part", kind)
+
+
+@dataclass_transform(eq_default=False, field_specifiers=(array, cell, number, part))
 class Bundle:
-    """Base class of bundles; a subclass lists its members like a dataclass.
+    """Base class of bundles; a subclass declares its members.
 
-    A member is a C-contiguous array of 64-bit numbers, a number, or another bundle. A bundle never
-    lets go of its arrays, so that its table stays good; what is in the arrays may change.
+    Arrays are C-contiguous, of 64-bit numbers. A bundle never lets go of its arrays, so that its
+    table stays good; what is in the arrays and cells may change.
+
+    Parameters
+    ----------
+    **members : array, number or Bundle
+        Every member by its name. Cells may be left out, and are zero then.
 
     Raises
     ------
     TypeError
-        When it is handed to a kernel with a member of another kind.
+        If a member is missing or unknown, or an array does not have its shape; when it is handed to
+        a kernel, if an array is not what kernels can read.
 
     Examples
     --------
+    >>> import numba
     >>> class Rod(Bundle):
-    ...     mass: float
-    ...     end: np.ndarray
+    ...     mass: float = number(float)
+    ...     end: np.ndarray = array("axis")
+    ...     swings: int = cell(int)
     >>> @numba.njit
-    ... def moment(rod):
+    ... def swing(rod):
+    ...     rod.swings += 1
     ...     return rod.mass * rod.end[0]
-    >>> moment(Rod(2.0, np.array([0.5, 0.0])))
-    1.0
+    >>> rod = Rod(mass=2.0, end=np.array([0.5, 0.0]))
+    >>> swing(rod), rod.swings
+    (1.0, 1)
     """
 
-    def __init_subclass__(cls) -> None:
-        dataclass(frozen=True, eq=False)(cls)
+    declared: ClassVar[dict[str, Member]] = {}
+    """The members that the class declares, by name."""
 
-    @cached_property
-    def _numba_type_(self) -> BundleType:
+    def __init_subclass__(cls) -> None:
+        own = {name: value for name, value in vars(cls).items() if isinstance(value, Member)}
+        cls.declared = cls.declared | own
+        cells = [name for name, member in cls.declared.items() if member.role == "cell"]
+        for name in own:
+            if name in cells:
+                setattr(cls, name, _cell_property(cells.index(name), own[name]))
+            else:
+                delattr(cls, name)
+
+    def __init__(self, **members: Any) -> None:
+        own = self.__dict__
+        own["_cells"] = np.zeros(self._cell_count(), dtype=np.int64)
+        extents: dict[str, int] = {}
+        for name, member in self.declared.items():
+            if name not in members:
+                if member.role != "cell":
+                    raise TypeError(f"{type(self).__name__} is made with {name}, which is missing")
+                continue
+            value = members.pop(name)
+            if member.role == "cell":
+                setattr(self, name, value)
+                continue
+            if member.role == "array":
+                _check_shape(f"{type(self).__name__}.{name}", member, np.shape(value), extents)
+            elif member.role == "number":
+                value = member.kind(value)
+            elif not isinstance(value, member.kind):
+                raise TypeError(f"{type(self).__name__}.{name} is a {member.kind.__name__}")
+            own[name] = value
+        if members:
+            raise TypeError(f"{type(self).__name__} has no {', '.join(members)}")
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        member = self.declared.get(name)
+        if member is None or member.role != "cell":
+            raise AttributeError(f"{type(self).__name__}.{name} is no cell, and stays what it is")
+        object.__setattr__(self, name, value)
+
+    @classmethod
+    def allocate(cls: type[_Some], *, dtype: Any = None, **given: Any) -> _Some:
+        """Make a bundle of zeros.
+
+        Parameters
+        ----------
+        dtype : type, optional
+            Of its arrays of floats, for other numbers than these: ``object`` for symbols.
+        **given : int, array, number or Bundle
+            The extents by name, and members that are not to be zeros. Parts are allocated with the
+            same extents.
+        """
+        extents = {name: value for name, value in given.items() if name not in cls.declared}
+        members = {name: value for name, value in given.items() if name in cls.declared}
+        for name, member in cls.declared.items():
+            if name in members or member.role == "cell":
+                continue
+            if member.role == "part":
+                members[name] = member.kind.allocate(dtype=dtype, **extents)  # type: ignore[attr-defined]
+            elif member.role == "number":
+                members[name] = member.kind()
+            else:
+                size = tuple(_extent(each, extents) for each in member.shape)
+                floats = dtype if dtype is not None and member.kind is float else member.dtype
+                members[name] = np.zeros(size, dtype=floats)
+        return cls(**members)
+
+    @classmethod
+    def _cell_count(cls) -> int:
+        return sum(member.role == "cell" for member in cls.declared.values())
+
+    @classmethod
+    def compiled_type(cls) -> Any:
+        """Return its type to Numba."""
+        kind: Any = cls
+        return _bundle_type(kind)
+
+    @property
+    def _numba_type_(self) -> Any:
         """Its type to Numba, which looks for it under this name."""
-        members = ((name, _member_type(value)) for name, value in self.members().items())
-        return _bundle_type(type(self).__name__, tuple(members))
+        return self.compiled_type()
 
     @property
     def table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
-        """One word for every number and bundle, and address and shape of every array."""
+        """One word for every number, cell and bundle, and address and shape of every array."""
         # Of two threads that ask at once both get the same one, which lives as long as the bundle.
         made: np.ndarray[Any, np.dtype[np.int64]] | None = self.__dict__.get("_table")
         return self.__dict__.setdefault("_table", self._new_table()) if made is None else made
 
     def _new_table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
         words: list[int] = []
-        for value in self.members().values():
-            if isinstance(value, np.ndarray):
+        cells = int(self.__dict__["_cells"].ctypes.data)
+        for name, member in self.declared.items():
+            if member.role == "cell":
+                words.append(cells)
+                cells += _BYTES
+                continue
+            value = getattr(self, name)
+            if member.role == "array":
+                if not (value.flags.c_contiguous and value.dtype == member.dtype):
+                    raise TypeError(
+                        f"{type(self).__name__}.{name} is a C-contiguous array of "
+                        f"{member.dtype}, not of {value.dtype}"
+                    )
                 words += [value.__array_interface__["data"][0], *value.shape]
-            elif isinstance(value, Bundle):
+            elif member.role == "part":
                 words.append(value.address)
-            elif isinstance(value, float):
+            elif member.kind is float:
                 words.append(int(np.float64(value).view(np.int64)))
             else:
-                words.append(int(value))
+                words.append(value)
         return np.array(words, dtype=np.int64)
 
     @cached_property
@@ -91,59 +243,115 @@ class Bundle:
         """Where its table is."""
         return int(self.table.ctypes.data)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __reduce__(self) -> Any:
         """Members only: a copy has a table of its own."""
-        return self.members()
-
-    @cached_property
-    def arrays(self) -> tuple[np.ndarray[Any, Any], ...]:
-        """Its arrays and those of the bundles in it."""
-        found: list[np.ndarray[Any, Any]] = []
-        for value in self.members().values():
-            if isinstance(value, np.ndarray):
-                found.append(value)
-            elif isinstance(value, Bundle):
-                found += value.arrays
-        return tuple(found)
-
-    def become(self, other: Bundle) -> None:
-        """Copy what is in the arrays of a bundle of the same kind and shapes.
-
-        Read-only arrays are not the bundle's own but shared with others, and stay what they are.
-        """
-        for mine, its in zip(self.arrays, other.arrays, strict=True):
-            if mine.flags.writeable:
-                mine[...] = its
+        return _made, (type(self), self.members())
 
     def members(self) -> dict[str, Any]:
-        """Members by name, in their order."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        """Members by name, in their order; of cells what they hold."""
+        return {name: getattr(self, name) for name in self.declared}
+
+    def replaced(self: _Some, **changes: Any) -> _Some:
+        """Return a bundle with some other members, which shares the rest."""
+        return type(self)(**self.members() | changes)
+
+    def storage(self, prefix: str = "") -> Iterator[tuple[str, np.ndarray[Any, Any]]]:
+        """Yield the arrays behind it by name, ``part.array`` those of its parts.
+
+        Addresses are left out; its cells are one array.
+        """
+        if self._cell_count():
+            yield f"{prefix}cells", self.__dict__["_cells"]
+        for name, member in self.declared.items():
+            if member.role == "part":
+                yield from getattr(self, name).storage(f"{prefix}{name}.")
+            elif member.role == "array" and not member.address:
+                yield prefix + name, getattr(self, name)
+
+    def contents(self) -> dict[str, np.ndarray[Any, Any]]:
+        """Copy what is its own in its storage, by name: read-only arrays are shared with others."""
+        return {name: value.copy() for name, value in self.storage() if value.flags.writeable}
+
+    def fill(self, contents: Mapping[str, np.ndarray[Any, Any]]) -> None:
+        """Put contents of a bundle of the same kind and shapes in the place of its own.
+
+        Raises
+        ------
+        ValueError
+            If something is missing, or of another shape or kind; nothing has changed then.
+        """
+        storage = {name: mine for name, mine in self.storage() if mine.flags.writeable}
+        for name, mine in storage.items():
+            its = contents.get(name)
+            if its is None or its.shape != mine.shape or its.dtype != mine.dtype:
+                raise ValueError(f"{type(self).__name__}.{name} is missing, or of another shape")
+        for name, mine in storage.items():
+            mine[...] = contents[name]
+
+    def become(self, other: Bundle) -> None:
+        """Copy what is in a bundle of the same kind and shapes."""
+        self.fill(dict(other.storage()))
 
 
-def _member_type(value: Any) -> Any:
-    if isinstance(value, Bundle):
-        return value._numba_type_
-    if isinstance(value, np.ndarray):
-        if not (value.flags.c_contiguous and value.dtype in (np.float64, np.int64)):
-            raise TypeError(
-                f"a bundle holds C-contiguous arrays of 64-bit numbers, not {value.dtype}"
-            )
-        return _array_type(value.dtype.char, value.ndim)
-    return types.float64 if isinstance(value, float) else types.int64
+def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
+    return kind(**members)
+
+
+def _cell_property(place: int, member: Member) -> property:
+    """Read and write a cell from Python."""
+
+    def get(bundle: Bundle) -> Any:
+        return member.kind(bundle.__dict__["_cells"].view(member.dtype)[place])
+
+    def put(bundle: Bundle, value: Any) -> None:
+        bundle.__dict__["_cells"].view(member.dtype)[place] = value
+
+    return property(get, put)
+
+
+def _extent(extent: str | int, known: Mapping[str, int]) -> int:
+    """Return the size that an extent stands for."""
+    if isinstance(extent, int):
+        return extent
+    factor, name, more = _parsed(extent)
+    if name not in known:
+        raise TypeError(f"the extent {name!r} is not given")
+    return factor * known[name] + more
 
 
 @lru_cache
-def _array_type(dtype: str, ndim: int) -> Any:
-    """Type of an array; Numba takes long to make one, and simulations make many bundles."""
-    return types.Array(numba.from_dtype(np.dtype(dtype)), ndim, "C")
+def _parsed(extent: str) -> tuple[int, str, int]:
+    match = _EXTENT.fullmatch(extent)
+    if match is None or match[2] is None:
+        raise TypeError(f"an extent is a number or reads like '2 nc + 1', not {extent!r}")
+    return int(match[1] or 1), match[2], int(match[3] or 0)
+
+
+def _check_shape(
+    name: str, member: Member, shape: tuple[int, ...], extents: dict[str, int]
+) -> None:
+    """Refuse an array whose shape is not the declared one; note the extents that it tells."""
+    fits = len(shape) == len(member.shape)
+    for extent, size in zip(member.shape, shape, strict=False):
+        if isinstance(extent, int):
+            fits = fits and size == extent
+            continue
+        factor, letter, more = _parsed(extent)
+        fits = fits and size >= more and (size - more) % factor == 0
+        fits = fits and extents.setdefault(letter, (size - more) // factor) * factor + more == size
+    if not fits:
+        wanted = ", ".join(map(str, member.shape))
+        known = ", ".join(f"{letter} = {size}" for letter, size in extents.items())
+        raise TypeError(f"{name} has shape {shape} instead of ({wanted}), where {known}")
 
 
 class BundleType(types.Type):
     """Type of a bundle: its members and theirs."""
 
-    def __init__(self, name: str, members: tuple[tuple[str, Any], ...]) -> None:
-        self.members = dict(members)
-        described = ", ".join(f"{member}: {kind}" for member, kind in members)
+    def __init__(self, name: str, members: tuple[tuple[str, Any, bool], ...]) -> None:
+        self.members = {member: kind for member, kind, _ in members}
+        self.cells = {member for member, _, changes in members if changes}
+        described = ", ".join(map(str, members))
         # The name goes into every symbol of the machine code: short, but never that of another.
         super().__init__(name=f"{name}_{hashlib.sha256(described.encode()).hexdigest()[:12]}")
 
@@ -157,7 +365,22 @@ class BundleType(types.Type):
         return place
 
 
-_bundle_type = lru_cache(BundleType)
+@lru_cache
+def _bundle_type(cls: Any) -> BundleType:
+    return BundleType(
+        cls.__name__,
+        tuple(
+            (name, _member_type(member), member.role == "cell")
+            for name, member in cls.declared.items()
+        ),
+    )
+
+
+def _member_type(member: Member) -> Any:
+    if member.role == "part":
+        return _bundle_type(member.kind)
+    scalar = types.float64 if member.kind is float else types.int64
+    return types.Array(scalar, len(member.shape), "C") if member.role == "array" else scalar
 
 
 @register_model(BundleType)
@@ -170,12 +393,12 @@ class _BundleModel(models.PrimitiveModel):
 
 @unbox(BundleType)
 def _unbox_bundle(_: BundleType, value: Any, c: Any) -> NativeValue:
-    number = c.pyapi.object_getattr_string(value, "address")
-    failed = cgutils.is_null(c.builder, number)
+    found = c.pyapi.object_getattr_string(value, "address")
+    failed = cgutils.is_null(c.builder, found)
     word = cgutils.alloca_once_value(c.builder, ir.Constant(_WORD, 0))
     with c.builder.if_then(c.builder.not_(failed)):
-        c.builder.store(c.pyapi.long_as_ulonglong(number), word)
-        c.pyapi.decref(number)
+        c.builder.store(c.pyapi.long_as_ulonglong(found), word)
+        c.pyapi.decref(found)
     table = c.builder.inttoptr(c.builder.load(word), _WORD.as_pointer())
     return NativeValue(table, is_error=failed)
 
@@ -188,34 +411,52 @@ class _BundleAttribute(AttributeTemplate):
         return kind.members.get(name)
 
 
-@lower_getattr_generic(BundleType)
-def _get_member(context: Any, builder: Any, kind: BundleType, table: Any, name: str) -> Any:
-    """Read a member from the table.
+def _word(builder: Any, table: Any, place: int) -> Any:
+    """Read a word of a table.
 
     Nothing ever writes to a table, and the optimiser is told so (``invariant.load``): it reads what
-    it needs once, however many arrays are written to meanwhile. Arrays carry no reference count.
+    it needs once, however many arrays are written to meanwhile.
     """
+    value = builder.load(builder.gep(table, [ir.Constant(_WORD, place)], inbounds=True))
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value
+
+
+def _cell(context: Any, builder: Any, kind: BundleType, table: Any, name: str) -> Any:
+    """Where a cell is."""
+    pointer = context.get_value_type(kind.members[name]).as_pointer()
+    return builder.inttoptr(_word(builder, table, kind.place(name)), pointer)
+
+
+@lower_getattr_generic(BundleType)
+def _get_member(context: Any, builder: Any, kind: BundleType, table: Any, name: str) -> Any:
+    """Read a member. Arrays carry no reference count."""
+    if name in kind.cells:
+        return builder.load(_cell(context, builder, kind, table, name))
     place = kind.place(name)
     member = kind.members[name]
-
-    def word(offset: int) -> Any:
-        slot = builder.gep(table, [ir.Constant(_WORD, place + offset)], inbounds=True)
-        value = builder.load(slot)
-        value.set_metadata("invariant.load", builder.module.add_metadata([]))
-        return value
-
+    word = _word(builder, table, place)
     if isinstance(member, BundleType):
-        return builder.inttoptr(word(0), _WORD.as_pointer())
+        return builder.inttoptr(word, _WORD.as_pointer())
     if member == types.float64:
-        return builder.bitcast(word(0), ir.DoubleType())
+        return builder.bitcast(word, ir.DoubleType())
     if not isinstance(member, types.Array):
-        return word(0)
-    array = context.make_array(member)(context, builder)
-    shape = [word(1 + i) for i in range(member.ndim)]
+        return word
+    made = context.make_array(member)(context, builder)
+    shape = [_word(builder, table, place + 1 + i) for i in range(member.ndim)]
     strides = [ir.Constant(_WORD, _BYTES)]
     for extent in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], extent))
-    data = builder.inttoptr(word(0), context.get_data_type(member.dtype).as_pointer())
+    data = builder.inttoptr(word, context.get_data_type(member.dtype).as_pointer())
     itemsize = ir.Constant(_WORD, _BYTES)
-    populate_array(array, data=data, shape=shape, strides=strides, itemsize=itemsize, meminfo=None)
-    return array._getvalue()
+    populate_array(made, data=data, shape=shape, strides=strides, itemsize=itemsize, meminfo=None)
+    return made._getvalue()
+
+
+@lower_setattr_generic(BundleType)
+def _set_member(context: Any, builder: Any, signature: Any, values: Any, name: str) -> None:
+    """Write to a cell; nothing else of a bundle can be set."""
+    kind: BundleType = signature.args[0]
+    if name not in kind.cells:
+        raise NotImplementedError(f"{name} is not a cell, and stays what it is")
+    builder.store(values[1], _cell(context, builder, kind, values[0], name))

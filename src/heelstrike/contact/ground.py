@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import SimulationError
 
@@ -32,10 +32,10 @@ class GroundModel(Bundle):
         Coefficients of each segment.
     """
 
-    vertices: Floats
-    normal: Floats
-    friction: Floats
-    restitution: Floats
+    vertices: Floats = array("ns + 1", "axes")
+    normal: Floats = array("ns", "axes")
+    friction: Floats = array("ns")
+    restitution: Floats = array("ns")
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,12 @@ class Ground:
         segments = len(vertices) - 1
         friction = _coefficients("friction coefficient", self.friction, segments, np.inf)
         restitution = _coefficients("restitution", self.restitution, segments, 1.0)
-        model = GroundModel(vertices, _normals(vertices), friction, restitution)
+        model = GroundModel(
+            vertices=vertices,
+            normal=_normals(vertices),
+            friction=friction,
+            restitution=restitution,
+        )
         object.__setattr__(self, "_model", model)
 
     @classmethod

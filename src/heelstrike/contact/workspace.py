@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.contact.solvers.elimination import LARGEST, elimination_programs
 
 Floats = NDArray[np.float64]
@@ -105,14 +105,14 @@ class ContactWorkspace(Bundle):
         The matrix of a small system.
     """
 
-    counters: Integers
-    labels: Integers
-    vectors: Floats
-    squares: Floats
-    tableau: Floats
-    solvers: Integers
-    eliminations: Integers
-    lower_half: Floats
+    counters: Integers = array("counters", of=int)
+    labels: Integers = array("labels", "places", of=int)
+    vectors: Floats = array("vectors", "entries")
+    squares: Floats = array("squares", "unknowns", "width")
+    tableau: Floats = array("pairs", "pairs + 2")
+    solvers: Integers = array(1, of=int, address=True)
+    eliminations: Integers = array("sizes", of=int, address=True)
+    lower_half: Floats = array("half")
 
 
 def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:

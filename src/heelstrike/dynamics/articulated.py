@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
@@ -44,14 +44,9 @@ class ArticulatedBodies(Bundle):
         1 / D, what the joint accelerates per unit of force while its parent stays.
     """
 
-    inertia: Floats
-    momentum: Floats
-    inverse: Floats
-
-
-def articulated_bodies(nv: int) -> ArticulatedBodies:
-    """Allocate the articulated bodies of a robot of `nv` coordinates."""
-    return ArticulatedBodies(np.zeros((nv, 6)), np.zeros((nv, 3)), np.zeros(nv))
+    inertia: Floats = array("nl", 6)
+    momentum: Floats = array("nl", 3)
+    inverse: Floats = array("nl")
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array
 
 Floats = NDArray[np.float64]
 
@@ -43,39 +43,21 @@ class Workspace(Bundle):
         Zeros, never written.
     """
 
-    angle: Floats
-    cosine: Floats
-    sine: Floats
-    origin: Floats
-    pivot: Floats
-    motion: Floats
-    velocity: Floats
-    bias_acceleration: Floats
-    acceleration: Floats
-    force: Floats
-    inertia: Floats
-    composite: Floats
-    zero: Floats
+    angle: Floats = array("nl")
+    cosine: Floats = array("nl")
+    sine: Floats = array("nl")
+    origin: Floats = array("nl", "axes")
+    pivot: Floats = array("axes")
+    motion: Floats = array("nl", 3)
+    velocity: Floats = array("nl", 3)
+    bias_acceleration: Floats = array("nl", 3)
+    acceleration: Floats = array("nl", 3)
+    force: Floats = array("nl", 3)
+    inertia: Floats = array("nl", 4)
+    composite: Floats = array("nl", 4)
+    zero: Floats = array("nv")
 
 
 def workspace(nv: int, dtype: Any = np.float64) -> Workspace:
     """Make the scratch arrays for a robot of `nv` coordinates (dtype ``object`` for symbols)."""
-
-    def zeros(*shape: int) -> Floats:
-        return np.zeros(shape, dtype=dtype)
-
-    return Workspace(
-        angle=zeros(nv),
-        cosine=zeros(nv),
-        sine=zeros(nv),
-        origin=zeros(nv, 2),
-        pivot=zeros(2),
-        motion=zeros(nv, 3),
-        velocity=zeros(nv, 3),
-        bias_acceleration=zeros(nv, 3),
-        acceleration=zeros(nv, 3),
-        force=zeros(nv, 3),
-        inertia=zeros(nv, 4),
-        composite=zeros(nv, 4),
-        zero=zeros(nv),
-    )
+    return Workspace.allocate(nl=nv, nv=nv, axes=2, dtype=dtype)

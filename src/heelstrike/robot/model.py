@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array, number
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -61,26 +61,26 @@ class Model(Bundle):
         from the world origin loses no digits.
     """
 
-    parent: Integers
-    axis: Floats
-    offset: Floats
-    reference: Floats
-    mass: Floats
-    center_of_mass: Floats
-    inertia: Floats
-    armature: Floats
-    damping: Floats
-    stiffness: Floats
-    rest: Floats
-    dry_friction: Floats
-    lower: Floats
-    upper: Floats
-    speed_limit: Floats
-    gravity: Floats
-    contact_link: Integers
-    contact_position: Floats
-    contact_radius: Floats
-    actuator_joint: Integers
-    torque_lower: Floats
-    torque_upper: Floats
-    pivot: int
+    parent: Integers = array("nl", of=int)
+    axis: Floats = array("nl", 3)
+    offset: Floats = array("nl", "axes")
+    reference: Floats = array("nq")
+    mass: Floats = array("nl")
+    center_of_mass: Floats = array("nl", "axes")
+    inertia: Floats = array("nl")
+    armature: Floats = array("nv")
+    damping: Floats = array("nv")
+    stiffness: Floats = array("nv")
+    rest: Floats = array("nq")
+    dry_friction: Floats = array("nv")
+    lower: Floats = array("nq")
+    upper: Floats = array("nq")
+    speed_limit: Floats = array("nv")
+    gravity: Floats = array("axes")
+    contact_link: Integers = array("nc", of=int)
+    contact_position: Floats = array("nc", "axes")
+    contact_radius: Floats = array("nc")
+    actuator_joint: Integers = array("nu", of=int)
+    torque_lower: Floats = array("nu")
+    torque_upper: Floats = array("nu")
+    pivot: int = number(int)

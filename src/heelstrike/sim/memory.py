@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array, part
 from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import ContactWorkspace
-from heelstrike.dynamics.articulated import ArticulatedBodies, articulated_bodies
+from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.guard import guarded, guarded_bundle
@@ -130,58 +129,58 @@ class Memory(Bundle):
         Counts and worst values of the run; their places are module constants.
     """
 
-    q: Floats
-    v: Floats
-    next_v: Floats
-    torque: Floats
-    force: Floats
-    rate: Floats
-    bias: Floats
-    stiffness: Floats
-    damping: Floats
-    mass_matrix: Floats
-    factor: Floats
-    added: Floats
-    bodies: ArticulatedBodies
-    tree: Workspace
-    scratch: Workspace
-    contacts: Contacts
-    friction: Floats
-    restitution: Floats
-    slip: Floats
-    mode: Integers
-    closed: Integers
-    slipping: Integers
-    stop_torque: Floats
-    stopped: Integers
-    dry_joint: Integers
-    friction_torque: Floats
-    dry_mode: Integers
-    resting: Integers
-    candidate: Integers
-    jacobian: Floats
-    leaf: Integers
-    root: Floats
-    half: Floats
-    delassus: Floats
-    free: Floats
-    impulse: Floats
-    velocity: Floats
-    problem_friction: Floats
-    problem_mode: Integers
-    residual: Floats
-    programs: Integers
-    every_point: Integers
-    usual_points: Integers
-    usual_place: Integers
-    point_rows: Floats
-    point_delassus: Floats
-    point_velocity: Floats
-    point_impulse: Floats
-    solver: ContactWorkspace
-    pushes: Pushes
-    tally: Integers
-    extreme: Floats
+    q: Floats = array("nq")
+    v: Floats = array("nv")
+    next_v: Floats = array("nv")
+    torque: Floats = array("nu")
+    force: Floats = array("nv")
+    rate: Floats = array("nv")
+    bias: Floats = array("nv")
+    stiffness: Floats = array("nv")
+    damping: Floats = array("nv")
+    mass_matrix: Floats = array("nv", "nv")
+    factor: Floats = array("nv", "nv")
+    added: Floats = array("nv")
+    bodies: ArticulatedBodies = part(ArticulatedBodies)
+    tree: Workspace = part(Workspace)
+    scratch: Workspace = part(Workspace)
+    contacts: Contacts = part(Contacts)
+    friction: Floats = array("capacity")
+    restitution: Floats = array("capacity")
+    slip: Floats = array("nc")
+    mode: Integers = array("capacity", of=int)
+    closed: Integers = array("capacity", of=int)
+    slipping: Integers = array("capacity", of=int)
+    stop_torque: Floats = array("nv")
+    stopped: Integers = array("nv", of=int)
+    dry_joint: Integers = array("nd", of=int)
+    friction_torque: Floats = array("nv")
+    dry_mode: Integers = array("nd", of=int)
+    resting: Integers = array("nd", of=int)
+    candidate: Integers = array("capacity", of=int)
+    jacobian: Floats = array("2 capacity", "nv")
+    leaf: Integers = array("capacity", of=int)
+    root: Floats = array("nv")
+    half: Floats = array("nv", "2 capacity")
+    delassus: Floats = array("2 capacity", "2 capacity")
+    free: Floats = array("2 capacity")
+    impulse: Floats = array("2 capacity")
+    velocity: Floats = array("2 capacity")
+    problem_friction: Floats = array("capacity")
+    problem_mode: Integers = array("capacity", of=int)
+    residual: Floats = array(3)
+    programs: Integers = array("programs", of=int, address=True)
+    every_point: Integers = array("nc", of=int)
+    usual_points: Integers = array("usual", of=int)
+    usual_place: Integers = array("nc", of=int)
+    point_rows: Floats = array("2 usual", "nv")
+    point_delassus: Floats = array("2 usual", "2 usual")
+    point_velocity: Floats = array("nc", "rows")
+    point_impulse: Floats = array("nc", "rows")
+    solver: ContactWorkspace = part(ContactWorkspace)
+    pushes: Pushes = part(Pushes)
+    tally: Integers = array("tallies", of=int)
+    extreme: Floats = array("extremes")
 
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
@@ -193,62 +192,25 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     usual = usual_points(robot)
     place = np.full(nc, -1)
     place[usual] = np.arange(len(usual))
-    return Memory(
+    return Memory.allocate(
+        nl=nv, nq=robot.nq, nv=nv, nu=nu, nc=nc, nd=len(dry), capacity=capacity, usual=len(usual),
+        axes=2, rows=2, tallies=TALLIES, extremes=EXTREMES,
         q=guarded(np.zeros(nv)),
         v=guarded(np.zeros(nv)),
-        next_v=np.zeros(nv),
         torque=guarded(np.zeros(nu)),
-        force=np.zeros(nv),
-        rate=np.zeros(nv),
-        bias=np.zeros(nv),
-        stiffness=np.zeros(nv),
-        damping=np.zeros(nv),
-        mass_matrix=np.zeros((nv, nv)),
-        factor=np.zeros((nv, nv)),
-        added=np.zeros(nv),
-        bodies=articulated_bodies(nv),
         tree=guarded_bundle(workspace(nv)),
         scratch=guarded_bundle(workspace(nv)),
-        contacts=guarded_bundle(
-            Contacts(np.zeros((nc, 2)), np.zeros((nc, 2)), np.zeros(nc), np.zeros((nc, 2)))
-        ),
+        contacts=guarded_bundle(Contacts.allocate(nc=nc, axes=2, rows=2)),
         friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
-        restitution=np.zeros(capacity),
-        slip=np.zeros(nc),
-        mode=np.zeros(capacity, dtype=np.int64),
-        closed=np.zeros(capacity, dtype=np.int64),
-        slipping=np.zeros(capacity, dtype=np.int64),
-        stop_torque=np.zeros(nv),
-        stopped=np.zeros(nv, dtype=np.int64),
         dry_joint=dry.astype(np.int64),
-        friction_torque=np.zeros(nv),
-        dry_mode=np.zeros(len(dry), dtype=np.int64),
         resting=np.full(len(dry), -1, dtype=np.int64),
-        candidate=np.zeros(capacity, dtype=np.int64),
-        jacobian=np.zeros((2 * capacity, nv)),
-        leaf=np.zeros(capacity, dtype=np.int64),
-        root=np.zeros(nv),
-        half=np.zeros((nv, 2 * capacity)),
-        delassus=np.zeros((2 * capacity, 2 * capacity)),
-        free=np.zeros(2 * capacity),
-        impulse=np.zeros(2 * capacity),
-        velocity=np.zeros(2 * capacity),
-        problem_friction=np.zeros(capacity),
-        problem_mode=np.zeros(capacity, dtype=np.int64),
-        residual=np.zeros(3),
         programs=straight_line_programs(robot.model, usual),
         every_point=np.arange(nc),
         usual_points=usual,
         usual_place=place,
-        point_rows=np.zeros((2 * len(usual), nv)),
-        point_delassus=np.zeros((2 * len(usual), 2 * len(usual))),
-        point_velocity=np.zeros((nc, 2)),
-        point_impulse=np.zeros((nc, 2)),
         solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
         pushes=pushes_on(robot, pushes),
-        tally=np.zeros(TALLIES, dtype=np.int64),
-        extreme=np.zeros(EXTREMES),
-    )
+    )  # fmt: skip
 
 
 class Record(Bundle):
@@ -258,48 +220,30 @@ class Record(Bundle):
     follows. `row_count` and `event_count` are the numbers of rows used.
     """
 
-    row_count: Integers
-    time: Floats
-    q: Floats
-    v: Floats
-    torque: Floats
-    stop_torque: Floats
-    friction_torque: Floats
-    point: Floats
-    normal: Floats
-    gap: Floats
-    force: Floats
-    slip: Floats
-    residual: Floats
-    event_count: Integers
-    event_time: Floats
-    event_kind: Integers
-    event_contact: Integers
-    event_impulse: Floats
+    row_count: Integers = array(1, of=int)
+    time: Floats = array("nt")
+    q: Floats = array("nt", "nq")
+    v: Floats = array("nt", "nv")
+    torque: Floats = array("nt", "nu")
+    stop_torque: Floats = array("nt", "nv")
+    friction_torque: Floats = array("nt", "nv")
+    point: Floats = array("nt", "nc", "axes")
+    normal: Floats = array("nt", "nc", "axes")
+    gap: Floats = array("nt", "nc")
+    force: Floats = array("nt", "nc", "rows")
+    slip: Floats = array("nt", "nc")
+    residual: Floats = array("nt", 3)
+    event_count: Integers = array(1, of=int)
+    event_time: Floats = array("ne")
+    event_kind: Integers = array("ne", of=int)
+    event_contact: Integers = array("ne", of=int)
+    event_impulse: Floats = array("ne", "rows")
 
 
 def allocate_record(robot: Robot, rows: int, events: int) -> Record:
     """Allocate a record of `rows` instants and `events` events."""
-    nv, nu, nc = robot.nv, robot.nu, robot.nc
-    return Record(
-        row_count=np.zeros(1, dtype=np.int64),
-        time=np.zeros(rows),
-        q=np.zeros((rows, nv)),
-        v=np.zeros((rows, nv)),
-        torque=np.zeros((rows, nu)),
-        stop_torque=np.zeros((rows, nv)),
-        friction_torque=np.zeros((rows, nv)),
-        point=np.zeros((rows, nc, 2)),
-        normal=np.zeros((rows, nc, 2)),
-        gap=np.zeros((rows, nc)),
-        force=np.zeros((rows, nc, 2)),
-        slip=np.zeros((rows, nc)),
-        residual=np.zeros((rows, 3)),
-        event_count=np.zeros(1, dtype=np.int64),
-        event_time=np.zeros(events),
-        event_kind=np.zeros(events, dtype=np.int64),
-        event_contact=np.zeros(events, dtype=np.int64),
-        event_impulse=np.zeros((events, 2)),
+    return Record.allocate(
+        nt=rows, ne=events, nq=robot.nq, nv=robot.nv, nu=robot.nu, nc=robot.nc, axes=2, rows=2
     )
 
 
@@ -318,5 +262,6 @@ def joined(records: list[Record]) -> Record:
         "row_count": np.array([sum(rows)]),
         "event_count": np.array([sum(events)]),
     }
-    names = [field.name for field in dataclasses.fields(Record)]
-    return Record(**{name: counts[name] if name in counts else join(name) for name in names})
+    return Record(
+        **{name: counts[name] if name in counts else join(name) for name in Record.declared}
+    )

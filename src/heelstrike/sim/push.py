@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
@@ -132,13 +132,13 @@ class Pushes(Bundle):
         How much of each push acts in the step being computed, 0 to 1.
     """
 
-    link: Integers
-    point: Floats
-    position: Floats
-    force: Floats
-    start: Floats
-    end: Floats
-    share: Floats
+    link: Integers = array("np", of=int)
+    point: Floats = array("np", "axes")
+    position: Floats = array("np", "axes")
+    force: Floats = array("np", "axes")
+    start: Floats = array("np")
+    end: Floats = array("np")
+    share: Floats = array("np")
 
 
 def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:

@@ -318,8 +318,8 @@ def test_a_robot_sunk_in_the_ground_is_refused_whatever_swing_feet_may_do() -> N
 def test_the_events_of_an_instant_have_room() -> None:
     """Compiled code checks once an instant, not at every event."""
     robot = walking.bravo7()
-    model: Model = dataclasses.replace(  # type: ignore[type-var]
-        robot.model, lower=np.full(9, -9.0), upper=np.full(9, 9.0), dry_friction=np.ones(9)
+    model = robot.model.replaced(
+        lower=np.full(9, -9.0), upper=np.full(9, 9.0), dry_friction=np.ones(9)
     )
     robot = dataclasses.replace(robot, model=model)
     loop = prepared(

@@ -17,6 +17,7 @@ from robot_cases import walker2d_xml
 from synthetic_runs import box, make_run, pendulum
 
 import heelstrike as hs
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.robot import Robot, read_mjcf
 from heelstrike.sim import Event, EventKind, RunStatus, Scheme
 from heelstrike.sim.files.dataset import to_dataset
@@ -29,6 +30,9 @@ def same(a: Any, b: Any) -> bool:
         return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=True)
     if isinstance(a, hs.Ground):
         return same(a.model(), b.model())
+    if isinstance(a, Bundle):
+        mine, its = a.members(), b.members()
+        return mine.keys() == its.keys() and all(same(mine[name], its[name]) for name in mine)
     if dataclasses.is_dataclass(a):
         return type(a) is type(b) and all(
             same(getattr(a, field.name), getattr(b, field.name)) for field in dataclasses.fields(a)

@@ -188,7 +188,7 @@ def check_flight(engine: Engine, robot: Robot) -> float:
     peer = engine.peer(scenario, FLIGHT_STEP)
     if peer.lacks:
         none: Any = {name: np.zeros(robot.nv) for name in peer.lacks}
-        robot = replace(robot, model=replace(robot.model, **none))
+        robot = replace(robot, model=robot.model.replaced(**none))
         scenario = replace(scenario, robot=robot)
         peer = engine.peer(scenario, FLIGHT_STEP)
     peer.run()

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
@@ -35,6 +35,7 @@ from heelstrike.dynamics.kernels import (
     solve_factorized,
 )
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.contact_law import (
     BRISTLE_BY_BRISTLE,
     BRISTLE_BY_NORMAL,
@@ -87,11 +88,11 @@ class Laws(Bundle):
         The law of the joint stops.
     """
 
-    normal: int
-    friction: int
-    numbers: Floats
-    stop: int
-    stop_numbers: Floats
+    normal: int = number(int)
+    friction: int = number(int)
+    numbers: Floats = array("numbers")
+    stop: int = number(int)
+    stop_numbers: Floats = array("numbers")
 
 
 class Control(NamedTuple):
@@ -136,7 +137,7 @@ class CompliantWorkspace(Bundle):
         Derivatives of both by q and v of the joint.
     torque_by_q, torque_by_v : (nu, nv) float
         Derivatives of the controller's torques.
-    age : (1,) int
+    age : int
         Steps since these were found.
     trial_torque : (nu,) float
         Torques of a perturbed state.
@@ -169,90 +170,53 @@ class CompliantWorkspace(Bundle):
         if it did not.
     """
 
-    bristle: Floats
-    acceleration: Floats
-    bristle_rate: Floats
-    force: Floats
-    partial: Floats
-    stop_force: Floats
-    dry_force: Floats
-    stop_partial: Floats
-    torque_by_q: Floats
-    torque_by_v: Floats
-    trial_torque: Floats
-    age: Integers
-    base_q: Floats
-    base_v: Floats
-    base_acceleration: Floats
-    base_bristle: Floats
-    base_rate: Floats
-    base_gap: Floats
-    base_force: Floats
-    base_stop_force: Floats
-    base_dry_force: Floats
-    base_stop_partial: Floats
-    base_partial: Floats
-    base_rows: Floats
-    base_matrix: Floats
-    force_by_q: Floats
-    system: Floats
-    order: Integers
-    stage_q: Floats
-    stage_v: Floats
-    stage_bristle: Floats
-    right_q: Floats
-    right_v: Floats
-    right_bristle: Floats
-    impulse: Floats
-    stop_impulse: Floats
-    dry_impulse: Floats
-    touched: Floats
-    left: Floats
+    bristle: Floats = array("nc")
+    acceleration: Floats = array("nv")
+    bristle_rate: Floats = array("nc")
+    force: Floats = array("nc", "rows")
+    partial: Floats = array("nc", "partials")
+    stop_force: Floats = array("nv")
+    dry_force: Floats = array("nv")
+    stop_partial: Floats = array("nv", 2)
+    torque_by_q: Floats = array("nu", "nv")
+    torque_by_v: Floats = array("nu", "nv")
+    trial_torque: Floats = array("nu")
+    age: int = cell(int)
+    base_q: Floats = array("nv")
+    base_v: Floats = array("nv")
+    base_acceleration: Floats = array("nv")
+    base_bristle: Floats = array("nc")
+    base_rate: Floats = array("nc")
+    base_gap: Floats = array("nc")
+    base_force: Floats = array("nc", "rows")
+    base_stop_force: Floats = array("nv")
+    base_dry_force: Floats = array("nv")
+    base_stop_partial: Floats = array("nv", 2)
+    base_partial: Floats = array("nc", "partials")
+    base_rows: Floats = array("2 nc", "nv")
+    base_matrix: Floats = array("nv", "nv")
+    force_by_q: Floats = array("nv", "nv")
+    system: Floats = array("nv", "nv")
+    order: Integers = array("nv", of=int)
+    stage_q: Floats = array("stages", "nv")
+    stage_v: Floats = array("stages", "nv")
+    stage_bristle: Floats = array("stages", "nc")
+    right_q: Floats = array("nv")
+    right_v: Floats = array("nv")
+    right_bristle: Floats = array("nc")
+    impulse: Floats = array("nc", "rows")
+    stop_impulse: Floats = array("nv")
+    dry_impulse: Floats = array("nv")
+    touched: Floats = array("nc")
+    left: Floats = array("nc")
 
 
-def compliant_workspace(nv: int, nu: int, nc: int) -> CompliantWorkspace:
-    """Allocate the scratch for a robot of the given numbers of coordinates, motors, contacts."""
-    return CompliantWorkspace(
-        bristle=np.zeros(nc),
-        acceleration=np.zeros(nv),
-        bristle_rate=np.zeros(nc),
-        force=np.zeros((nc, 2)),
-        partial=np.zeros((nc, PARTIALS)),
-        stop_force=np.zeros(nv),
-        dry_force=np.zeros(nv),
-        stop_partial=np.zeros((nv, 2)),
-        torque_by_q=np.zeros((nu, nv)),
-        torque_by_v=np.zeros((nu, nv)),
-        trial_torque=guarded(np.zeros(nu)),
-        age=np.full(1, GAINS_LAST, dtype=np.int64),
-        base_q=np.zeros(nv),
-        base_v=np.zeros(nv),
-        base_acceleration=np.zeros(nv),
-        base_bristle=np.zeros(nc),
-        base_rate=np.zeros(nc),
-        base_gap=np.zeros(nc),
-        base_force=np.zeros((nc, 2)),
-        base_stop_force=np.zeros(nv),
-        base_dry_force=np.zeros(nv),
-        base_stop_partial=np.zeros((nv, 2)),
-        base_partial=np.zeros((nc, PARTIALS)),
-        base_rows=np.zeros((2 * nc, nv)),
-        base_matrix=np.zeros((nv, nv)),
-        force_by_q=np.zeros((nv, nv)),
-        system=np.zeros((nv, nv)),
-        order=np.zeros(nv, dtype=np.int64),
-        stage_q=np.zeros((STAGES, nv)),
-        stage_v=np.zeros((STAGES, nv)),
-        stage_bristle=np.zeros((STAGES, nc)),
-        right_q=np.zeros(nv),
-        right_v=np.zeros(nv),
-        right_bristle=np.zeros(nc),
-        impulse=np.zeros((nc, 2)),
-        stop_impulse=np.zeros(nv),
-        dry_impulse=np.zeros(nv),
-        touched=np.zeros(nc),
-        left=np.zeros(nc),
-    )
+def compliant_workspace(robot: Robot) -> CompliantWorkspace:
+    """Allocate the scratch for a robot."""
+    return CompliantWorkspace.allocate(
+        nv=robot.nv, nu=robot.nu, nc=robot.nc, rows=2, partials=PARTIALS, stages=STAGES,
+        trial_torque=guarded(np.zeros(robot.nu)), age=GAINS_LAST,
+    )  # fmt: skip
 
 
 @kernel
@@ -298,7 +262,7 @@ def find_gains(
     for j in range(model.parent.shape[0]):
         difference(control, time, model, memory, memory.q, j, work.trial_torque, work.torque_by_q)
         difference(control, time, model, memory, memory.v, j, work.trial_torque, work.torque_by_v)
-    work.age[0] = 0
+    work.age = 0
 
 
 @kernel

@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compiler.compilation import kernel, loop_for, type_of
-from heelstrike.contact.ground import Ground, GroundModel
+from heelstrike.compiler.compilation import kernel, loop_for
+from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.contact_law import (
     NUMBERS,
     BristleFriction,
@@ -50,7 +49,6 @@ from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import (
     CONTROLLER_TYPE,
     MODEL_TYPE,
-    example_model,
     hold_torque,
 )
 from heelstrike.sim.engine import (
@@ -70,8 +68,6 @@ from heelstrike.sim.memory import (
     STEPS,
     Memory,
     Record,
-    allocate_memory,
-    allocate_record,
 )
 from heelstrike.sim.push import share_over_step
 from heelstrike.sim.record_size import check_room, check_steps
@@ -277,7 +273,7 @@ def sample(
     elapsed = 0.0
     h = clock[PROPOSED]
     begin_step(model, memory, work)
-    if control.continuous and work.age[0] >= GAINS_LAST:
+    if control.continuous and work.age >= GAINS_LAST:
         find_gains(control, start, model, memory, work)
     rejected = False
     while elapsed < span:
@@ -299,7 +295,7 @@ def sample(
         shortest = taken <= SHORTEST
         finite = error < np.inf
         if not (error <= 1.0 or (shortest and finite)):
-            if control.continuous and (work.age[0] > 0 or shortest):
+            if control.continuous and (work.age > 0 or shortest):
                 find_gains(control, start + elapsed, model, memory, work)
             if shortest:
                 for i in range(model.parent.shape[0]):
@@ -324,7 +320,7 @@ def sample(
         account(model, start + elapsed, taken, memory, work)
         memory.residual[1] = max(memory.residual[1], cone_residual(model, memory, work))
         memory.tally[STEPS] += 1
-        work.age[0] += 1
+        work.age += 1
         begin_step(model, memory, work)
         elapsed = span if final else elapsed + taken
         factor = GROW
@@ -511,19 +507,18 @@ def _advance(
 def compiled_advance() -> tuple[Any, float]:
     """Compile the loop or load it from the cache; return it with the seconds that took."""
     begin = perf_counter()
-    robot = Robot("", example_model(), (), (), (), (), (), None, False)
     vector = types.float64[::1]
     signature = types.int64(
         CONTROLLER_TYPE,
         MODEL_TYPE,
-        type_of(Ground().model()),
-        type_of(Laws(0, 0, np.zeros(NUMBERS), 0, np.zeros(NUMBERS))),
+        GroundModel.compiled_type(),
+        Laws.compiled_type(),
         vector,
         vector,
         vector,
-        type_of(allocate_memory(robot)),
-        type_of(compliant_workspace(1, 1, 1)),
-        type_of(allocate_record(robot, 1, 1)),
+        Memory.compiled_type(),
+        CompliantWorkspace.compiled_type(),
+        Record.compiled_type(),
         vector,
         types.int64[::1],
     )
@@ -545,14 +540,18 @@ class _CompliantEngine:
         self._advance, self.compile_s = compiled_advance()
         self._setting = setting
         self.spare = guarded(())
-        self._work = compliant_workspace(setting.robot.nv, setting.robot.nu, setting.robot.nc)
+        self._work = compliant_workspace(setting.robot)
         numbers = np.zeros(NUMBERS)
         method.law.write(numbers)
         method.friction.write(numbers)
         stop_numbers = np.zeros(NUMBERS)
         method.stop.write(stop_numbers)
         self._laws = Laws(
-            method.law.kind, method.friction.kind, numbers, method.stop.kind, stop_numbers
+            normal=method.law.kind,
+            friction=method.friction.kind,
+            numbers=numbers,
+            stop=method.stop.kind,
+            stop_numbers=stop_numbers,
         )
         self.solver = f"{type(method.law).__name__}, {type(method.friction).__name__}"
         self._control_every = 1

@@ -12,9 +12,9 @@ from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
-from heelstrike.compiler.compilation import compiled_for, type_of
-from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.compilation import compiled_for
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.state import State
@@ -35,10 +35,10 @@ class Contacts(Bundle):
         Force on the robot, (normal, tangent), of the step before, in newtons.
     """
 
-    position: Floats
-    normal: Floats
-    gap: Floats
-    force: Floats
+    position: Floats = array("nc", "axes")
+    normal: Floats = array("nc", "axes")
+    gap: Floats = array("nc")
+    force: Floats = array("nc", "rows")
 
 
 @runtime_checkable
@@ -75,41 +75,9 @@ class CompiledController:
     damping: NDArray[np.float64] | None = None
 
 
-def example_model() -> Model:
-    """Return a model of no links: what the compiler needs to know about all models."""
-    floats = np.zeros(0)
-    pairs = np.zeros((0, 2))
-    integers = np.zeros(0, dtype=np.int64)
-    return Model(
-        parent=integers,
-        axis=np.zeros((0, 3)),
-        offset=pairs,
-        reference=floats,
-        mass=floats,
-        center_of_mass=pairs,
-        inertia=floats,
-        armature=floats,
-        damping=floats,
-        stiffness=floats,
-        rest=floats,
-        dry_friction=floats,
-        lower=floats,
-        upper=floats,
-        speed_limit=floats,
-        gravity=floats,
-        contact_link=integers,
-        contact_position=pairs,
-        contact_radius=floats,
-        actuator_joint=integers,
-        torque_lower=floats,
-        torque_upper=floats,
-        pivot=0,
-    )
-
-
-MODEL_TYPE = type_of(example_model())
-WORKSPACE_TYPE = type_of(workspace(1))
-CONTACTS_TYPE = type_of(Contacts(np.zeros((1, 2)), np.zeros((1, 2)), np.zeros(1), np.zeros((1, 2))))
+MODEL_TYPE = Model.compiled_type()
+WORKSPACE_TYPE = Workspace.compiled_type()
+CONTACTS_TYPE = Contacts.compiled_type()
 _VECTOR = types.float64[::1]
 
 CONTROLLER_SIGNATURE = types.void(
@@ -160,9 +128,9 @@ def is_stock(controller: CompiledController) -> bool:
 
 def read_only(contacts: Contacts) -> Contacts:
     """Return the same contacts, to be looked at only."""
-    shown = {name: array.view() for name, array in contacts.members().items()}
-    for array in shown.values():
-        array.flags.writeable = False
+    shown = {name: values.view() for name, values in contacts.members().items()}
+    for values in shown.values():
+        values.flags.writeable = False
     return Contacts(**shown)
 
 

@@ -17,18 +17,17 @@ from typing import Any, ClassVar
 import numpy as np
 from numba import types
 
-from heelstrike.compiler.compilation import kernel, loop_for, type_of
-from heelstrike.contact.ground import Ground, GroundModel
+from heelstrike.compiler.compilation import kernel, loop_for
+from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.solvers.search import try_solvers
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.guard import guarded
-from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE, Contacts, example_model
+from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE, Contacts
 from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
@@ -94,8 +93,6 @@ from heelstrike.sim.memory import (
     STEPS,
     Memory,
     Record,
-    allocate_memory,
-    allocate_record,
 )
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record_size import check_room, check_steps
@@ -760,18 +757,17 @@ def _advance(
 def compiled_advance() -> tuple[Any, float]:
     """Compile the loop or load it from the cache; return it with the seconds that took."""
     begin = perf_counter()
-    robot = Robot("", example_model(), (), (), (), (), (), None, False)
     vector = types.float64[::1]
     signature = types.int64(
         CONTROLLER_TYPE,
         MODEL_TYPE,
-        type_of(Ground().model()),
+        GroundModel.compiled_type(),
         vector,
         vector,
         vector,
-        type_of(allocate_memory(robot)),
-        type_of(allocate_record(robot, 1, 1)),
-        type_of(allocate_phase(robot)),
+        Memory.compiled_type(),
+        Record.compiled_type(),
+        Phase.compiled_type(),
         types.int64[::1],
     )
     try_solvers.begin()

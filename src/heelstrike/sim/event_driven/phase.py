@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 
@@ -118,49 +118,49 @@ class Phase(Bundle):
         Their places are module constants.
     """
 
-    stop_joint: Integers
-    stop_side: Floats
-    stop_limit: Floats
-    dry_joint: Integers
-    order: Integers
-    closed: Integers
-    slide: Integers
-    group: Integers
-    carrier: Integers
-    holder: Integers
-    stuck: Integers
-    anchor: Floats
-    hit: Integers
-    plastic: Integers
-    passing: Integers
-    force: Floats
-    end_force: Floats
-    impulse: Floats
-    last_impact: Floats
-    accumulation: Floats
-    row: Integers
-    lean: Floats
-    system: Floats
-    unknown: Floats
-    column: Integers
-    value: Floats
-    rate: Floats
-    end_value: Floats
-    end_rate: Floats
-    before: Floats
-    before_rate: Floats
-    sample: Floats
-    sample_rate: Floats
-    fired: Integers
-    scratch: Floats
-    begin: Floats
-    end: Floats
-    trial: Floats
-    slopes: Floats
-    dense: Floats
-    torque: Floats
-    clock: Floats
-    count: Integers
+    stop_joint: Integers = array("ns", of=int)
+    stop_side: Floats = array("ns")
+    stop_limit: Floats = array("ns")
+    dry_joint: Integers = array("nd", of=int)
+    order: Integers = array(3, of=int)
+    closed: Integers = array("contacts", of=int)
+    slide: Integers = array("contacts", of=int)
+    group: Integers = array("contacts", of=int)
+    carrier: Integers = array("contacts", of=int)
+    holder: Integers = array("contacts", of=int)
+    stuck: Integers = array("contacts", of=int)
+    anchor: Floats = array("contacts")
+    hit: Integers = array("contacts", of=int)
+    plastic: Integers = array("contacts", of=int)
+    passing: Integers = array("contacts", of=int)
+    force: Floats = array("contacts", "rows")
+    end_force: Floats = array("contacts", "rows")
+    impulse: Floats = array("contacts", "rows")
+    last_impact: Floats = array("contacts")
+    accumulation: Floats = array("contacts")
+    row: Integers = array("2 contacts", of=int)
+    lean: Floats = array("2 contacts")
+    system: Floats = array("2 contacts", "2 contacts + 1")
+    unknown: Floats = array("2 contacts")
+    column: Integers = array("2 contacts", of=int)
+    value: Floats = array("2 contacts")
+    rate: Floats = array("2 contacts")
+    end_value: Floats = array("2 contacts")
+    end_rate: Floats = array("2 contacts")
+    before: Floats = array("2 contacts")
+    before_rate: Floats = array("2 contacts")
+    sample: Floats = array("2 contacts")
+    sample_rate: Floats = array("2 contacts")
+    fired: Integers = array("2 contacts", of=int)
+    scratch: Floats = array("axes", 3)
+    begin: Floats = array("2 nv")
+    end: Floats = array("2 nv")
+    trial: Floats = array("2 nv")
+    slopes: Floats = array("stages", "2 nv")
+    dense: Floats = array("dense_rows", "2 nv")
+    torque: Floats = array("nu")
+    clock: Floats = array("clocks")
+    count: Integers = array("counts", of=int)
 
 
 def allocate_phase(robot: Robot) -> Phase:
@@ -170,53 +170,15 @@ def allocate_phase(robot: Robot) -> Phase:
     upper = np.flatnonzero(np.isfinite(model.upper))
     dry = np.flatnonzero(model.dry_friction > 0.0)
     nc = robot.nc + len(lower) + len(upper) + len(dry)
-    size = robot.nq + nv
-
-    def integers(count: int) -> Integers:
-        return np.zeros(count, dtype=np.int64)
-
-    return Phase(
+    return Phase.allocate(
+        nv=nv, nu=nu, ns=len(lower) + len(upper), nd=len(dry), contacts=nc, axes=2, rows=2,
+        stages=SLOPES, dense_rows=DENSE_ROWS, clocks=CLOCKS, counts=COUNTS,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
-        order=integers(3),
         closed=(np.arange(nc) >= nc - len(dry)).astype(np.int64),
-        slide=integers(nc),
-        group=integers(nc),
-        carrier=integers(nc),
-        holder=integers(nc),
-        stuck=integers(nc),
-        anchor=np.zeros(nc),
-        hit=integers(nc),
-        plastic=integers(nc),
-        passing=integers(nc),
-        force=np.zeros((nc, 2)),
-        end_force=np.zeros((nc, 2)),
-        impulse=np.zeros((nc, 2)),
         last_impact=np.full(nc, -np.inf),
         accumulation=np.full(nc, np.inf),
-        row=integers(2 * nc),
-        lean=np.zeros(2 * nc),
-        system=np.zeros((2 * nc, 2 * nc + 1)),
-        unknown=np.zeros(2 * nc),
-        column=integers(2 * nc),
         value=np.ones(2 * nc),
-        rate=np.zeros(2 * nc),
-        end_value=np.zeros(2 * nc),
-        end_rate=np.zeros(2 * nc),
-        before=np.zeros(2 * nc),
-        before_rate=np.zeros(2 * nc),
-        sample=np.zeros(2 * nc),
-        sample_rate=np.zeros(2 * nc),
-        fired=integers(2 * nc),
-        scratch=np.zeros((2, 3)),
-        begin=np.zeros(size),
-        end=np.zeros(size),
-        trial=np.zeros(size),
-        slopes=np.zeros((SLOPES, size)),
-        dense=np.zeros((DENSE_ROWS, size)),
-        torque=np.zeros(nu),
-        clock=np.zeros(CLOCKS),
-        count=integers(COUNTS),
-    )
+    )  # fmt: skip

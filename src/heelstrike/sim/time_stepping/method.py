@@ -24,9 +24,9 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from heelstrike.compiler.compilation import dissolved_kernel, kernel, loop_for, type_of
+from heelstrike.compiler.compilation import dissolved_kernel, kernel, loop_for
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.ground import Ground, GroundModel
+from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
@@ -34,7 +34,6 @@ from heelstrike.contact.solvers.search import try_solvers
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.robot.robot import Robot
 from heelstrike.sim.contact_geometry import (
     add_impulse,
     assemble_delassus,
@@ -48,7 +47,7 @@ from heelstrike.sim.contact_geometry import (
 )
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.guard import guarded
-from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE, example_model
+from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE
 from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
 from heelstrike.sim.engine import (
     BAD_CONTROLLER,
@@ -63,7 +62,7 @@ from heelstrike.sim.engine import (
     solver_order,
     whole_steps,
 )
-from heelstrike.sim.memory import STEPS, Memory, Record, allocate_memory, allocate_record
+from heelstrike.sim.memory import STEPS, Memory, Record
 from heelstrike.sim.point_contacts import point_velocities
 from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
@@ -521,17 +520,16 @@ def _advance(
 def compiled_advance() -> tuple[Any, float]:
     """Compile the loop or load it from the cache; return it with the seconds that took."""
     begin = perf_counter()
-    robot = Robot("", example_model(), (), (), (), (), (), None, False)
     vector = types.float64[::1]
     integers = types.int64[::1]
     signature = types.int64(
         CONTROLLER_TYPE,
         MODEL_TYPE,
-        type_of(Ground().model()),
+        GroundModel.compiled_type(),
         vector,
         vector,
-        type_of(allocate_memory(robot)),
-        type_of(allocate_record(robot, 1, 1)),
+        Memory.compiled_type(),
+        Record.compiled_type(),
         vector,
         integers,
         integers,
