@@ -71,7 +71,18 @@ def _state(package: Package) -> str:
 
 
 def compared(found: dict[str, str]) -> list[str]:
-    """Names of the peers that can be run."""
+    """Names of the peers that can be run.
+
+    Parameters
+    ----------
+    found : dict
+        What :func:`peers` returned.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
     return [
         name
         for name, state in found.items()
@@ -80,7 +91,18 @@ def compared(found: dict[str, str]) -> list[str]:
 
 
 def simulators(names: Sequence[str]) -> dict[str, Engine]:
-    """Those of the named engines that simulate, by name."""
+    """Those of the named engines that simulate, by name.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of engines that can be loaded.
+
+    Returns
+    -------
+    dict
+        Engines by name, without those that have no loop of their own.
+    """
     return {name: _adapter(PACKAGES[name]).ENGINE for name in names if name not in PARTS_OF_STEPS}
 
 

@@ -88,7 +88,13 @@ class Peer(ABC):
 
     @abstractmethod
     def advance(self, steps: int) -> None:
-        """Simulate some steps in as few calls as the engine allows."""
+        """Simulate some steps in as few calls as the engine allows.
+
+        Parameters
+        ----------
+        steps : int
+            How many.
+        """
 
     @abstractmethod
     def state(self) -> State:
@@ -99,18 +105,46 @@ class Peer(ABC):
         """How it touches the ground now."""
 
     def command(self, step: int) -> Floats:
-        """Command of each actuator in a step, (nu,)."""
+        """Command of each actuator in a step, (nu,).
+
+        Parameters
+        ----------
+        step : int
+            Number of the step, from 0.
+
+        Returns
+        -------
+        (nu,) float
+            Command c of the law of control.
+        """
         row: Floats = self.commands[min(step, len(self.commands) - 1)]
         return row
 
     def settle(self, seconds: float) -> None:
-        """Let it sink in first: start from where it is after a while."""
+        """Let it sink in first: start from where it is after a while.
+
+        Parameters
+        ----------
+        seconds : float
+            How long.
+        """
         self.restart()
         self.advance(round(seconds / self.step))
         self.start = State(self.state().q, self.state().v)
 
     def run(self, steps: int | None = None) -> float:
-        """Simulate from the start, to the end or some steps; return the seconds it took."""
+        """Simulate from the start, to the end or some steps; return the seconds it took.
+
+        Parameters
+        ----------
+        steps : int, optional
+            How many; by default all of the scenario.
+
+        Returns
+        -------
+        float
+            Seconds of computing.
+        """
         self.restart()
         begin = perf_counter()
         self.advance(self.steps if steps is None else steps)
@@ -178,6 +212,18 @@ def check_flight(engine: Engine, robot: Robot) -> float:
     """Check that a robot flies as ours does; return the largest difference of a coordinate.
 
     It is what tells that the engine has the same robot: masses, inertias, lengths, axes, gravity.
+
+    Parameters
+    ----------
+    engine : Engine
+        The engine.
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    float
+        Largest difference of a coordinate after the flight (rad, m).
 
     Raises
     ------

@@ -50,7 +50,22 @@ class Scenario:
         return Ground(friction=self.friction)
 
     def run(self, method: Method, *, controller: Any = None, record_every: int = NEVER) -> Run:
-        """Simulate it in heelstrike, under its own law of control or another controller."""
+        """Simulate it in heelstrike, under its own law of control or another controller.
+
+        Parameters
+        ----------
+        method : Method
+            Way through time.
+        controller : controller, optional
+            Instead of the scenario's own law.
+        record_every : int
+            Steps between two rows; by default only beginning and end are kept.
+
+        Returns
+        -------
+        Run
+            The run.
+        """
         return whole(
             simulate(
                 self.robot,
