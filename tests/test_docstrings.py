@@ -10,9 +10,7 @@ from __future__ import annotations
 
 import ast
 import enum
-import importlib
 import inspect
-import pkgutil
 import re
 import textwrap
 import typing
@@ -23,28 +21,12 @@ from typing import Any
 import numpy as np
 import pytest
 import synthetic_runs
+from public_names import public_names
 
 import heelstrike
 from heelstrike import errors
 
 ERRORS = {name for name, value in vars(errors).items() if inspect.isclass(value)}
-
-
-def public_names() -> dict[str, Any]:
-    """Public objects, each by the shortest of its names."""
-    packages = ["heelstrike"] + [
-        module.name
-        for module in pkgutil.walk_packages(heelstrike.__path__, "heelstrike.")
-        if module.ispkg
-    ]
-    found: dict[int, tuple[str, Any]] = {}
-    for package in packages:
-        module = importlib.import_module(package)
-        names = heelstrike._HOME if package == "heelstrike" else getattr(module, "__all__", ())
-        for name in names:
-            value = getattr(module, name)
-            found.setdefault(id(value), (f"{package}.{name}", value))
-    return dict(found.values())
 
 
 def callables() -> Iterator[tuple[str, Callable[..., Any]]]:
