@@ -45,5 +45,6 @@ def number(value: Any, digits: int = 3) -> str:
 
 def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """Return the lines of a table in Markdown."""
-    rule = [":---", *["---:"] * (len(head) - 1)]
-    return ["| " + " | ".join(cells) + " |" for cells in (head, rule, *rows)]
+    rule = "|" + "|".join([":---", *["---:"] * (len(head) - 1)]) + "|"
+    first, *others = ("| " + " | ".join(cells) + " |" for cells in (head, *rows))
+    return [first, rule, *others]

@@ -6,6 +6,7 @@ import importlib.util
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,8 +17,9 @@ from typing import Any
 
 import pytest
 from rich.console import Console
-from speed import precision, scenarios, steps, suite
+from speed import page, precision, scenarios, steps, suite
 from speed.figures import draw
+from speed.machine import machine
 from speed.race import reason
 from speed.scaling import crossover
 from speed.suite import PARTS
@@ -113,6 +115,39 @@ def test_ctrl_c_keeps_the_parts_that_are_finished(
     assert [path.name for path in tmp_path.iterdir()] == ["benchmark.json"]
     assert written(tmp_path)["footprint"] == footprint
     assert written(tmp_path)["interrupted"] == "threads"
+
+
+def test_the_page_is_filled_from_results_that_are_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = tmp_path / "performance.md"
+    copy.write_text(page.PAGE.read_text(encoding="utf-8"), encoding="utf-8")
+    before = copy.read_text(encoding="utf-8")
+    monkeypatch.setattr(page, "PAGE", copy)
+    results = {
+        "quick": False,
+        "date": "2001-02-03T04:05:06",
+        "machine": machine(),
+        "peers": {"mujoco": "1.2.3"},
+        "threads": {
+            "runs": 7, "duration_s": 1.0, "steps": 7000, "same_for_all_threads": True,
+            "rows": [{"threads": 1, "steps_per_s": 5e5, "speed_up": 1.0}],
+        },
+    }  # fmt: skip
+    (tmp_path / "benchmark.json").write_text(json.dumps(results))
+    page.fill(tmp_path)
+    after = copy.read_text(encoding="utf-8")
+    assert "Measured 2001-02-03 on" in after
+    assert "*7 walks of 1 s, 7000 steps, identical on all threads*" in after
+    assert "| 1 | 0.5 | 1 | – | – |" in after
+    # All that was not measured, and the counts of instructions, stay as they are.
+    for part in ("steps", "scaling", "footprint", "endurance", "instructions"):
+        block = re.search(rf"<!-- benchmark: {part} -->.*?<!-- end -->", before, re.DOTALL)
+        assert block is not None
+        assert block[0] in after
+    (tmp_path / "benchmark.json").write_text(json.dumps({**results, "quick": True}))
+    with pytest.raises(SystemExit, match="not all results"):
+        page.fill(tmp_path)
 
 
 def _only(monkeypatch: pytest.MonkeyPatch, engines: dict[str, Engine], contest: Scenario) -> None:
