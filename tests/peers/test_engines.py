@@ -151,3 +151,9 @@ def test_an_engine_that_cannot_be_loaded_is_named_and_left_out(
     found = peers()
     assert "cannot be loaded: ImportError: libmujoco.so" in found["mujoco"]
     assert compared(found) == ["drake", "bullet", "dart", "pinocchio"]
+
+
+def test_by_default_all_are_loaded_that_can_be() -> None:
+    found = set(compared(peers())) - set(PARTS_OF_STEPS)
+    assert "mujoco" in found
+    assert set(simulators()) == found

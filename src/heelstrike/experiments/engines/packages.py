@@ -90,19 +90,20 @@ def compared(found: dict[str, str]) -> list[str]:
     ]
 
 
-def simulators(names: Sequence[str]) -> dict[str, Engine]:
-    """Those of the named engines that simulate, by name.
+def simulators(names: Sequence[str] | None = None) -> dict[str, Engine]:
+    """Load engines that simulate.
 
     Parameters
     ----------
-    names : sequence of str
-        Names of engines that can be loaded.
+    names : sequence of str, optional
+        Names of engines that can be loaded, by default of all that can.
 
     Returns
     -------
     dict
         Engines by name, without those that have no loop of their own.
     """
+    names = compared(peers()) if names is None else names
     return {name: _adapter(PACKAGES[name]).ENGINE for name in names if name not in PARTS_OF_STEPS}
 
 
