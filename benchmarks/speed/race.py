@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -62,7 +63,7 @@ def race(
     alike = scenario.contacts is not None if alike is None else alike
 
     def run(duration: float) -> float:
-        shorter = Scenario(**(vars(scenario) | {"duration": duration}))
+        shorter = replace(scenario, duration=duration)
         return shorter.run(method, controller=controller).timing.wall_s
 
     steps = {"heelstrike": round(scenario.duration / STEP)}

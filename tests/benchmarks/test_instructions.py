@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import instructions
@@ -17,16 +18,11 @@ def runs() -> dict[str, hs.Run]:
     """Runs by name, of those that step through time; as long as they are counted."""
     found = {}
     for name, counted in instructions.scenarios().items():
-        if counted.method == "TimeStepping":
-            scenario = counted.scenario
+        if isinstance(counted.method, hs.TimeStepping):
             longer = (counted.first + counted.count) * instructions.STEP
-            found[name] = hs.simulate(
-                scenario.robot,
-                scenario.feedback,
-                state=scenario.state,
-                duration=longer,
-                ground=hs.Ground(friction=counted.friction),
-                stop_when_fallen=False,
+            scenario = replace(counted.scenario, duration=longer)
+            found[name] = scenario.run(
+                counted.method, controller=counted.controller, record_every=1
             )
     return found
 
