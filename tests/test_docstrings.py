@@ -26,6 +26,10 @@ from public_names import public_names
 import heelstrike
 from heelstrike import errors
 
+SECTIONS = {
+    "", "Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns", "See Also", "Notes",
+    "References", "Examples",
+}  # fmt: skip
 ERRORS = {name for name, value in vars(errors).items() if inspect.isclass(value)}
 
 
@@ -90,7 +94,8 @@ def gaps(function: Callable[..., Any]) -> list[str]:
     documented = sections(inspect.getdoc(function) or "")
     described = entries(documented.get("Parameters", []))
     taken = parameters(function)
-    found = [f"{name} is not described" for name in taken if name not in described]
+    found = [f"there is no section {name!r}" for name in documented.keys() - SECTIONS]
+    found += [f"{name} is not described" for name in taken if name not in described]
     found += [f"{name} is described but not taken" for name in described if name not in taken]
     found += [f"{name} is described twice" for name in described if described.count(name) > 1]
     returned = inspect.signature(function).return_annotation not in (None, "None", "NoReturn")
@@ -122,6 +127,7 @@ def test_a_class_describes_what_it_is_made_of(name: str) -> None:
     kind = CLASSES[name]
     assert kind.__doc__
     documented = sections(kind.__doc__)
+    assert documented.keys() <= SECTIONS
     described = entries(documented.get("Parameters", []) + documented.get("Attributes", []))
     if issubclass(kind, (enum.Enum, BaseException)) or getattr(kind, "_is_protocol", False):
         return
