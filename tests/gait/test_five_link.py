@@ -17,7 +17,7 @@ import heelstrike as hs
 
 HUMAN_KNEES = {"right_knee": (0.0, 2.5)}
 
-# Of N²m²s, by `benchmarks/five_link.py`: what 24, 48 and 96 intervals agree on.
+# Of N²m²s, by `benchmarks/gaits.py meshes`: what 24, 48 and 96 intervals agree on.
 COST = 469.6501
 COST_OF_FREE_KNEES = 469.50198
 

@@ -426,7 +426,22 @@ class ComputedTorque:
         return CompiledController(kernel, self._parameters, self._initial_memory())
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
-        """Return the joint torques (nu,), in N m."""
+        """Return the joint torques (nu,), in N m.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        state : State
+            Where the robot is.
+        contacts : Contacts
+            How it touches the ground.
+
+        Returns
+        -------
+        (nu,) float
+            Torques, in the order of the actuators.
+        """
         if t <= 0.0:
             self.reset()
         forward_kinematics(self.robot.model, state.q, self._tree)

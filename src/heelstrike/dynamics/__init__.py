@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from heelstrike.dynamics.energies import energy, kinetic_energy, potential_energy
 from heelstrike.dynamics.equations_of_motion import (
@@ -35,6 +35,9 @@ from heelstrike.dynamics.points import (
     point_velocity,
 )
 from heelstrike.dynamics.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
+
+if TYPE_CHECKING:
+    from heelstrike.dynamics.casadi_functions import CasadiDynamics as CasadiDynamics
 
 __all__ = [
     "CasadiDynamics",

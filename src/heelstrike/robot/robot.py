@@ -77,12 +77,28 @@ class Mirror:
             Positions.
         reference : (nq,) float
             The robot's `Model.reference`.
+
+        Returns
+        -------
+        (..., nq) float
+            Positions of the mirror image.
         """
         mirrored: NDArray[np.float64] = self.sign * (q - reference)[..., self.joint] + reference
         return mirrored
 
     def velocity(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return velocities or accelerations, of shape (..., nv), left and right exchanged."""
+        """Return velocities or accelerations, of shape (..., nv), left and right exchanged.
+
+        Parameters
+        ----------
+        v : (..., nv) float
+            Velocities or accelerations.
+
+        Returns
+        -------
+        (..., nv) float
+            Those of the mirror image.
+        """
         mirrored: NDArray[np.float64] = self.sign * v[..., self.joint]
         return mirrored
 
@@ -166,6 +182,16 @@ class Robot:
     def joint_index(self, joint: str | int) -> int:
         """Index of a coordinate, given by the name of its joint (or by an index, which is checked).
 
+        Parameters
+        ----------
+        joint : str or int
+            Name of the joint, or an index.
+
+        Returns
+        -------
+        int
+            Its place in q and v.
+
         Raises
         ------
         RobotError
@@ -174,7 +200,18 @@ class Robot:
         return index_of(self, "joint", self.joint_names, joint)
 
     def actuator_index(self, actuator: str | int) -> int:
-        """Index of an actuator, given by its name or index; see `joint_index`."""
+        """Index of an actuator, given by its name or index; see `joint_index`.
+
+        Parameters
+        ----------
+        actuator : str or int
+            Name of the actuator, or an index.
+
+        Returns
+        -------
+        int
+            Its place among the torques.
+        """
         return index_of(self, "actuator", self.actuator_names, actuator)
 
     def state(
@@ -196,6 +233,11 @@ class Robot:
             Where all others are, by default at rest in the reference configuration. It is left as
             it is.
 
+        Returns
+        -------
+        State
+            The state.
+
         Raises
         ------
         RobotError
@@ -212,15 +254,47 @@ class Robot:
         return state_by_name(self, position or {}, velocity or {}, start)
 
     def positions(self, state: State) -> dict[str, float]:
-        """Positions of a state by the names of the joints, in rad and m."""
+        """Positions of a state by the names of the joints, in rad and m.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Position by name of the joint.
+        """
         return by_name(self, checked(self, state).q)
 
     def velocities(self, state: State) -> dict[str, float]:
-        """Velocities of a state by the names of the joints, in rad/s and m/s."""
+        """Velocities of a state by the names of the joints, in rad/s and m/s.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Velocity by name of the joint.
+        """
         return by_name(self, checked(self, state).v)
 
     def mirrored(self, state: State) -> State:
         """Return a state with left and right exchanged.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        State
+            Its mirror image.
 
         Raises
         ------
@@ -270,6 +344,18 @@ class Robot:
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.
 
+        Parameters
+        ----------
+        state : State
+            The state.
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+
         Raises
         ------
         RobotError
@@ -283,6 +369,16 @@ class Robot:
         """Read a state from a file of :meth:`save_state`, bit by bit the one that was saved.
 
         Joints are matched by name, so that their order in the robot may have changed since.
+
+        Parameters
+        ----------
+        path : str or path
+            File to read.
+
+        Returns
+        -------
+        State
+            The state, in the order of this robot's joints.
 
         Raises
         ------

@@ -46,6 +46,11 @@ def read_mjcf(
     lenient : bool
         Let impossible masses and inertias pass, to look at the robot; see `inspect_robot`.
 
+    Returns
+    -------
+    Robot
+        The robot.
+
     Raises
     ------
     RobotError
