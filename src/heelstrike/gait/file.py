@@ -5,22 +5,22 @@ Reading a file never runs anything from it.
 
 from __future__ import annotations
 
+import enum
 import json
 import math
-from collections.abc import Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.gait import Gait, fingerprint
+from heelstrike.gait.gait import Footing, Gait, Phase, fingerprint
 from heelstrike.gait.margins import Margins
-from heelstrike.gait.piecewise import PiecewiseGait
+from heelstrike.gait.polynomials import coefficients
 from heelstrike.json_checksum import KEY as CHECKSUM
 from heelstrike.json_checksum import is_changed, with_checksum
 from heelstrike.robot.robot import Robot
@@ -28,33 +28,23 @@ from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
 
 FORMAT = "heelstrike gait"
-VERSION = 1
+VERSION = 2
+"""Version 1 had gaits of one phase: of a single cubic, given by its ends, or of several pieces."""
 LARGEST_FILE = 2**20
 """Gait files larger than this (in bytes) are refused: one has some 4 kB."""
 LARGEST_NUMBER = 1e9
 """No angle, velocity, force or cost of a gait is larger than this, in any unit."""
 
-_VECTORS = {
-    "start_position_rad": "start_position",
-    "end_position_rad": "end_position",
-    "start_velocity_rad_per_s": "start_velocity",
-    "end_velocity_rad_per_s": "end_velocity",
-    "mirror_sign": "mirror_sign",
-    "mirror_offset_rad": "mirror_offset",
-}
+Made = TypeVar("Made", Gait, Phase)
+Member = TypeVar("Member", bound=enum.Enum)
+
+_VECTORS = {"mirror_sign": "mirror_sign", "mirror_offset_rad": "mirror_offset"}
 _NUMBERS = {
     "step_length_m": "step_length",
-    "step_duration_s": "step_duration",
     "cost_N2m2s": "cost",
     "friction": "friction",
     "clearance_m": "clearance",
 }
-_PIECES = {
-    "breakpoints_s": "breakpoints",
-    "joint_pieces": "pieces",
-    "pitch_pieces": "pitch_pieces",
-}
-"""What a gait of piecewise polynomials has besides; a file with the first of these is one."""
 _MARGINS = {
     "normal_force_N": "normal_force",
     "friction_use": "friction_use",
@@ -83,27 +73,35 @@ def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
         "robot_fingerprint": gait.fingerprint,
         **{key: getattr(gait, name) for key, name in _NUMBERS.items()},
         "clearance_profile": gait.clearance_profile.value,
-        "stance_foot": gait.stance_foot,
         "joints": list(gait.joint_names),
         **{key: getattr(gait, name).tolist() for key, name in _VECTORS.items()},
         "mirror_joint": gait.mirror_joint.tolist(),
         "initial_position": gait.initial_state.q.tolist(),
         "initial_velocity": gait.initial_state.v.tolist(),
         "touchdown_impulse_Ns": gait.touchdown_impulse.tolist(),
+        "phases": [_phase_data(phase) for phase in gait.phases],
         # JSON knows no infinity: no limit, no margin.
         "margins": {
             key: value if math.isfinite(value := getattr(gait.margins, name)) else None
             for key, name in _MARGINS.items()
         },
     }
-    if isinstance(gait, PiecewiseGait):
-        data |= {key: getattr(gait, name).tolist() for key, name in _PIECES.items()}
     data = with_checksum(data)
     lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     try:
         write_whole(path, f"{{\n{lines}\n}}\n")
     except WriteError as error:
         raise GaitError(str(error)) from error
+
+
+def _phase_data(phase: Phase) -> dict[str, Any]:
+    pitch = phase.pitch_pieces
+    return {
+        "contacts": {str(foot): footing.value for foot, footing in phase.contacts.items()},
+        "breakpoints_s": phase.breakpoints.tolist(),
+        "joint_pieces": phase.pieces.tolist(),
+        **({} if pitch is None else {"pitch_pieces": pitch.tolist()}),
+    }
 
 
 def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
@@ -128,11 +126,13 @@ def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
         not finite or not those that were saved, or the gait belongs to another robot.
     """
     path = Path(path)
-    reader = _Reader(path, _parsed(path))
+    data = _parsed(path)
+    reader = _Reader(path, data)
+    reader.check_format()
     gait = reader.gait()
     if robot is not None:
         _check_robot(gait, robot, path)
-    if is_changed(reader.data):
+    if is_changed(data):
         raise GaitError(
             f"{path}: damaged: its numbers are not those that were saved. If you changed them, "
             f'remove the entry "{CHECKSUM}".'
@@ -171,18 +171,21 @@ def _parsed(path: Path) -> Any:
 
 
 class _Reader:
-    """Entries of a gait file, each checked for its kind before use."""
+    """Entries of a gait file, or of an object in it, each checked for its kind before use."""
 
     def __init__(self, path: Path, data: Any) -> None:
         self.path = path
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
+        self.data = data
+
+    def check_format(self) -> None:
+        if not isinstance(self.data, dict) or self.data.get("format") != FORMAT:
             raise self.error(f'not a gait file: it must be a JSON object with "format": "{FORMAT}"')
-        if data.get("version") != VERSION or isinstance(data["version"], bool):
+        version = self.data.get("version")
+        if isinstance(version, bool) or version not in range(1, VERSION + 1):
             raise self.error(
-                f"version {_shown(data.get('version'))} of the format is not known here, only "
+                f"version {_shown(version)} of the format is not known here, only those to "
                 f"{VERSION}; was it written by a newer heelstrike?"
             )
-        self.data = data
 
     def error(self, what: str) -> GaitError:
         return GaitError(f"{self.path}: {what}")
@@ -190,11 +193,9 @@ class _Reader:
     def gait(self) -> Gait:
         joints = self.names("joints")
         nu = len(joints)
-        margins = self.entry(self.data, "margins")
-        if not isinstance(margins, dict):
-            raise self.error('"margins" must be an object')
+        margins = self.object("margins")
         values: dict[str, Any] = {
-            **{name: self.number(self.data, key) for key, name in _NUMBERS.items()},
+            **{name: self.number(key) for key, name in _NUMBERS.items()},
             **{name: self.vector(key, nu) for key, name in _VECTORS.items()},
             "robot": self.text("robot"),
             "fingerprint": self.text("robot_fingerprint"),
@@ -202,33 +203,69 @@ class _Reader:
             "mirror_joint": [
                 self.whole("mirror_joint", x) for x in self.vector("mirror_joint", nu)
             ],
-            "stance_foot": self.whole("stance_foot", self.number(self.data, "stance_foot")),
             "initial_state": State(
                 self.vector("initial_position", nu + 3), self.vector("initial_velocity", nu + 3)
             ),
-            "clearance_profile": self.profile("clearance_profile"),
+            "clearance_profile": self.member("clearance_profile", ClearanceProfile),
             "touchdown_impulse": self.vector("touchdown_impulse_Ns", 3),
-            "margins": Margins(
-                **{name: self.margin(margins, key) for key, name in _MARGINS.items()}
-            ),
+            "margins": Margins(**{name: margins.margin(key) for key, name in _MARGINS.items()}),
         }
-        kind: type[Gait] = Gait
-        if any(key in self.data for key in _PIECES):
-            kind = PiecewiseGait
-            values |= self.pieces(nu)
+        if self.data["version"] == 1:
+            return self.made(Gait, **values, phases=(self.only_phase(nu),))
+        phases = self.entry("phases")
+        if not isinstance(phases, list):
+            raise self.error('"phases" must be a list')
+        read = tuple(_Reader(self.path, phase).phase(nu) for phase in phases)
+        return self.made(Gait, **values, phases=read)
+
+    def made(self, kind: type[Made], **values: Any) -> Made:
         try:
             return kind(**values)
         except GaitError as error:
             raise self.error(str(error)) from None
 
-    def pieces(self, nu: int) -> dict[str, NDArray[np.float64]]:
-        breakpoints, joints, pitch = (self.table(key) for key in _PIECES)
-        if joints.ndim != 3 or joints.shape[2] != nu or pitch.ndim != 2 or breakpoints.ndim != 1:
+    def phase(self, nu: int) -> Phase:
+        contacts = self.object("contacts")
+        feet = {key: contacts.member(key, Footing) for key in contacts.data}
+        if not feet or not set(feet) <= {"0", "1"}:
+            raise self.error(f'"contacts" must name feet "0" or "1", got {_shown(list(feet))}')
+        pitch = ("pitch_pieces",) if "pitch_pieces" in self.data else ()
+        return self.piecewise({int(foot): feet[foot] for foot in feet}, nu, *pitch)
+
+    def only_phase(self, nu: int) -> Phase:
+        """What a file of version 1 says of the motion."""
+        foot = self.whole("stance_foot", self.number("stance_foot"))
+        if {"breakpoints_s", "joint_pieces", "pitch_pieces"} & set(self.data):
+            return self.piecewise({foot: Footing.POINT}, nu, "pitch_pieces")
+        duration = self.number("step_duration_s")
+        if not duration > 0.0:
+            raise self.error("step_duration must be positive")
+        ends = [
+            self.vector(f"{end}_{key}", nu)
+            for end in ("start", "end")
+            for key in ("position_rad", "velocity_rad_per_s")
+        ]
+        pieces = coefficients(np.stack(ends), duration)[None]
+        breakpoints = np.array([0.0, duration])
+        contacts = {foot: Footing.FLAT}
+        return self.made(Phase, contacts=contacts, breakpoints=breakpoints, pieces=pieces)
+
+    def piecewise(self, contacts: dict[int, Footing], nu: int, *pitch: str) -> Phase:
+        breakpoints, pieces = self.table("breakpoints_s"), self.table("joint_pieces")
+        pitches = [self.table(key) for key in pitch]
+        shapes = [breakpoints.ndim, pieces.ndim, *(each.ndim for each in pitches)]
+        if shapes != [1, 3, 2][: len(shapes)] or pieces.shape[2] != nu:
             raise self.error(
                 f'"joint_pieces" must hold a list of coefficients of {nu} joints for every piece, '
                 '"pitch_pieces" a list of coefficients, "breakpoints_s" the times between them'
             )
-        return {"breakpoints": breakpoints, "pieces": joints, "pitch_pieces": pitch}
+        return self.made(
+            Phase,
+            contacts=contacts,
+            breakpoints=breakpoints,
+            pieces=pieces,
+            pitch_pieces=pitches[0] if pitches else None,
+        )
 
     def table(self, key: str) -> NDArray[np.float64]:
         """Numbers in lists of lists, all of the same length."""
@@ -238,32 +275,40 @@ class _Reader:
                 return [checked(each, depth - 1) for each in value]
             return self.checked(key, value)
 
-        numbers = checked(self.entry(self.data, key), 3)
+        numbers = checked(self.entry(key), 3)
         try:
             return np.array(numbers, dtype=np.float64)
         except ValueError:
             raise self.error(f'"{key}" must hold lists of one length') from None
 
-    def entry(self, data: Mapping[str, Any], key: str) -> Any:
-        if key not in data:
+    def entry(self, key: str) -> Any:
+        if not isinstance(self.data, dict):
+            raise self.error(f'an object with "{key}" must stand where {_shown(self.data)} does')
+        if key not in self.data:
             raise self.error(f'"{key}" is missing')
-        return data[key]
+        return self.data[key]
+
+    def object(self, key: str) -> _Reader:
+        value = self.entry(key)
+        if not isinstance(value, dict):
+            raise self.error(f'"{key}" must be an object')
+        return _Reader(self.path, value)
 
     def text(self, key: str) -> str:
-        value = self.entry(self.data, key)
+        value = self.entry(key)
         if not isinstance(value, str):
             raise self.error(f'"{key}" must be a text, got {_shown(value)}')
         return value
 
-    def profile(self, key: str) -> ClearanceProfile:
+    def member(self, key: str, kind: type[Member]) -> Member:
         try:
-            return ClearanceProfile(self.text(key))
+            return kind(self.text(key))
         except ValueError:
-            names = ", ".join(f'"{known.value}"' for known in ClearanceProfile)
+            names = ", ".join(f'"{known.value}"' for known in kind)
             raise self.error(f'"{key}" must be one of {names}') from None
 
     def names(self, key: str) -> tuple[str, ...]:
-        value = self.entry(self.data, key)
+        value = self.entry(key)
         if (
             not isinstance(value, list)
             or not value
@@ -273,15 +318,15 @@ class _Reader:
             raise self.error(f'"{key}" must be a list of different names, got {_shown(value)}')
         return tuple(value)
 
-    def number(self, data: Mapping[str, Any], key: str) -> float:
-        return self.checked(key, self.entry(data, key))
+    def number(self, key: str) -> float:
+        return self.checked(key, self.entry(key))
 
-    def margin(self, data: Mapping[str, Any], key: str) -> float:
-        value = self.entry(data, key)
+    def margin(self, key: str) -> float:
+        value = self.entry(key)
         return math.inf if value is None else self.checked(key, value)
 
     def vector(self, key: str, size: int) -> NDArray[np.float64]:
-        value = self.entry(self.data, key)
+        value = self.entry(key)
         if not isinstance(value, list) or len(value) != size:
             raise self.error(f'"{key}" must be a list of {size} numbers, got {_shown(value)}')
         return np.array([self.checked(key, number) for number in value])

@@ -1,17 +1,22 @@
-"""The nonlinear program on a grid of phases, and its solution by IPOPT with exact derivatives."""
+"""The nonlinear program of a step, and its solution by IPOPT with exact derivatives."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
 
 import casadi
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.ipopt import Ipopt
-from heelstrike.gait.transcription import Group, Transcription
+from heelstrike.gait.polynomials import Instants, coefficients, gauss, lobatto
+from heelstrike.gait.request import Request
+from heelstrike.gait.starts import Start
+from heelstrike.gait.transcription import Group, Row, Transcription
+from heelstrike.interruption import deferred_interrupts
 
 Floats = NDArray[np.float64]
 
@@ -19,21 +24,48 @@ CONVERGED = 1e-8
 """Tolerance of IPOPT on scaled constraints and optimality."""
 MOST_ITERATIONS = 100
 """Iterations after which a start is given up; those that succeed take about 25."""
+POINTS = 4
+"""Gauss points in every piece of a motion that must satisfy an equation along the path."""
+PRICE_OF_EQUATIONS = 1000.0
+"""Price of violating an equation in an elastic program; that of an inequality is 1. Equations say
+what a periodic step is, so that they give way last."""
+RESERVE = 1e-6
+"""Scaled distance kept from every bound along the path, for the time between the instants."""
+
+SETTINGS = {
+    "print_time": False,
+    "error_on_fail": False,
+    "ipopt": {
+        "sb": "yes",
+        "print_level": 0,
+        "tol": CONVERGED,
+        "constr_viol_tol": CONVERGED,
+        "acceptable_iter": 0,
+        "max_iter": MOST_ITERATIONS,
+    },
+}
 
 
-def lobatto(intervals: int) -> tuple[Floats, Floats]:
-    """Nodes on [0, 1], ends included, and weights of Gauss-Lobatto quadrature.
+def first_instants(request: Request) -> tuple[int, Instants]:
+    """Degree of the polynomials, and the instants on which a program begins.
 
-    The rule is exact for polynomials of degree ``2 * intervals - 1``, and its nodes are densest at
-    the ends of the step, where the clearance of the swing foot is decided.
+    On flat feet every motion of the joints is possible and the paper's cubics are chosen among. On
+    points an equation of motion is left: there, pieces have the degree at which the accelerations
+    can satisfy it at the Gauss points of each (direct collocation; positions at the joints of the
+    pieces are then accurate to order 2 `POINTS`: U. M. Ascher, R. M. M. Mattheij and R. D.
+    Russell, *Numerical Solution of Boundary Value Problems for Ordinary Differential Equations*,
+    1995, section 5.3).
     """
-    last = np.zeros(intervals + 1)
-    last[-1] = 1.0
-    inner = np.sort(legendre.Legendre(last).deriv().roots().real)
-    inner = 0.5 * (inner - inner[::-1])  # symmetric to the last digit
-    nodes = np.concatenate([[-1.0], inner, [1.0]])
-    weights = 2.0 / (intervals * (intervals + 1) * legendre.legval(nodes, last) ** 2)
-    return 0.5 * (nodes + 1.0), 0.5 * weights
+    if request.stance.flat:
+        pieces, degree, (nodes, weights) = 1, 3, lobatto(request.intervals)
+    else:
+        pieces, degree, (nodes, weights) = request.intervals, POINTS + 1, gauss(POINTS)
+    return degree, Instants(
+        pieces,
+        np.repeat(np.arange(pieces), nodes.size),
+        np.tile(nodes, pieces),
+        np.tile(weights, pieces) / pieces,
+    )
 
 
 @dataclass(frozen=True)
@@ -43,7 +75,7 @@ class Solution:
     Attributes
     ----------
     unknowns : (n,) float
-        The unknowns of the transcription.
+        The unknowns of the program.
     objective : float
         Value of the objective.
     converged : bool
@@ -64,39 +96,25 @@ class Solution:
     multipliers: Floats
 
 
-PRICE_OF_EQUATIONS = 1000.0
-"""Price of violating an equation in an elastic program; that of an inequality is 1. Equations say
-what a periodic step is, so that they give way last."""
-RESERVE = 1e-6
-"""Scaled distance kept from every bound along the path, for the time between the nodes."""
-
-SETTINGS = {
-    "print_time": False,
-    "error_on_fail": False,
-    "ipopt": {
-        "sb": "yes",
-        "print_level": 0,
-        "tol": CONVERGED,
-        "constr_viol_tol": CONVERGED,
-        "acceptable_iter": 0,
-        "max_iter": MOST_ITERATIONS,
-    },
-}
-
-
 class Program:
-    """The program on a grid.
+    """The program on a mesh of equal pieces.
+
+    Unknowns are, of all free coordinates, the positions at the end of every piece, the velocities
+    at the beginning of the step and the end of every piece, and the multiples of the remaining
+    shape functions; then the step's duration and length. The positions at its beginning are the
+    mirror image of those at its end.
 
     Parameters
     ----------
     transcription : Transcription
         The functions.
-    phases : (N,) float
-        Phases at which the constraints along the path hold.
-    weights : (N,) float
-        Quadrature weights of the phases; zero for phases that only carry constraints.
     profile : ClearanceProfile
         Shape of the swing foot's clearance.
+    degree : int
+        Degree of the polynomials.
+    instants : Instants
+        When the constraints along the path hold. Equations among them hold where the instants
+        have a weight; the others only carry inequalities.
     elastic : bool
         Let every constraint be violated and minimise the sum of the scaled violations instead of
         the effort: shows which constraints are in conflict when there is no solution.
@@ -105,127 +123,141 @@ class Program:
     def __init__(
         self,
         transcription: Transcription,
-        phases: Floats,
-        weights: Floats,
-        *,
         profile: ClearanceProfile,
+        degree: int,
+        instants: Instants,
+        *,
         elastic: bool = False,
     ) -> None:
         self.transcription = transcription
-        self.phases = phases
-        self.weights = weights
+        self.request = transcription.request
         self.profile = profile
+        self.degree = degree
+        self.instants = instants
         self.elastic = elastic
-        self._lower, self._upper = self._constraint_bounds()
-        self._solver = self._build()
+        n, pieces = transcription.size, instants.pieces
+        sizes = [n * pieces, n * (pieces + 1), n * pieces * (degree - 3), 1, 1]
+        self._ends = [0, *np.cumsum(sizes).tolist()]
+        self._lower, self._upper = self._bounds()
+        self._build()
 
-    def refined(self, phases: Floats) -> Program:
-        """Return the same program with more phases that only carry constraints."""
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self._ends[-1])
+
+    def refined(self, instants: Instants) -> Program:
+        """Return the same program with more instants."""
         return Program(
-            self.transcription,
-            np.concatenate([self.phases, phases]),
-            np.concatenate([self.weights, np.zeros(phases.size)]),
-            profile=self.profile,
+            self.transcription, self.profile, self.degree, self.instants.joined(instants)
         )
 
     def relaxed(self) -> Program:
         """Return the elastic variant of the program."""
-        return Program(
-            self.transcription, self.phases, self.weights, profile=self.profile, elastic=True
-        )
+        return Program(self.transcription, self.profile, self.degree, self.instants, elastic=True)
 
-    def path_bounds(self, phases: Floats) -> tuple[Floats, Floats]:
-        """Scaled bounds of the constraints along the path at phases, (rows, N) each."""
-        rows = self.transcription.path.rows
-        lower = np.array([[row.lower] for row in rows]).repeat(len(phases), axis=1)
-        upper = np.array([[row.upper] for row in rows]).repeat(len(phases), axis=1)
-        clearance = self.clearance(phases)
+    def path_bounds(self, instants: Instants) -> tuple[Floats, Floats]:
+        """Scaled bounds of the constraints along the path at instants, (rows, N) each."""
+        rows = self.transcription.path_rows
+        lower = np.array([[row.lower] for row in rows]).repeat(instants.share.size, axis=1)
+        upper = np.array([[row.upper] for row in rows]).repeat(instants.share.size, axis=1)
         for k, row in enumerate(rows):
             if row.group is Group.CLEARANCE:
-                lower[k] = clearance
+                lower[k] = self.clearance(instants)
+            if row.lower == row.upper:
+                lower[k, instants.weight == 0.0] = -np.inf
+                upper[k, instants.weight == 0.0] = np.inf
         return lower, upper
 
-    def clearance(self, phases: Floats) -> Floats:
-        """Least height of the swing foot at phases (m); none at the ends, where it stands."""
-        height = self.transcription.request.clearance * self.profile.height(phases)
+    def clearance(self, instants: Instants) -> Floats:
+        """Least height of the swing foot at instants (m); none at the ends, where it stands."""
+        phases = instants.phases
+        height = self.request.clearance * self.profile.height(phases)
         return np.where((phases > 0.0) & (phases < 1.0), height, -np.inf)
 
-    def _constraint_bounds(self) -> tuple[Floats, Floats]:
-        touchdown = self.transcription.touchdown.rows
-        lower, upper = self.path_bounds(self.phases)
+    def labelled_rows(self) -> list[tuple[Row, float | None]]:
+        """Meaning of every constraint, with its phase if it is one along the path."""
+        rows: list[tuple[Row, float | None]]
+        rows = [(row, None) for row in self.transcription.touchdown_rows]
+        for phase in self.instants.phases.tolist():
+            rows += [(row, phase) for row in self.transcription.path_rows]
+        return rows
+
+    def _bounds(self) -> tuple[Floats, Floats]:
+        """Scaled bounds of all constraints: those at touchdown, then instant by instant."""
+        touchdown = self.transcription.touchdown_rows
+        lower, upper = self.path_bounds(self.instants)
         reserve = np.minimum(RESERVE, 0.5 * (upper - lower))
         return (
             np.concatenate([[row.lower for row in touchdown], (lower + reserve).ravel(order="F")]),
             np.concatenate([[row.upper for row in touchdown], (upper - reserve).ravel(order="F")]),
         )
 
-    def _build(self) -> Ipopt:
-        path, touchdown = self.transcription.path, self.transcription.touchdown
-        count, size = len(self.phases), self.transcription.size
-        at_touchdown = len(touchdown.rows)
-        total = at_touchdown + len(path.rows) * count
-        unknowns = casadi.MX.sym("unknowns", size + (2 * total if self.elastic else 0))
-        x, excess = unknowns[:size], unknowns[size:]
-        phases = casadi.DM(self.phases).T
-        weights = casadi.DM(self.weights)
+    def _parts(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """Positions and velocities at the ends of the pieces, the rest, duration and length."""
+        if isinstance(unknowns, np.ndarray):
+            unknowns = casadi.DM(unknowns)
+        n, pieces = self.transcription.size, self.instants.pieces
+        ends = self._ends
+        q, v, rest, duration, length = (unknowns[begin:end] for begin, end in pairwise(ends))
+        q, v = casadi.reshape(q, n, pieces), casadi.reshape(v, n, pieces + 1)
+        start, _ = self.transcription.mirror(q[:, -1], v[:, 0])
+        return casadi.horzcat(start, q), v, casadi.reshape(rest, n, -1), duration, length
 
-        costs, values = path.value.map(count)(x, phases)
-        f = costs @ weights
-        f_slope = path.gradient.map(count)(x, phases)[1] @ weights
-        g = casadi.vertcat(touchdown.value(x)[1], casadi.vec(values))
-        slopes = casadi.horzsplit(path.jacobian.map(count)(x, phases)[1], size)
-        g_slope = casadi.vertcat(touchdown.jacobian(x)[1], *slopes)
-
-        f_multiplier = casadi.MX.sym("f_multiplier")
-        g_multiplier = casadi.MX.sym("g_multiplier", total)
-        multipliers = casadi.vertcat(
-            f_multiplier * weights.T,
-            casadi.reshape(g_multiplier[at_touchdown:], len(path.rows), count),
+    def along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:
+        """Positions, velocities and accelerations at instants, (n, N) each."""
+        q, v, rest, duration, _ = self._parts(unknowns)
+        h = duration / instants.pieces
+        values = casadi.horzcat(q[:, :-1], h * v[:, :-1], q[:, 1:], h * v[:, 1:], h**2 * rest)
+        position, velocity, acceleration = (
+            values @ casadi.sparsify(casadi.DM(instants.matrix(self.degree, order)))
+            for order in range(3)
         )
-        if self.elastic:
-            multipliers[0, :] = 0.0
-        hessian = touchdown.hessian(x, casadi.vertcat(0.0, g_multiplier[:at_touchdown]))
-        for block in casadi.horzsplit(path.hessian.map(count)(x, phases, multipliers), size):
-            hessian = hessian + block
+        return position, velocity / h, acceleration / h**2
 
+    def motion(self, unknowns: Floats, instants: Instants) -> list[Floats]:
+        """Return the numbers of :meth:`along`."""
+        return [np.array(part) for part in self.along(unknowns, instants)]
+
+    def at_touchdown(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
+        """Return q(T), v(T), v(0), duration and length, as the transcription takes them."""
+        q, v, _, duration, length = self._parts(unknowns)
+        return q[:, -1], v[:, -1], v[:, 0], duration, length
+
+    def effort(self, unknowns: Floats) -> float:
+        """∫ΓᵀΓ dt over the step, in N²m²s."""
+        return float(self._constraints(unknowns)[0])
+
+    def pieces(self, unknowns: Floats) -> Floats:
+        """Coefficients of the free coordinates in the time of each piece, (K, degree + 1, n)."""
+        n, count = self.transcription.size, self.instants.pieces
+        q, v, rest, duration, _ = (np.array(part) for part in self._parts(unknowns))
+        blocks = [q[:, :-1], v[:, :-1], q[:, 1:], v[:, 1:], rest]
+        values = np.concatenate(blocks, axis=1).reshape(n, self.degree + 1, count)
+        return coefficients(values.transpose(2, 1, 0), float(duration[0, 0]) / count)
+
+    def _build(self) -> None:
+        total = self._lower.size
+        unknowns = casadi.MX.sym("unknowns", self.size + (2 * total if self.elastic else 0))
+        x = unknowns[: self.size]
+        f, g = self._constraints(x)
+        if self.request.free_step:
+            f = f / x[-1]
         if self.elastic:
             # Each constraint may be exceeded upwards or downwards; the sum of that is minimised.
+            low, high = unknowns[self.size : -total], unknowns[-total:]
             price = np.where(self._lower == self._upper, PRICE_OF_EQUATIONS, 1.0)
-            prices = casadi.DM(np.concatenate([price, price]))
-            f = casadi.dot(prices, excess)
-            f_slope = casadi.vertcat(casadi.DM.zeros(size), prices)
-            g = g + excess[:total] - excess[total:]
-            identity = casadi.DM.eye(total)
-            g_slope = casadi.horzcat(g_slope, identity, -identity)
-            hessian = casadi.diagcat(hessian, casadi.DM(2 * total, 2 * total))
-        none = casadi.MX.sym("none", 0)  # nlpsol's parameters, which we have no use for
-        derivatives = {
-            "grad_f": casadi.Function(
-                "grad_f", [unknowns, none], [f, f_slope], ["x", "p"], ["f", "grad_f_x"]
-            ),
-            "jac_g": casadi.Function(
-                "jac_g", [unknowns, none], [g, g_slope], ["x", "p"], ["g", "jac_g_x"]
-            ),
-            "hess_lag": casadi.Function(
-                "hess_lag",
-                [unknowns, none, f_multiplier, g_multiplier],
-                [hessian],
-                ["x", "p", "lam_f", "lam_g"],
-                ["hess_gamma_x_x"],
-            ),
-        }
-        return Ipopt({"x": unknowns, "f": f, "g": g}, {**SETTINGS, **derivatives})
+            f, g = casadi.dot(price, low + high), g + low - high
+        self._solver = Ipopt({"x": unknowns, "f": f, "g": g}, SETTINGS)
 
     def solve(self, guess: Floats) -> Solution:
         """Solve from a guess of the unknowns.
 
         An elastic program starts with the violations of the guess taken up by the excesses.
         """
-        request = self.transcription.request
-        size = self.transcription.size
-        lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
-        lower[-2], upper[-2] = request.duration_bounds
-        lower[-1], upper[-1] = request.length_bounds
+        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
+        lower[-2], upper[-2] = self.request.duration_bounds
+        lower[-1], upper[-1] = self.request.length_bounds
         start = np.clip(guess, lower, upper)
         if self.elastic:
             missing = self.violations(start)
@@ -236,7 +268,7 @@ class Program:
             x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
         )
         return Solution(
-            unknowns=np.array(found["x"]).ravel()[:size],
+            unknowns=np.array(found["x"]).ravel()[: self.size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
             status=str(statistics["return_status"]).replace("_", " ").lower(),
@@ -244,15 +276,103 @@ class Program:
             multipliers=np.array(found["lam_g"]).ravel(),
         )
 
-    def values(self, unknowns: Floats) -> Floats:
-        """Scaled values of all constraints: those at touchdown, then phase by phase."""
-        path, touchdown = self.transcription.path, self.transcription.touchdown
-        _, along = path.value.map(len(self.phases))(unknowns, self.phases[None, :])
+    def sampled(self, start: Start) -> Floats:
+        """Unknowns of a motion to start from."""
+        ends = np.arange(self.instants.pieces + 1) / self.instants.pieces
+        q, v = start.motion(ends)
+        rest = np.zeros(self._ends[3] - self._ends[2])
         return np.concatenate(
-            [np.array(touchdown.value(unknowns)[1]).ravel(), np.array(along).ravel(order="F")]
+            [q[:, 1:].ravel(order="F"), v.ravel(order="F"), rest, [start.duration, start.length]]
+        )
+
+    def _constraints(self, x: Any) -> tuple[Any, Any]:
+        """Effort and scaled values of all constraints: at touchdown, then instant by instant."""
+        count = self.instants.share.size
+        effort, along = self.transcription.path.map(count)(*self.along(x, self.instants))
+        touchdown = self.transcription.touchdown(*self.at_touchdown(x))
+        return (
+            x[-2] * (effort @ casadi.DM(self.instants.weight)),
+            casadi.vertcat(touchdown, casadi.vec(along)),
         )
 
     def violations(self, unknowns: Floats) -> Floats:
         """Scaled distances of all constraints outside of their bounds; positive if too low."""
-        values = self.values(unknowns)
+        values = np.array(self._constraints(unknowns)[1]).ravel()
         return np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
+
+    def polished(self, unknowns: Floats) -> Floats:
+        """Satisfy the equations to rounding, by the least change of the unknowns."""
+        x = casadi.MX.sym("x", self.size)
+        exact = np.flatnonzero(self._lower == self._upper).tolist()
+        residual = self._constraints(x)[1][exact] - casadi.DM(self._lower[exact])
+        equations = casadi.Function("equations", [x], [residual, casadi.jacobian(residual, x)])
+        free = np.ones(self.size, dtype=bool)
+        free[-2] = np.ptp(self.request.duration_bounds) > 0.0
+        free[-1] = np.ptp(self.request.length_bounds) > 0.0
+        polished = unknowns.copy()
+        for _ in range(3):
+            residual, jacobian = (np.array(part) for part in equations(polished))
+            polished[free] -= np.linalg.lstsq(jacobian[:, free], residual.ravel(), rcond=None)[0]
+        return polished
+
+
+class Ipopt:
+    """A nonlinear program for IPOPT, in a form that Ctrl-C can stop.
+
+    CasADi looks for signals in the functions that IPOPT evaluates, takes what they raise for a
+    failure of the function, and returns; nobody learns that there was a Ctrl-C. So the signal is
+    held back, and the search stopped after the iteration in which it came.
+
+    Parameters
+    ----------
+    problem : mapping
+        CasADi expressions of the unknowns ``x``, the objective ``f`` and the constraints ``g``.
+    options : mapping
+        Options of ``casadi.nlpsol``.
+    """
+
+    def __init__(self, problem: Mapping[str, Any], options: Mapping[str, Any]) -> None:
+        self._watch = _Watch(problem["x"].numel(), problem["g"].numel())
+        self._solver = casadi.nlpsol(
+            "gait", "ipopt", dict(problem), {**options, "iteration_callback": self._watch}
+        )
+
+    def solve(self, **arguments: Any) -> tuple[Any, Any]:
+        """Solve it; return what ``casadi.nlpsol`` found, and its statistics.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            At Ctrl-C, once the iteration under way has ended.
+        """
+        with deferred_interrupts() as interrupted:
+            self._watch.stop = interrupted
+            found = self._solver(**arguments)
+        return found, self._solver.stats()
+
+
+class _Watch(casadi.Callback):  # type: ignore[misc]
+    """What IPOPT asks after every iteration: whether to stop."""
+
+    def __init__(self, unknowns: int, constraints: int) -> None:
+        casadi.Callback.__init__(self)
+        self._sizes = {"f": 1, "x": unknowns, "lam_x": unknowns, "g": constraints}
+        self._sizes |= {"lam_g": constraints, "lam_p": 0}
+        self.stop: Callable[[], bool] = lambda: False
+        self.construct("watch", {})
+
+    def get_n_in(self) -> int:
+        """Return how many results of a program it is shown."""
+        return int(casadi.nlpsol_n_out())
+
+    def get_n_out(self) -> int:
+        """Return how many answers it gives."""
+        return 1
+
+    def get_sparsity_in(self, index: int) -> Any:
+        """Return the shape of a result."""
+        return casadi.Sparsity.dense(self._sizes[casadi.nlpsol_out(index)], 1)
+
+    def eval(self, _: Any) -> list[int]:
+        """Return whether to stop."""
+        return [int(self.stop())]
