@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,18 +55,18 @@ class Margins:
         Residual of the equations of the impact, relative to the robot's weight (s m).
     """
 
-    normal_force: float
+    normal_force: float = field(metadata={"unit": "N"})
     friction_use: float
-    zero_moment_point: float
-    clearance: float
-    joint_range: float
-    torque: float
-    peak_torque: float
-    impulse: float
+    zero_moment_point: float = field(metadata={"unit": "m"})
+    clearance: float = field(metadata={"unit": "m"})
+    joint_range: float = field(metadata={"unit": "rad"})
+    torque: float = field(metadata={"unit": "Nm"})
+    peak_torque: float = field(metadata={"unit": "Nm"})
+    impulse: float = field(metadata={"unit": "Ns"})
     impulse_friction_use: float
-    impulse_center: float
-    landing_velocity: float
-    lift_velocity: float
+    impulse_center: float = field(metadata={"unit": "m"})
+    landing_velocity: float = field(metadata={"unit": "m_per_s"})
+    lift_velocity: float = field(metadata={"unit": "m_per_s"})
     touchdown_error: float
     impact_error: float
 

@@ -255,20 +255,19 @@ class Program:
 
         An elastic program starts with the violations of the guess taken up by the excesses.
         """
-        lower, upper = np.full(self.size, -np.inf), np.full(self.size, np.inf)
-        lower[-2], upper[-2] = self.request.duration_bounds
-        lower[-1], upper[-1] = self.request.length_bounds
-        start = np.clip(guess, lower, upper)
+        size, more = self.size, 2 * self._lower.size if self.elastic else 0
+        low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
+        lower = np.concatenate([np.full(size - 2, -np.inf), low, np.zeros(more)])
+        upper = np.concatenate([np.full(size - 2, np.inf), high, np.full(more, np.inf)])
+        start = np.clip(guess, lower[:size], upper[:size])
         if self.elastic:
             missing = self.violations(start)
             start = np.concatenate([start, np.maximum(missing, 0.0), np.maximum(-missing, 0.0)])
-            lower = np.concatenate([lower, np.zeros(2 * missing.size)])
-            upper = np.concatenate([upper, np.full(2 * missing.size, np.inf)])
         found, statistics = self._solver.solve(
             x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
         )
         return Solution(
-            unknowns=np.array(found["x"]).ravel()[: self.size],
+            unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
             status=str(statistics["return_status"]).replace("_", " ").lower(),
@@ -306,9 +305,8 @@ class Program:
         exact = np.flatnonzero(self._lower == self._upper).tolist()
         residual = self._constraints(x)[1][exact] - casadi.DM(self._lower[exact])
         equations = casadi.Function("equations", [x], [residual, casadi.jacobian(residual, x)])
-        free = np.ones(self.size, dtype=bool)
-        free[-2] = np.ptp(self.request.duration_bounds) > 0.0
-        free[-1] = np.ptp(self.request.length_bounds) > 0.0
+        step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
+        free = np.append(np.full(self.size - 2, True), step)
         polished = unknowns.copy()
         for _ in range(3):
             residual, jacobian = (np.array(part) for part in equations(polished))

@@ -104,8 +104,8 @@ class Request:
         self._check_step()
         self._check_margins()
         self._fill("intervals", NODES if stance.flat else MESH)
-        _whole("intervals", self.intervals, 10 if stance.flat else 4, 1000)
-        _whole("starts", self.starts, 1, 100)
+        self._check_count("intervals", 10 if stance.flat else 4, 1000)
+        self._check_count("starts", 1, 100)
 
     def _set(self, **values: Any) -> None:
         for name, value in values.items():
@@ -115,11 +115,31 @@ class Request:
         if getattr(self, name) is None:
             self._set(**{name: default})
 
+    def _check_number(self, name: str, *, positive: str = "", infinite: bool = False) -> None:
+        """Make a number a float, once it is one: not negative, or positive, of some unit."""
+        value = getattr(self, name)
+        if value is None:
+            return
+        number = isinstance(value, int | float | np.integer | np.floating)
+        fits = number and not isinstance(value, bool) and (infinite or math.isfinite(value))
+        if not fits or not (value > 0.0 if positive else value >= 0.0):
+            what = (
+                f"a positive number ({positive})" if positive else "a number that is not negative"
+            )
+            raise GaitError(f"{name} must be {what}, got {value!r}")
+        self._set(**{name: float(value)})
+
+    def _check_count(self, name: str, lowest: int, highest: int) -> None:
+        value = getattr(self, name)
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            raise GaitError(f"{name} must be a whole number, got {value!r}")
+        if not lowest <= value <= highest:
+            raise GaitError(f"{name} must be between {lowest} and {highest}, got {value}")
+
     def _check_step(self) -> None:
+        for name, unit in (("step_length", "m"), ("step_duration", "s"), ("speed", "m/s")):
+            self._check_number(name, positive=unit)
         length, duration, speed = self.step_length, self.step_duration, self.speed
-        _positive("step_length", length, "m")
-        _positive("step_duration", duration, "s")
-        _positive("speed", speed, "m/s")
         if length is not None and duration is not None and speed is not None:
             raise GaitError(
                 "step_length, step_duration and speed are all given; the speed is the length over "
@@ -153,8 +173,8 @@ class Request:
         self._fill("zmp_margin", 0.2 * stance.half_length)
         self._fill("force_margin", 0.1 * robot.weight)
         for name in ("friction", "clearance", "zmp_margin", "force_margin"):
-            _not_negative(name, getattr(self, name))
-        _positive("joint_speed_limit", self.joint_speed_limit, "rad/s", infinite=True)
+            self._check_number(name)
+        self._check_number("joint_speed_limit", positive="rad/s", infinite=True)
         if stance.flat and self.zmp_margin >= stance.half_length:
             raise GaitError(
                 f"zmp_margin = {self.zmp_margin:g} m leaves nothing of the sole, which reaches "
@@ -247,29 +267,6 @@ def _check_robot(robot: Robot) -> None:
             f"{name}: gravity is {robot.model.gravity} m/s²; a gait on level ground needs it "
             "to point down."
         )
-
-
-def _positive(name: str, value: float | None, unit: str, *, infinite: bool = False) -> None:
-    if value is None:
-        return
-    if not _is_number(value) or not (value > 0.0 and (infinite or math.isfinite(value))):
-        raise GaitError(f"{name} must be a positive number ({unit}), got {value!r}")
-
-
-def _not_negative(name: str, value: float) -> None:
-    if not _is_number(value) or not (value >= 0.0 and math.isfinite(value)):
-        raise GaitError(f"{name} must be a number that is not negative, got {value!r}")
-
-
-def _whole(name: str, value: int, lowest: int, highest: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise GaitError(f"{name} must be a whole number, got {value!r}")
-    if not lowest <= value <= highest:
-        raise GaitError(f"{name} must be between {lowest} and {highest}, got {value}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
 
 
 def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats]:

@@ -157,11 +157,11 @@ class _Kinematics:
         reference = self._robot.model.reference
         q = np.clip(reference, self._lower, self._upper)
         for j in self._inside:
-            wanted = reference[j] + bend * BENT * self._robot.model.axis[j, 0]
-            q[j] = np.clip(wanted, self._lower[j], self._upper[j])
-            if abs(q[j] - reference[j]) < 0.5 * BENT:  # a stop is in the way
-                other = reference[j] - bend * BENT * self._robot.model.axis[j, 0]
-                q[j] = np.clip(other, self._lower[j], self._upper[j])
+            for sense in (bend, -bend):  # the other one where a stop is in the way
+                wanted = reference[j] + sense * BENT * self._robot.model.axis[j, 0]
+                q[j] = np.clip(wanted, self._lower[j], self._upper[j])
+                if abs(q[j] - reference[j]) >= 0.5 * BENT:
+                    break
         return q
 
 
