@@ -43,7 +43,7 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
      "memory.slip[contact] = -row_product("),
     ("control/computed_torque.py", "        force[j] -= passive[j]\n", "        pass\n"),
     ("control/point_feet.py", "        force[j] -= passive[j]\n", "        pass\n"),
-    ("gait/support.py", " - model.contact_radius[contact]", ""),
+    ("gait/support.py", " - self.robot.model.contact_radius[contact]", ""),
     ("gait/support.py", "center - np.array([0.0, sole.radius])", "center"),
 )  # fmt: skip
 

@@ -6,12 +6,4 @@ from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.optimize import optimize_gait
 
-__all__ = [
-    "ClearanceProfile",
-    "Footing",
-    "Gait",
-    "Margins",
-    "Phase",
-    "load_gait",
-    "optimize_gait",
-]
+__all__ = ["ClearanceProfile", "Footing", "Gait", "Margins", "Phase", "load_gait", "optimize_gait"]

@@ -33,14 +33,12 @@ def nearest_to_feasible(program: Program) -> Floats:
         If some violation always remains; the message names the constraints in conflict.
     """
     elastic = program.relaxed()
-    nearest: Solution | None = None
+    found = []
     for start in islice(starts(program.request), ATTEMPTS):
-        solution = elastic.solve(program.sampled(start))
-        if np.abs(program.violations(solution.unknowns)).max() <= FEASIBLE:
-            return solution.unknowns
-        if nearest is None or solution.objective < nearest.objective:
-            nearest = solution
-    assert nearest is not None
+        found.append(elastic.solve(program.sampled(start)))
+        if np.abs(program.violations(found[-1].unknowns)).max() <= FEASIBLE:
+            return found[-1].unknowns
+    nearest = min(found, key=lambda solution: solution.objective)
     raise InfeasibleGaitError(_message(program, nearest))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -135,10 +136,8 @@ def optimize_gait(
     transcription = Transcription(request)
     *others, last = request.profiles
     for profile in others:
-        try:
+        with suppress(InfeasibleGaitError):  # the last profile asks least of the swing foot
             return _designed(transcription, profile, report)
-        except InfeasibleGaitError:
-            continue  # the last profile asks least of the swing foot
     return _designed(transcription, last, report)
 
 
@@ -197,17 +196,13 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
     """Gait with the given unknowns, its joints in the order of the actuators."""
     transcription, request = program.transcription, program.request
     robot, stance = request.robot, request.stance
-    mirror, reference = robot.mirror, robot.model.reference
+    mirror, joint = robot.mirror, robot.model.actuator_joint
     assert mirror is not None
-    joint = robot.model.actuator_joint
-    actuator_of = {int(j): k for k, j in enumerate(joint)}
-    offset = reference - mirror.sign * reference[mirror.joint]
     pieces = program.pieces(unknowns)
-    end, end_velocity, start_velocity, duration, length = program.at_touchdown(unknowns)
-    landing = transcription.landing(end, end_velocity, start_velocity)[0]
+    end, _, start_velocity, duration, length = touchdown = program.at_touchdown(unknowns)
     impulse = np.zeros(3)
     if request.impact:
-        impulse[: stance.held] = np.array(landing).ravel()
+        impulse[: stance.held] = np.array(transcription.landing(*touchdown[:3])[0]).ravel()
     state = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
     phase = Phase(
         contacts={stance.foot: Footing.FLAT if stance.flat else Footing.POINT},
@@ -221,9 +216,9 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
         joint_names=actuated_joints(robot),
         step_length=float(length),
         phases=(phase,),
-        mirror_joint=np.array([actuator_of[int(mirror.joint[j])] for j in joint]),
+        mirror_joint=np.argsort(joint)[mirror.joint[joint] - 3],
         mirror_sign=mirror.sign[joint],
-        mirror_offset=offset[joint],
+        mirror_offset=mirror.position(np.zeros(robot.nv), robot.model.reference)[joint],
         initial_state=State(*state),
         cost=program.effort(unknowns),
         friction=request.friction,

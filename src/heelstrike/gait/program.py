@@ -82,17 +82,14 @@ class Solution:
         Whether it is an optimum within the tolerance.
     status : str
         IPOPT's own word for how it ended.
-    iterations : int
-        Number of iterations.
     multipliers : (m,) float
-        Multipliers of the scaled constraints, in the order of :meth:`Program.values`.
+        Multipliers of the scaled constraints, in the order of :meth:`Program.labelled_rows`.
     """
 
     unknowns: Floats
     objective: float
     converged: bool
     status: str
-    iterations: int
     multipliers: Floats
 
 
@@ -271,7 +268,6 @@ class Program:
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
             status=str(statistics["return_status"]).replace("_", " ").lower(),
-            iterations=int(statistics["iter_count"]),
             multipliers=np.array(found["lam_g"]).ravel(),
         )
 

@@ -28,6 +28,9 @@ NODES = 26
 MESH = 12
 """Default intervals of the mesh of a step on point feet."""
 
+STEP_UNITS = {"step_length": "m", "step_duration": "s", "speed": "m/s"}
+"""What may be asked of a step."""
+
 SHORTEST, LONGEST = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
 SHORTEST_FREE, LONGEST_FREE = 0.5, 8.0
@@ -137,7 +140,7 @@ class Request:
             raise GaitError(f"{name} must be between {lowest} and {highest}, got {value}")
 
     def _check_step(self) -> None:
-        for name, unit in (("step_length", "m"), ("step_duration", "s"), ("speed", "m/s")):
+        for name, unit in STEP_UNITS.items():
             self._check_number(name, positive=unit)
         length, duration, speed = self.step_length, self.step_duration, self.speed
         if length is not None and duration is not None and speed is not None:
@@ -211,15 +214,8 @@ class Request:
         return self.step_length is None or self.step_duration is None
 
     def __str__(self) -> str:
-        asked = [
-            f"{name} = {value:g} {unit}"
-            for name, value, unit in (
-                ("step_length", self.step_length, "m"),
-                ("step_duration", self.step_duration, "s"),
-                ("speed", self.speed, "m/s"),
-            )
-            if value is not None
-        ]
+        given = [name for name in STEP_UNITS if getattr(self, name) is not None]
+        asked = [f"{name} = {getattr(self, name):g} {STEP_UNITS[name]}" for name in given]
         return ", ".join([*asked, f"friction = {self.friction:g}"])
 
 

@@ -119,15 +119,18 @@ def _tangent_angles(difference: Floats, radii: float) -> list[float]:
     return [float(a) for a in np.arctan2(np.sin(angles), np.cos(angles))]
 
 
+def leg(robot: Robot, foot: Sole) -> list[int]:
+    """Links from a foot up, without those of the trunk's coordinates."""
+    links = [foot.link]
+    while (parent := int(robot.model.parent[links[-1]])) > 2:
+        links.append(parent)
+    return links
+
+
 def standing_height(robot: Robot, stance: Sole) -> float:
     """Height of the trunk above a sole in the reference configuration, in m."""
-    model = robot.model
-    link = stance.link
     ground = np.array(_rotated(stance.point, stance.angle)) - [0.0, stance.radius]
-    while link > 2:
-        ground += model.offset[link]
-        link = model.parent[link]
-    height = -float(ground[1])
+    height = -float(ground[1] + robot.model.offset[leg(robot, stance), 1].sum())
     if not height > 0.0:
         raise GaitError(
             f"robot {robot.name!r}: in its reference configuration the trunk is not above the "
@@ -139,27 +142,11 @@ def standing_height(robot: Robot, stance: Sole) -> float:
 def reach(robot: Robot, feet: tuple[Sole, Sole], lower: Floats, upper: Floats) -> float:
     """Distance of the feet with both legs in one line, an upper bound of any step (m)."""
     model = robot.model
-    chains = []
-    for foot in feet:
-        chain = []
-        link = foot.link
-        while link >= 0:
-            chain.append(link)
-            link = int(model.parent[link])
-        chains.append(chain)
-    common = set(chains[0]) & set(chains[1])
-    total = 0.0
-    hips = []
-    for chain in chains:
-        for link in chain:
-            if link in common:
-                break
-            # The last offset is from the trunk to the hip: only the distance of the hips counts.
-            if model.parent[link] in common:
-                hips.append(model.offset[link])
-            else:
-                total += float(np.hypot(*model.offset[link]))
-            if model.axis[link, 0] == 0.0:
-                span = np.abs([lower[link], upper[link]] - model.reference[link])
-                total += float(span.max())
-    return total + float(np.hypot(*(hips[0] - hips[1])))
+    right, left = (leg(robot, foot) for foot in feet)
+    own = [[j for j in right if j not in left], [j for j in left if j not in right]]
+    # The last offset is from the trunk to the hip: only the distance of the hips counts.
+    hips = model.offset[own[0][-1]] - model.offset[own[1][-1]]
+    lengths = np.linalg.norm(model.offset[own[0][:-1] + own[1][:-1]], axis=1)
+    slides = [j for j in own[0] + own[1] if model.axis[j, 0] == 0.0]
+    spans = np.abs(np.array([lower[slides], upper[slides]]) - model.reference[slides])
+    return float(lengths.sum() + np.hypot(*hips) + spans.max(axis=0).sum())

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics.symbolic import TracedDynamics, symbols
 from heelstrike.gait.request import Request
-from heelstrike.gait.sole import Sole
+from heelstrike.gait.sole import leg
 
 Floats = NDArray[np.float64]
 
@@ -114,7 +114,10 @@ class _Kinematics:
             "places", [q], [places_vector, casadi.jacobian(places_vector, q)]
         )
         self._lower, self._upper = request.lower, request.upper
-        self._inside = [*_inside(request, request.stance), *_inside(request, request.swing)]
+        self._inside: list[int] = []  # hinges between hip and foot, or to a foot that is a point
+        for foot in (request.stance, request.swing):
+            hinges = [j for j in leg(robot, foot) if robot.model.axis[j, 0] != 0.0]
+            self._inside += hinges[1 if foot.flat else 0 : -1]
 
     @property
     def bend_is_free(self) -> bool:
@@ -163,15 +166,3 @@ class _Kinematics:
                 if abs(q[j] - reference[j]) >= 0.5 * BENT:
                     break
         return q
-
-
-def _inside(request: Request, foot: Sole) -> list[int]:
-    """Hinges of a leg between hip and foot, and that of a foot which is a point: its knees."""
-    model = request.robot.model
-    chain = []
-    link = foot.link
-    while link > 2:
-        if model.axis[link, 0] != 0.0:
-            chain.append(int(link))
-        link = int(model.parent[link])
-    return chain[1 if foot.flat else 0 : -1]

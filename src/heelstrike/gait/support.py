@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.symbolic import TracedDynamics, traced
-from heelstrike.gait.sole import Sole
+from heelstrike.gait.sole import Sole, leg
 from heelstrike.robot.robot import Robot
 
 Symbols = NDArray[np.object_]
@@ -110,17 +110,18 @@ class Support:
 
     def height(self, contact: int) -> Any:
         """Height of the lowest point of a contact disc."""
-        model = self.robot.model
-        link, local = int(model.contact_link[contact]), model.contact_position[contact]
-        center = self._dynamics.point_position(link, local)
-        return center[1] - self._origin[1] - model.contact_radius[contact]
+        _, center = self._disc(contact)
+        return center[1] - self._origin[1] - self.robot.model.contact_radius[contact]
 
     def rise(self, contact: int, v: Symbols) -> Any:
         """Vertical velocity of a contact disc when the robot moves with velocity `v`, (nv,)."""
+        return self._dynamics.point_jacobian(*self._disc(contact))[1] @ v
+
+    def _disc(self, contact: int) -> tuple[int, Symbols]:
+        """Link of a contact disc, and its centre."""
         model = self.robot.model
-        link, local = int(model.contact_link[contact]), model.contact_position[contact]
-        center = self._dynamics.point_position(link, local)
-        return self._dynamics.point_jacobian(link, center)[1] @ v
+        link = int(model.contact_link[contact])
+        return link, self._dynamics.point_position(link, model.contact_position[contact])
 
     def mass_matrix(self) -> Symbols:
         """Mass matrix A(q), (nv, nv)."""
@@ -165,12 +166,7 @@ class Impact:
 def foot_angle(robot: Robot, sole: Sole, q: Symbols) -> Any:
     """Rotation about +y that the joints between trunk and foot make up."""
     model = robot.model
-    angle: Any = 0.0
-    link = sole.link
-    while link > 2:
-        angle = angle + model.axis[link, 0] * (q[link] - model.reference[link])
-        link = model.parent[link]
-    return angle
+    return sum(model.axis[link, 0] * (q[link] - model.reference[link]) for link in leg(robot, sole))
 
 
 def _posture(robot: Robot, sole: Sole, position: Symbols) -> Symbols:
