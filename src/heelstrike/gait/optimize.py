@@ -127,9 +127,9 @@ def optimize_gait(
     >>> gait.position([0.0, 0.35]).shape
     (2, 6)
     """
-    asked = {name: value for name, value in locals().items() if name != "progress"}
+    asked = dict(locals())  # all arguments, by name
+    report = _Forward(asked.pop("progress"))
     request = Request(**asked)
-    report = _Forward(progress)
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
     from heelstrike.gait.transcription import Transcription
 

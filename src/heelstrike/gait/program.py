@@ -9,6 +9,7 @@ from typing import Any
 
 import casadi
 import numpy as np
+import scipy.sparse.linalg
 from numpy.typing import NDArray
 
 from heelstrike.gait.clearance import ClearanceProfile
@@ -29,6 +30,8 @@ POINTS = 4
 PRICE_OF_EQUATIONS = 1000.0
 """Price of violating an equation in an elastic program; that of an inequality is 1. Equations say
 what a periodic step is, so that they give way last."""
+SHIFT = 1e-12
+"""Added to the squares of the singular values of equations (scaled) that may be dependent."""
 RESERVE = 1e-6
 """Scaled distance kept from every bound along the path, for the time between the instants."""
 
@@ -305,8 +308,13 @@ class Program:
         free = np.append(np.full(self.size - 2, True), step)
         polished = unknowns.copy()
         for _ in range(3):
-            residual, jacobian = (np.array(part) for part in equations(polished))
-            polished[free] -= np.linalg.lstsq(jacobian[:, free], residual.ravel(), rcond=None)[0]
+            missing, slope = equations(polished)
+            rows = slope.sparse()[:, free]
+            # Equations may depend on each other: then, and only then, does the shift matter.
+            normal = rows @ rows.T + SHIFT * scipy.sparse.identity(len(exact), format="csc")
+            polished[free] -= rows.T @ scipy.sparse.linalg.spsolve(
+                normal, np.array(missing).ravel()
+            )
         return polished
 
 
