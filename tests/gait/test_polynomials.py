@@ -9,37 +9,49 @@ from numpy.polynomial.polynomial import polyval
 from heelstrike.gait.polynomials import (
     Instants,
     coefficients,
+    cubic,
     evaluated,
     gauss,
     lobatto,
     shape_functions,
 )
 
-ENDS = np.random.default_rng(3).normal(size=(4, 6))  # position, velocity; at either end
+DRAW = np.random.default_rng(3)
+POSITIONS, VELOCITIES = DRAW.normal(size=(2, 2, 6))  # at either end
 DURATION = 0.7
 
 
-@pytest.mark.parametrize("degree", [3, 5])
-def test_ends_are_met_whatever_the_rest(degree: int) -> None:
-    rest = np.random.default_rng(4).normal(size=(degree - 3, 6))
-    pieces = coefficients(np.vstack([ENDS, rest]), DURATION)[None]
-    for t, ends in ((0.0, ENDS[:2]), (DURATION, ENDS[2:])):
-        for order in (0, 1):
-            found = evaluated(pieces, np.array([0.0, DURATION]), np.asarray(t), order)
-            np.testing.assert_allclose(found, ends[order], atol=1e-13)
+def test_ends_of_a_cubic_are_met() -> None:
+    pieces, ends = cubic(POSITIONS, VELOCITIES, DURATION)[None], np.array([0.0, DURATION])
+    for order, expected in enumerate((POSITIONS, VELOCITIES)):
+        found = evaluated(pieces, ends, ends, order)
+        np.testing.assert_allclose(found, expected, atol=1e-14)
 
 
-def test_coefficients_are_those_of_the_papers_matrix() -> None:
+def test_coefficients_of_a_cubic_are_those_of_the_papers_matrix() -> None:
     T = DURATION
     printed = np.array(
         [
             [1.0, 0.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0, 0.0],
-            [-3.0 / T**2, -2.0 / T, 3.0 / T**2, -1.0 / T],
-            [2.0 / T**3, 1.0 / T**2, -2.0 / T**3, 1.0 / T**2],
+            [0.0, 0.0, 1.0, 0.0],
+            [-3.0 / T**2, 3.0 / T**2, -2.0 / T, -1.0 / T],
+            [2.0 / T**3, -2.0 / T**3, 1.0 / T**2, 1.0 / T**2],
         ]
     )
-    np.testing.assert_allclose(coefficients(ENDS, T), printed @ ENDS, rtol=1e-13, atol=1e-13)
+    found = cubic(POSITIONS, VELOCITIES, T)
+    expected = printed @ np.vstack([POSITIONS, VELOCITIES])
+    np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
+
+
+def test_a_piece_begins_where_it_should_and_accelerates_by_legendre_polynomials() -> None:
+    values = DRAW.normal(size=(6, 4))  # degree 5
+    pieces, breakpoints = coefficients(values, DURATION)[None], np.array([0.0, DURATION])
+    times = DURATION * np.array([0.0, 0.2, 1.0])
+    for order in (0, 1):
+        found = evaluated(pieces, breakpoints, times, order)[0]
+        np.testing.assert_allclose(found, values[order], atol=1e-14)
+    expected = np.polynomial.legendre.legval(2.0 * times / DURATION - 1.0, values[2:]).T
+    np.testing.assert_allclose(evaluated(pieces, breakpoints, times, 2), expected, atol=1e-12)
 
 
 def test_shape_functions_make_up_every_polynomial_of_their_degree() -> None:
@@ -71,7 +83,7 @@ def test_derivatives_are_those_of_the_polynomials() -> None:
 
 def test_straight_motion_has_no_acceleration() -> None:
     slope = np.array([0.3, -2.0])
-    line = coefficients(np.array([0.0 * slope, slope, slope * DURATION, slope]), DURATION)[None]
+    line = cubic([0.0 * slope, slope * DURATION], [slope, slope], DURATION)[None]
     ends, t = np.array([0.0, DURATION]), np.asarray(0.31)
     np.testing.assert_allclose(evaluated(line, ends, t, 2), 0.0, atol=1e-14)
     np.testing.assert_allclose(evaluated(line, ends, t, 0), slope * 0.31, atol=1e-15)

@@ -72,7 +72,9 @@ def a_step(seed: int) -> tuple[np.ndarray, SimpleNamespace]:
     gait = SimpleNamespace(
         stance_foot=0, position=motion(0), velocity=motion(1), acceleration=motion(2)
     )
-    return np.concatenate([end, start_velocity, end_velocity, [duration, 0.25]]), gait
+    # The acceleration 2 a2 + 6 a3 t in parts that are 1 and that go from -1 to 1.
+    mean, rise = 2.0 * cubic[2] + 3.0 * duration * cubic[3], 3.0 * duration * cubic[3]
+    return np.concatenate([end, start_velocity, mean, rise, [duration, 0.25]]), gait
 
 
 def path_values(

@@ -20,7 +20,7 @@ from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, fingerprint
 from heelstrike.gait.margins import Margins
-from heelstrike.gait.polynomials import coefficients
+from heelstrike.gait.polynomials import cubic
 from heelstrike.json_checksum import read_json, require_unchanged, shown, with_checksum
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -172,12 +172,9 @@ class _Reader:
         duration = self.number("step_duration_s")
         if not duration > 0.0:
             raise self.error("step_duration must be positive")
-        ends = [
-            self.vector(f"{end}_{key}", nu)
-            for end in ("start", "end")
-            for key in ("position_rad", "velocity_rad_per_s")
-        ]
-        pieces = coefficients(np.stack(ends), duration)[None]
+        positions = [self.vector(f"{end}_position_rad", nu) for end in ("start", "end")]
+        velocities = [self.vector(f"{end}_velocity_rad_per_s", nu) for end in ("start", "end")]
+        pieces = cubic(positions, velocities, duration)[None]
         breakpoints = np.array([0.0, duration])
         contacts = {foot: Footing.FLAT}
         return self.made(Phase, contacts=contacts, breakpoints=breakpoints, pieces=pieces)

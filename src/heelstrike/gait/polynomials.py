@@ -1,11 +1,8 @@
-"""Piecewise polynomials, each fixed by the positions and velocities at its ends (paper eq. 41-43).
-
-A piece of degree three is fixed by its ends alone. Of a higher degree, the rest is free: multiples
-of functions that vanish with their slopes at both ends, so that pieces always join smoothly.
-"""
+"""Piecewise polynomials (paper eq. 41-43), and the instants at which a program looks at them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -18,36 +15,53 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+def cubic(positions: Sequence[Floats], velocities: Sequence[Floats], duration: float) -> Floats:
+    """Coefficients a0 … a3 of the cubics with given ends (paper eq. 43).
+
+    Parameters
+    ----------
+    positions, velocities : two (n,) arrays
+        Positions and velocities at t = 0 and t = `duration`.
+    duration : float
+        Length T of the interval, in s.
+
+    Returns
+    -------
+    (4, n) array
+        Coefficients, lowest first.
+    """
+    (start, end), (before, after) = positions, velocities
+    slope = (end - start) / duration
+    bend = (3.0 * slope - 2.0 * before - after) / duration
+    return np.stack([start, before, bend, (before + after - 2.0 * slope) / duration**2])
+
+
 @cache
 def shape_functions(degree: int) -> Floats:
     """Coefficients, lowest first, of the functions that make up a piece on [0, 1], by columns.
 
-    The first four go with the position and velocity at the beginning and with those at the end
-    (eq. 43 with T = 1). The others are (u (1 - u))² times a Legendre polynomial.
+    The first two go with the position and the velocity at the beginning. The others are Legendre
+    polynomials integrated twice: they go with parts of the acceleration, so that no digits are
+    lost between positions that are close to each other.
 
     Returns
     -------
     (degree + 1, degree + 1) array
     """
-    columns = [[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]]
-    functions = [Polynomial(column) for column in columns]
-    for order in range(degree - 3):
-        factor = Legendre.basis(order, domain=[0, 1]).convert(kind=Polynomial)
-        functions.append(Polynomial([0, 1, -1]) ** 2 * factor)
-    matrix = np.zeros((degree + 1, degree + 1))
-    for k, function in enumerate(functions):
-        matrix[: len(function.coef), k] = function.coef
+    matrix = np.eye(degree + 1)
+    for order in range(degree - 1):
+        part = Legendre.basis(order, domain=[0, 1]).convert(kind=Polynomial).integ(2)
+        matrix[: part.coef.size, order + 2] = part.coef
     return matrix
 
 
 def coefficients(values: Floats, duration: float) -> Floats:
-    """Coefficients of pieces in the time since the beginning of each (paper eq. 43).
+    """Coefficients of pieces in the time since the beginning of each.
 
     Parameters
     ----------
     values : (..., d + 1, n) array
-        Position and velocity at the beginning, position and velocity at the end, and the multiples
-        of the remaining shape functions, as accelerations, of n coordinates.
+        Position and velocity at the beginning, and the parts of the acceleration, of n coordinates.
     duration : float
         Duration of a piece, in s.
 
@@ -56,11 +70,9 @@ def coefficients(values: Floats, duration: float) -> Floats:
     (..., d + 1, n) array
         Coefficients, lowest first.
     """
-    size = values.shape[-2]
-    scale = np.ones((size, 1))
-    scale[[1, 3]], scale[4:] = duration, duration**2
-    powers = duration ** np.arange(size)[:, None]
-    result: Floats = (shape_functions(size - 1) @ (scale * values)) / powers
+    order = np.arange(values.shape[-2])[:, None]
+    scaled = duration ** np.minimum(order, 2) * values
+    result: Floats = (shape_functions(order.size - 1) @ scaled) / duration**order
     return result
 
 

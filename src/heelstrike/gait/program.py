@@ -99,10 +99,10 @@ class Solution:
 class Program:
     """The program on a mesh of equal pieces.
 
-    Unknowns are, of all free coordinates, the positions at the end of every piece, the velocities
-    at the beginning of the step and the end of every piece, and the multiples of the remaining
-    shape functions; then the step's duration and length. The positions at its beginning are the
-    mirror image of those at its end.
+    Unknowns are, of all free coordinates, the positions at the end and the velocities at the
+    beginning of every piece, and the parts of its acceleration; then the step's duration and
+    length. The positions at its beginning are the mirror image of those at its end. Where a piece
+    ends, the next one begins: those equations always hold, also in an elastic program.
 
     Parameters
     ----------
@@ -136,15 +136,16 @@ class Program:
         self.instants = instants
         self.elastic = elastic
         n, pieces = transcription.size, instants.pieces
-        sizes = [n * pieces, n * (pieces + 1), n * pieces * (degree - 3), 1, 1]
-        self._ends = [0, *np.cumsum(sizes).tolist()]
+        self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
+        sizes = [n * pieces, n * pieces, n * pieces * (degree - 1), 1, 1]
+        self._places = [0, *np.cumsum(sizes).tolist()]
         self._lower, self._upper = self._bounds()
         self._build()
 
     @property
     def size(self) -> int:
         """Number of unknowns."""
-        return int(self._ends[-1])
+        return int(self._places[-1])
 
     def refined(self, instants: Instants) -> Program:
         """Return the same program with more instants."""
@@ -184,7 +185,7 @@ class Program:
         return rows
 
     def _bounds(self) -> tuple[Floats, Floats]:
-        """Scaled bounds of all constraints: those at touchdown, then instant by instant."""
+        """Scaled bounds of the constraints: those at touchdown, then instant by instant."""
         touchdown = self.transcription.touchdown_rows
         lower, upper = self.path_bounds(self.instants)
         reserve = np.minimum(RESERVE, 0.5 * (upper - lower))
@@ -194,21 +195,20 @@ class Program:
         )
 
     def _parts(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
-        """Positions and velocities at the ends of the pieces, the rest, duration and length."""
+        """Positions, velocities and parts of the acceleration, (n, ...); duration and length."""
         if isinstance(unknowns, np.ndarray):
             unknowns = casadi.DM(unknowns)
-        n, pieces = self.transcription.size, self.instants.pieces
-        ends = self._ends
-        q, v, rest, duration, length = (unknowns[begin:end] for begin, end in pairwise(ends))
-        q, v = casadi.reshape(q, n, pieces), casadi.reshape(v, n, pieces + 1)
+        n = self.transcription.size
+        q, v, a, duration, length = (unknowns[k:end] for k, end in pairwise(self._places))
+        q, v, a = (casadi.reshape(part, n, -1) for part in (q, v, a))
         start, _ = self.transcription.mirror(q[:, -1], v[:, 0])
-        return casadi.horzcat(start, q), v, casadi.reshape(rest, n, -1), duration, length
+        return casadi.horzcat(start, q), v, a, duration, length
 
     def along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:
         """Positions, velocities and accelerations at instants, (n, N) each."""
-        q, v, rest, duration, _ = self._parts(unknowns)
+        q, v, a, duration, _ = self._parts(unknowns)
         h = duration / instants.pieces
-        values = casadi.horzcat(q[:, :-1], h * v[:, :-1], q[:, 1:], h * v[:, 1:], h**2 * rest)
+        values = casadi.horzcat(q[:, :-1], h * v, h**2 * a)
         position, velocity, acceleration = (
             values @ casadi.sparsify(casadi.DM(instants.matrix(self.degree, order)))
             for order in range(3)
@@ -222,25 +222,26 @@ class Program:
     def at_touchdown(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
         """Return q(T), v(T), v(0), duration and length, as the transcription takes them."""
         q, v, _, duration, length = self._parts(unknowns)
-        return q[:, -1], v[:, -1], v[:, 0], duration, length
+        _, ends, _ = self.along(unknowns, self._ends)
+        return q[:, -1], ends[:, -1], v[:, 0], duration, length
 
     def effort(self, unknowns: Floats) -> float:
         """∫ΓᵀΓ dt over the step, in N²m²s."""
-        return float(self._constraints(unknowns)[0])
+        return float(self._evaluated(unknowns)[0])
 
     def pieces(self, unknowns: Floats) -> Floats:
         """Coefficients of the free coordinates in the time of each piece, (K, degree + 1, n)."""
         n, count = self.transcription.size, self.instants.pieces
-        q, v, rest, duration, _ = (np.array(part) for part in self._parts(unknowns))
-        blocks = [q[:, :-1], v[:, :-1], q[:, 1:], v[:, 1:], rest]
-        values = np.concatenate(blocks, axis=1).reshape(n, self.degree + 1, count)
+        q, v, a, duration, _ = (np.array(part) for part in self._parts(unknowns))
+        values = np.concatenate([q[:, :-1], v, a], axis=1).reshape(n, self.degree + 1, count)
         return coefficients(values.transpose(2, 1, 0), float(duration[0, 0]) / count)
 
     def _build(self) -> None:
         total = self._lower.size
         unknowns = casadi.MX.sym("unknowns", self.size + (2 * total if self.elastic else 0))
         x = unknowns[: self.size]
-        f, g = self._constraints(x)
+        f, joined, g = self._evaluated(x)
+        self._joined = joined.numel()
         if self.request.free_step:
             f = f / x[-1]
         if self.elastic:
@@ -248,7 +249,8 @@ class Program:
             low, high = unknowns[self.size : -total], unknowns[-total:]
             price = np.where(self._lower == self._upper, PRICE_OF_EQUATIONS, 1.0)
             f, g = casadi.dot(price, low + high), g + low - high
-        self._solver = Ipopt({"x": unknowns, "f": f, "g": g}, SETTINGS)
+        problem = {"x": unknowns, "f": f, "g": casadi.vertcat(joined, g)}
+        self._solver = Ipopt(problem, SETTINGS)
 
     def solve(self, guess: Floats) -> Solution:
         """Solve from a guess of the unknowns.
@@ -264,45 +266,53 @@ class Program:
             missing = self.violations(start)
             start = np.concatenate([start, np.maximum(missing, 0.0), np.maximum(-missing, 0.0)])
         found, statistics = self._solver.solve(
-            x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
+            x0=start,
+            lbx=lower,
+            ubx=upper,
+            lbg=np.append(np.zeros(self._joined), self._lower),
+            ubg=np.append(np.zeros(self._joined), self._upper),
         )
         return Solution(
             unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
             status=str(statistics["return_status"]).replace("_", " ").lower(),
-            multipliers=np.array(found["lam_g"]).ravel(),
+            multipliers=np.array(found["lam_g"]).ravel()[self._joined :],
         )
 
     def sampled(self, start: Start) -> Floats:
         """Unknowns of a motion to start from."""
-        ends = np.arange(self.instants.pieces + 1) / self.instants.pieces
-        q, v = start.motion(ends)
-        rest = np.zeros(self._ends[3] - self._ends[2])
-        return np.concatenate(
-            [q[:, 1:].ravel(order="F"), v.ravel(order="F"), rest, [start.duration, start.length]]
-        )
+        q, v, a = start.motion(np.linspace(0.0, 1.0, self.instants.pieces + 1))
+        rest = np.zeros(self._places[3] - self._places[2])
+        rest[: v[:, 1:].size] = a[:, 1:].ravel(order="F")
+        parts = [part.ravel(order="F") for part in (q[:, 1:], v[:, :-1], rest)]
+        return np.concatenate([*parts, [start.duration, start.length]])
 
-    def _constraints(self, x: Any) -> tuple[Any, Any]:
-        """Effort and scaled values of all constraints: at touchdown, then instant by instant."""
+    def _evaluated(self, x: Any) -> tuple[Any, Any, Any]:
+        """Effort, gaps between the pieces, and scaled values of the constraints."""
+        q, v, _, _, _ = self._parts(x)
+        q_end, v_end, _ = self.along(x, self._ends)
+        gaps = casadi.veccat(q[:, 1:] - q_end, v[:, 1:] - v_end[:, :-1])
         count = self.instants.share.size
         effort, along = self.transcription.path.map(count)(*self.along(x, self.instants))
         touchdown = self.transcription.touchdown(*self.at_touchdown(x))
         return (
             x[-2] * (effort @ casadi.DM(self.instants.weight)),
+            gaps,
             casadi.vertcat(touchdown, casadi.vec(along)),
         )
 
     def violations(self, unknowns: Floats) -> Floats:
-        """Scaled distances of all constraints outside of their bounds; positive if too low."""
-        values = np.array(self._constraints(unknowns)[1]).ravel()
+        """Scaled distances of the constraints outside of their bounds; positive if too low."""
+        values = np.array(self._evaluated(unknowns)[2]).ravel()
         return np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
 
     def polished(self, unknowns: Floats) -> Floats:
         """Satisfy the equations to rounding, by the least change of the unknowns."""
         x = casadi.MX.sym("x", self.size)
         exact = np.flatnonzero(self._lower == self._upper).tolist()
-        residual = self._constraints(x)[1][exact] - casadi.DM(self._lower[exact])
+        _, gaps, values = self._evaluated(x)
+        residual = casadi.vertcat(gaps, values[exact] - casadi.DM(self._lower[exact]))
         equations = casadi.Function("equations", [x], [residual, casadi.jacobian(residual, x)])
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)
@@ -311,7 +321,7 @@ class Program:
             missing, slope = equations(polished)
             rows = slope.sparse()[:, free]
             # Equations may depend on each other: then, and only then, does the shift matter.
-            normal = rows @ rows.T + SHIFT * scipy.sparse.identity(len(exact), format="csc")
+            normal = rows @ rows.T + SHIFT * scipy.sparse.identity(residual.numel(), format="csc")
             polished[free] -= rows.T @ scipy.sparse.linalg.spsolve(
                 normal, np.array(missing).ravel()
             )

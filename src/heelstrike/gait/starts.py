@@ -49,12 +49,13 @@ class Start:
     duration: float
     length: float
 
-    def motion(self, phases: Floats) -> tuple[Floats, Floats]:
-        """Positions and velocities at phases of the step, (n, N) each."""
+    def motion(self, phases: Floats) -> tuple[Floats, Floats, Floats]:
+        """Positions, velocities and accelerations at phases of the step, (n, N) each."""
         begin, middle, end = (part[:, None] for part in (self.begin, self.middle, self.end))
         bow = 4.0 * (middle - 0.5 * (begin + end))
         position = begin + phases * (end - begin) + phases * (1.0 - phases) * bow
-        return position, (end - begin + (1.0 - 2.0 * phases) * bow) / self.duration
+        velocity = (end - begin + (1.0 - 2.0 * phases) * bow) / self.duration
+        return position, velocity, (0.0 * phases - 2.0) * bow / self.duration**2
 
 
 def starts(request: Request) -> Iterator[Start]:
