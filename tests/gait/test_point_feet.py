@@ -227,7 +227,8 @@ def test_file_keeps_every_digit(walker: tuple[hs.Robot, hs.Gait], tmp_path: Path
         ("joint_pieces", [[1.0]], "for every piece"),
         ("joint_pieces", [[["1"]]], "must be a number"),
         ("pitch_pieces", [[0.0] * 6], "pitch_pieces must have shape"),
-        ("pitch_pieces", 0.0, "for every piece"),
+        ("pitch_pieces", None, '"pitch_pieces" is missing'),
+        ("pitch_pieces", 0.0, "pitch_pieces must have shape"),
         ("breakpoints_s", [0.0, 0.6], "2 breakpoints need pieces"),
     ],
 )

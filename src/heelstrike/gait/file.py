@@ -161,14 +161,13 @@ class _Reader:
         feet = {key: contacts.member(key, Footing) for key in contacts.data}
         if not feet or not set(feet) <= {"0", "1"}:
             raise self.error(f'"contacts" must name feet "0" or "1", got {shown(list(feet))}')
-        pitch = ("pitch_pieces",) if "pitch_pieces" in self.data else ()
-        return self.piecewise({int(foot): feet[foot] for foot in feet}, nu, *pitch)
+        return self.piecewise({int(foot): feet[foot] for foot in feet}, nu)
 
     def only_phase(self, nu: int) -> Phase:
         """What a file of version 1 says of the motion."""
         foot = self.whole("stance_foot", self.number("stance_foot"))
         if {"breakpoints_s", "joint_pieces", "pitch_pieces"} & set(self.data):
-            return self.piecewise({foot: Footing.POINT}, nu, "pitch_pieces")
+            return self.piecewise({foot: Footing.POINT}, nu)
         duration = self.number("step_duration_s")
         if not duration > 0.0:
             raise self.error("step_duration must be positive")
@@ -179,22 +178,16 @@ class _Reader:
         contacts = {foot: Footing.FLAT}
         return self.made(Phase, contacts=contacts, breakpoints=breakpoints, pieces=pieces)
 
-    def piecewise(self, contacts: dict[int, Footing], nu: int, *pitch: str) -> Phase:
-        breakpoints, pieces = self.table("breakpoints_s"), self.table("joint_pieces")
-        pitches = [self.table(key) for key in pitch]
-        shapes = [breakpoints.ndim, pieces.ndim, *(each.ndim for each in pitches)]
-        if shapes != [1, 3, 2][: len(shapes)] or pieces.shape[2] != nu:
+    def piecewise(self, contacts: dict[int, Footing], nu: int) -> Phase:
+        values = {"breakpoints": self.table("breakpoints_s"), "pieces": self.table("joint_pieces")}
+        if "pitch_pieces" in self.data or Footing.FLAT not in contacts.values():
+            values["pitch_pieces"] = self.table("pitch_pieces")
+        if values["breakpoints"].ndim != 1 or values["pieces"].shape[2:] != (nu,):
             raise self.error(
                 f'"joint_pieces" must hold a list of coefficients of {nu} joints for every piece, '
-                '"pitch_pieces" a list of coefficients, "breakpoints_s" the times between them'
+                '"breakpoints_s" the times between them'
             )
-        return self.made(
-            Phase,
-            contacts=contacts,
-            breakpoints=breakpoints,
-            pieces=pieces,
-            pitch_pieces=pitches[0] if pitches else None,
-        )
+        return self.made(Phase, contacts=contacts, **values)
 
     def table(self, key: str) -> NDArray[np.float64]:
         """Numbers in lists of lists, all of the same length."""

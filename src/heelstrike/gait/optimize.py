@@ -48,9 +48,10 @@ def optimize_gait(
 
     Every actuated joint follows one cubic polynomial a step; every step mirrors the one before
     (eq. 13). The robot always stands on one flat foot (eq. 11), in single support. The unknowns
-    are joint positions and velocities at the ends of the step. Where length and duration of the
-    step are not both fixed, they are unknowns too and the cost *per metre* is minimised: the cost
-    alone would be least for a robot that stands still.
+    are the joints' positions at the end of the step, their velocities at its beginning and their
+    accelerations. Where length and duration of the step are not both fixed, they are unknowns too
+    and the cost *per metre* is minimised: the cost alone would be least for a robot that stands
+    still.
 
     The constraints hold at all times, not only at the nodes of a grid: they are checked on a grid
     ten times finer and at the maxima between its points, and phases are added where they fail,

@@ -139,6 +139,7 @@ class Program:
         self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
         sizes = [n * pieces, n * pieces, n * pieces * (degree - 1), 1, 1]
         self._places = [0, *np.cumsum(sizes).tolist()]
+        self._gaps = n * (2 * pieces - 1)
         self._lower, self._upper = self._bounds()
         self._build()
 
@@ -177,7 +178,7 @@ class Program:
         return np.where((phases > 0.0) & (phases < 1.0), height, -np.inf)
 
     def labelled_rows(self) -> list[tuple[Row, float | None]]:
-        """Meaning of every constraint, with its phase if it is one along the path."""
+        """Meaning of every constraint, at touchdown first, with its phase if along the path."""
         rows: list[tuple[Row, float | None]]
         rows = [(row, None) for row in self.transcription.touchdown_rows]
         for phase in self.instants.phases.tolist():
@@ -185,13 +186,13 @@ class Program:
         return rows
 
     def _bounds(self) -> tuple[Floats, Floats]:
-        """Scaled bounds of the constraints: those at touchdown, then instant by instant."""
-        touchdown = self.transcription.touchdown_rows
+        """Bounds of the gaps between the pieces, and scaled ones of the constraints."""
+        gaps, touchdown = np.zeros(self._gaps), self.transcription.touchdown_rows
         lower, upper = self.path_bounds(self.instants)
         reserve = np.minimum(RESERVE, 0.5 * (upper - lower))
         return (
-            np.concatenate([[row.lower for row in touchdown], (lower + reserve).ravel(order="F")]),
-            np.concatenate([[row.upper for row in touchdown], (upper - reserve).ravel(order="F")]),
+            np.concatenate([gaps, [row.lower for row in touchdown], (lower + reserve).T.ravel()]),
+            np.concatenate([gaps, [row.upper for row in touchdown], (upper - reserve).T.ravel()]),
         )
 
     def _parts(self, unknowns: Any) -> tuple[Any, Any, Any, Any, Any]:
@@ -237,27 +238,26 @@ class Program:
         return coefficients(values.transpose(2, 1, 0), float(duration[0, 0]) / count)
 
     def _build(self) -> None:
-        total = self._lower.size
+        gaps, total = self._gaps, self._lower.size - self._gaps
         unknowns = casadi.MX.sym("unknowns", self.size + (2 * total if self.elastic else 0))
         x = unknowns[: self.size]
-        f, joined, g = self._evaluated(x)
-        self._joined = joined.numel()
+        f, g = self._evaluated(x)
         if self.request.free_step:
             f = f / x[-1]
         if self.elastic:
             # Each constraint may be exceeded upwards or downwards; the sum of that is minimised.
             low, high = unknowns[self.size : -total], unknowns[-total:]
-            price = np.where(self._lower == self._upper, PRICE_OF_EQUATIONS, 1.0)
-            f, g = casadi.dot(price, low + high), g + low - high
-        problem = {"x": unknowns, "f": f, "g": casadi.vertcat(joined, g)}
-        self._solver = Ipopt(problem, SETTINGS)
+            price = np.where(self._lower == self._upper, PRICE_OF_EQUATIONS, 1.0)[gaps:]
+            f = casadi.dot(price, low + high)
+            g = casadi.vertcat(g[:gaps], g[gaps:] + low - high)
+        self._solver = Ipopt({"x": unknowns, "f": f, "g": g}, SETTINGS)
 
     def solve(self, guess: Floats) -> Solution:
         """Solve from a guess of the unknowns.
 
         An elastic program starts with the violations of the guess taken up by the excesses.
         """
-        size, more = self.size, 2 * self._lower.size if self.elastic else 0
+        size, more = self.size, 2 * (self._lower.size - self._gaps) if self.elastic else 0
         low, high = np.array([self.request.duration_bounds, self.request.length_bounds]).T
         lower = np.concatenate([np.full(size - 2, -np.inf), low, np.zeros(more)])
         upper = np.concatenate([np.full(size - 2, np.inf), high, np.full(more, np.inf)])
@@ -266,18 +266,14 @@ class Program:
             missing = self.violations(start)
             start = np.concatenate([start, np.maximum(missing, 0.0), np.maximum(-missing, 0.0)])
         found, statistics = self._solver.solve(
-            x0=start,
-            lbx=lower,
-            ubx=upper,
-            lbg=np.append(np.zeros(self._joined), self._lower),
-            ubg=np.append(np.zeros(self._joined), self._upper),
+            x0=start, lbx=lower, ubx=upper, lbg=self._lower, ubg=self._upper
         )
         return Solution(
             unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
             status=str(statistics["return_status"]).replace("_", " ").lower(),
-            multipliers=np.array(found["lam_g"]).ravel()[self._joined :],
+            multipliers=np.array(found["lam_g"]).ravel()[self._gaps :],
         )
 
     def sampled(self, start: Start) -> Floats:
@@ -288,31 +284,28 @@ class Program:
         parts = [part.ravel(order="F") for part in (q[:, 1:], v[:, :-1], rest)]
         return np.concatenate([*parts, [start.duration, start.length]])
 
-    def _evaluated(self, x: Any) -> tuple[Any, Any, Any]:
-        """Effort, gaps between the pieces, and scaled values of the constraints."""
+    def _evaluated(self, x: Any) -> tuple[Any, Any]:
+        """Effort, and gaps between the pieces followed by scaled values of the constraints."""
         q, v, _, _, _ = self._parts(x)
         q_end, v_end, _ = self.along(x, self._ends)
         gaps = casadi.veccat(q[:, 1:] - q_end, v[:, 1:] - v_end[:, :-1])
         count = self.instants.share.size
         effort, along = self.transcription.path.map(count)(*self.along(x, self.instants))
         touchdown = self.transcription.touchdown(*self.at_touchdown(x))
-        return (
-            x[-2] * (effort @ casadi.DM(self.instants.weight)),
-            gaps,
-            casadi.vertcat(touchdown, casadi.vec(along)),
-        )
+        cost = x[-2] * (effort @ casadi.DM(self.instants.weight))
+        return cost, casadi.veccat(gaps, touchdown, along)
 
     def violations(self, unknowns: Floats) -> Floats:
         """Scaled distances of the constraints outside of their bounds; positive if too low."""
-        values = np.array(self._evaluated(unknowns)[2]).ravel()
-        return np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
+        values = np.array(self._evaluated(unknowns)[1]).ravel()
+        missing = np.maximum(self._lower - values, 0.0) - np.maximum(values - self._upper, 0.0)
+        return missing[self._gaps :]
 
     def polished(self, unknowns: Floats) -> Floats:
         """Satisfy the equations to rounding, by the least change of the unknowns."""
         x = casadi.MX.sym("x", self.size)
         exact = np.flatnonzero(self._lower == self._upper).tolist()
-        _, gaps, values = self._evaluated(x)
-        residual = casadi.vertcat(gaps, values[exact] - casadi.DM(self._lower[exact]))
+        residual = self._evaluated(x)[1][exact] - casadi.DM(self._lower[exact])
         equations = casadi.Function("equations", [x], [residual, casadi.jacobian(residual, x)])
         step = np.ptp([self.request.duration_bounds, self.request.length_bounds], axis=1) > 0.0
         free = np.append(np.full(self.size - 2, True), step)

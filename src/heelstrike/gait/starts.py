@@ -100,8 +100,7 @@ class _Kinematics:
 
     def __init__(self, request: Request) -> None:
         robot = request.robot
-        self._robot = robot
-        self._held = request.stance.held
+        self._request = request
         q = casadi.SX.sym("q", robot.nv)
         dynamics = TracedDynamics(robot, symbols(q))
         places = []
@@ -114,7 +113,6 @@ class _Kinematics:
         self._places = casadi.Function(
             "places", [q], [places_vector, casadi.jacobian(places_vector, q)]
         )
-        self._lower, self._upper = request.lower, request.upper
         self._inside: list[int] = []  # hinges between hip and foot, or to a foot that is a point
         for foot in (request.stance, request.swing):
             hinges = [j for j in leg(robot, foot) if robot.model.axis[j, 0] != 0.0]
@@ -123,11 +121,9 @@ class _Kinematics:
     @property
     def bend_is_free(self) -> bool:
         """Whether a joint inside a leg may bend both ways from the reference configuration."""
-        reference = self._robot.model.reference
-        return any(
-            self._lower[j] < reference[j] - BENT and self._upper[j] > reference[j] + BENT
-            for j in self._inside
-        )
+        asked, reference = self._request, self._request.robot.model.reference
+        free = (asked.lower < reference - BENT) & (asked.upper > reference + BENT)
+        return bool(free[self._inside].any())
 
     def posture(
         self, swing: tuple[float, float], trunk: tuple[float, float, float], bend: float
@@ -143,7 +139,7 @@ class _Kinematics:
         bend : float
             Sense (+1, -1) in which joints inside a leg are bent at first if they may both ways.
         """
-        level = [0.0][: self._held - 2]  # a flat foot's angle
+        level = [0.0][: self._request.stance.held - 2]  # a flat foot's angle
         target = np.array([0.0, 0.0, *level, *swing, *level, *trunk])
         q = self._bent(bend)
         for _ in range(SWEEPS):
@@ -153,17 +149,20 @@ class _Kinematics:
                 break
             normal = jacobian.T @ jacobian + DAMPING * np.eye(q.size)
             step = np.linalg.solve(normal, jacobian.T @ missing)
-            q = np.clip(q + step / max(1.0, np.abs(step).max() / BENT), self._lower, self._upper)
+            q = self._in_range(q + step / max(1.0, np.abs(step).max() / BENT))
         return q
 
     def _bent(self, bend: float) -> Floats:
         """Reference configuration with the joints inside the legs bent, in range."""
-        reference = self._robot.model.reference
-        q = np.clip(reference, self._lower, self._upper)
+        model = self._request.robot.model
+        q = self._in_range(model.reference)
         for j in self._inside:
             for sense in (bend, -bend):  # the other one where a stop is in the way
-                wanted = reference[j] + sense * BENT * self._robot.model.axis[j, 0]
-                q[j] = np.clip(wanted, self._lower[j], self._upper[j])
-                if abs(q[j] - reference[j]) >= 0.5 * BENT:
+                q[j] = model.reference[j] + sense * BENT * model.axis[j, 0]
+                q = self._in_range(q)
+                if abs(q[j] - model.reference[j]) >= 0.5 * BENT:
                     break
         return q
+
+    def _in_range(self, q: Floats) -> Floats:
+        return np.clip(q, self._request.lower, self._request.upper)
