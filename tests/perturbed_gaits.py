@@ -23,7 +23,8 @@ def perturb_gaits(size: float) -> None:
 def perturbed(designed: Callable[[Any, Any], Any], size: float) -> Callable[[Any, Any], Any]:
     """Have a gait made from perturbed unknowns: the same ones for the same unknowns, always.
 
-    Its duration and length, the last two, are what was asked for and stay so.
+    Its duration and length, the last two, are what was asked for and stay so; and its equations
+    hold to rounding, as they do for every gait that is found.
     """
 
     def perturbed_gait(program: Any, unknowns: Any) -> Any:
@@ -31,6 +32,6 @@ def perturbed(designed: Callable[[Any, Any], Any], size: float) -> Callable[[Any
         draw = np.random.default_rng(list(seed))
         factor = 1.0 + size * draw.standard_normal(len(unknowns))
         factor[-2:] = 1.0
-        return designed(program, unknowns * factor)
+        return designed(program, program.polished(unknowns * factor))
 
     return perturbed_gait

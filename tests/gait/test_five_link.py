@@ -46,6 +46,8 @@ def test_cost_converges_under_refinement() -> None:
     coarse, fine = five_link_gait(6, HUMAN_KNEES), five_link_gait(24, HUMAN_KNEES)
     assert abs(fine.cost - COST) <= 0.1 * abs(coarse.cost - COST)
     assert fine.cost == pytest.approx(COST, rel=1e-6)
+    # A limit is reached, not only approached: the coarse mesh loses nothing at a knee's stop.
+    assert coarse.cost == pytest.approx(COST, rel=2e-6)
     for gait in (coarse, fine):
         assert least_knee(gait) >= 0.0
         # None of the limits that OptimTraj does not know is reached; nor are its other bounds.
