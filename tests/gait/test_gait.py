@@ -102,6 +102,8 @@ def test_contradictory_numbers_are_refused(gait: hs.Gait, change: dict[str, Any]
         ({"contacts": {2: Footing.FLAT}}, "stance_foot must be 0 or 1"),
         ({"contacts": {}}, "at least one foot"),
         ({"breakpoints": [0.0]}, "breakpoints need pieces"),
+        ({"breakpoints": [[0.0, 0.7]]}, "breakpoints need pieces"),
+        ({"pieces": np.zeros((1, 0, 6))}, "breakpoints need pieces"),
         ({"breakpoints": [0.0, -0.7]}, "must rise from 0"),
         ({"breakpoints": [0.1, 0.7]}, "must rise from 0"),
         ({"breakpoints": [0.0, 0.3, 0.7]}, "breakpoints need pieces"),

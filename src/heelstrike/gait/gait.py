@@ -64,8 +64,9 @@ class Phase:
         for name in ("breakpoints", "pieces", "pitch_pieces"):
             if getattr(self, name) is not None:
                 _store(self, name)
+        object.__setattr__(self, "contacts", dict(self.contacts))
         count, shape = self.breakpoints.size - 1, self.pieces.shape
-        if count < 1 or len(shape) != 3 or shape[0] != count:
+        if self.breakpoints.ndim != 1 or len(shape) != 3 or shape[0] != count or 0 in shape:
             raise GaitError(
                 f"gait: {count + 1} breakpoints need pieces of shape ({count}, degree + 1, "
                 f"joints), got {shape}"
