@@ -60,6 +60,13 @@ def test_cost_converges_under_refinement() -> None:
         assert gait.margins.landing_velocity < 0.0
 
 
+@pytest.mark.slow
+def test_a_fine_mesh_loses_no_digits() -> None:
+    """Pieces of 7 ms: accelerations that were differences of positions would be too rough."""
+    gait = five_link_gait(96, HUMAN_KNEES)
+    assert gait.cost == pytest.approx(COST, rel=1e-7)
+
+
 @pytest.mark.parametrize(
     ("joint_ranges", "cost"),
     [(HUMAN_KNEES, COST), (None, COST_OF_FREE_KNEES)],

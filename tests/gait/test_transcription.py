@@ -143,6 +143,24 @@ def test_motion_that_is_reported(robot: hs.Robot, program: Program, seed: int) -
     np.testing.assert_allclose(v, start.v, atol=1e-12)
 
 
+def test_the_kind_of_foot_decides_about_the_moment_of_the_ground() -> None:
+    """It keeps inside a sole; on a point there is none, of which one equation is left."""
+    rows = {}
+    for name in ("bravo7", "rabbit"):
+        request = Request(
+            robot=hs.load_robot(name), **STEP, friction=0.6, clearance=0.03,
+            joint_speed_limit=np.inf, **UNASKED
+        )  # fmt: skip
+        transcription = Transcription(request)
+        rows[name] = [*transcription.path_rows, *transcription.touchdown_rows]
+    flat, point = ({row.group for row in rows[name]} for name in ("bravo7", "rabbit"))
+    sole = {Group.ZERO_MOMENT_POINT, Group.IMPULSE_CENTER, Group.TOUCHDOWN_ANGLE}
+    assert flat - point == sole
+    assert point - flat == {Group.ANKLE}
+    (ankle,) = (row for row in rows["rabbit"] if row.group is Group.ANKLE)
+    assert ankle.lower == ankle.upper == 0.0
+
+
 UNITS = {
     Group.NORMAL_FORCE: "N", Group.FRICTION: "N", Group.ANKLE: "N m",
     Group.ZERO_MOMENT_POINT: "m", Group.CLEARANCE: "m", Group.JOINT_RANGE: "rad",
