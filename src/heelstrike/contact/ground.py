@@ -198,7 +198,13 @@ class Ground:
 
     @classmethod
     def of_numbers(cls, numbers: Mapping[str, Floats]) -> Ground:
-        """Make the ground of :meth:`numbers`."""
+        """Make the ground of :meth:`numbers`.
+
+        Parameters
+        ----------
+        numbers : mapping of str to array
+            What that returned.
+        """
         return cls(
             friction=_one_if_equal(numbers["friction"]),
             restitution=_one_if_equal(numbers["restitution"]),
