@@ -36,7 +36,7 @@ class ArticulatedBodies(Bundle):
 
     Attributes
     ----------
-    inertia : (nv, 6) float
+    inertia : (nl, 6) float
         Their inertia about the pivot: rows of the upper triangle, in the order of spatial vectors.
     momentum : (nv, 3) float
         U, the momentum of the articulated body per unit velocity of its joint.
@@ -45,8 +45,8 @@ class ArticulatedBodies(Bundle):
     """
 
     inertia: Floats = array("nl", 6)
-    momentum: Floats = array("nl", 3)
-    inverse: Floats = array("nl")
+    momentum: Floats = array("nv", 3)
+    inverse: Floats = array("nv")
 
 
 @kernel
@@ -57,15 +57,14 @@ def articulate(model: Model, work: Workspace, added: Floats, bodies: Articulated
     """
     parents, armature, rigid, motion = model.parent, model.armature, work.inertia, work.motion
     inertia, momentum, inverse = bodies.inertia, bodies.momentum, bodies.inverse
-    count = parents.shape[0]
-    for i in range(count):
+    for i in range(model.nl):
         inertia[i, 0] = rigid[i, 3]
         inertia[i, 1] = rigid[i, 2]
         inertia[i, 2] = -rigid[i, 1]
         inertia[i, 3] = rigid[i, 0]
         inertia[i, 4] = 0.0
         inertia[i, 5] = rigid[i, 0]
-    for i in range(count - 1, -1, -1):
+    for i in range(model.nl - 1, -1, -1):
         m0 = motion[i, 0]
         m1 = motion[i, 1]
         m2 = motion[i, 2]
@@ -101,12 +100,11 @@ def solve_articulated(model: Model, work: Workspace, bodies: ArticulatedBodies, 
     """Replace x by A⁻¹ x, after :func:`articulate`."""
     parents, motion, force = model.parent, work.motion, work.force
     momentum, inverse = bodies.momentum, bodies.inverse
-    count = parents.shape[0]
-    for i in range(count):
+    for i in range(model.nl):
         force[i, 0] = 0.0
         force[i, 1] = 0.0
         force[i, 2] = 0.0
-    for i in range(count - 1, -1, -1):
+    for i in range(model.nl - 1, -1, -1):
         p0 = force[i, 0]
         p1 = force[i, 1]
         p2 = force[i, 2]
@@ -125,7 +123,7 @@ def carry_along(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Flo
     """Second half of :func:`solve_articulated`: x holds u / D and receives accelerations."""
     parents, motion, acceleration = model.parent, work.motion, work.acceleration
     momentum, inverse = bodies.momentum, bodies.inverse
-    for i in range(parents.shape[0]):
+    for i in range(model.nl):
         parent = parents[i]
         own = x[i]
         a0 = 0.0

@@ -130,24 +130,34 @@ class Robot:
     source: str = field(default="", repr=False)
 
     @property
+    def nl(self) -> int:
+        """Number of links."""
+        return self.model.nl
+
+    @property
+    def nj(self) -> int:
+        """Number of joints, one a link."""
+        return self.model.nj
+
+    @property
     def nq(self) -> int:
         """Number of positions."""
-        return len(self.model.reference)
+        return self.model.nq
 
     @property
     def nv(self) -> int:
         """Number of velocities."""
-        return len(self.model.parent)
+        return self.model.nv
 
     @property
     def nu(self) -> int:
         """Number of joint torques."""
-        return len(self.model.actuator_joint)
+        return self.model.nu
 
     @property
     def nc(self) -> int:
         """Number of contact points."""
-        return len(self.model.contact_link)
+        return self.model.nc
 
     @property
     def total_mass(self) -> float:
