@@ -40,7 +40,7 @@ def index_of(robot: Robot, what: str, names: tuple[str, ...], given: str | int) 
     near = difflib.get_close_matches(str(given), names, n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
     raise RobotError(
-        f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {', '.join(names) or 'none'}"
+        f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {', '.join(dict.fromkeys(names)) or 'none'}"
         + (f" (0 to {len(names) - 1})." if names else ".")
     )
 
