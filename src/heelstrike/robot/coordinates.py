@@ -39,8 +39,9 @@ def index_of(robot: Robot, what: str, names: tuple[str, ...], given: str | int) 
         return int(given) % len(names)
     near = difflib.get_close_matches(str(given), names, n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
+    known = ", ".join(dict.fromkeys(names)) or "none"
     raise RobotError(
-        f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {', '.join(dict.fromkeys(names)) or 'none'}"
+        f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {known}"
         + (f" (0 to {len(names) - 1})." if names else ".")
     )
 

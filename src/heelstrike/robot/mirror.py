@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
 from heelstrike.robot.robot import Foot, Mirror
 from heelstrike.robot.warning import warn
 
@@ -20,25 +20,6 @@ SHOWN = 6  # how many differences a message lists before it counts the rest
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
 _OTHER = {"l": "r", "r": "l"}
-
-# Numbers that two counterparts must share as they are, whatever the senses of their joints.
-_ALIKE = (
-    "mass",
-    "center_of_mass",
-    "inertia",
-    "offset",
-    "armature",
-    "damping",
-    "stiffness",
-    "dry_friction",
-    "speed_limit",
-)
-_LABEL = {
-    "center_of_mass": "centre of mass",
-    "offset": "place",
-    "dry_friction": "dry friction",
-    "speed_limit": "speed limit",
-}
 
 
 def find_mirror(
@@ -189,10 +170,10 @@ def _differing_joints(
         pair = f"of {names[i]} and {names[j]}"
         if not _same(model.axis[i], sign[i] * model.axis[j]):
             yield f"axis {pair} (not parallel)"
-        for field in _ALIKE:
-            a, b = getattr(model, field)[i], getattr(model, field)[j]
+        for name in (name for name, number in NUMBERS.items() if number.alike):
+            a, b = getattr(model, name)[i], getattr(model, name)[j]
             if not _same(a, b):
-                yield f"{_LABEL.get(field, field)} {pair} ({_text(a)}, {_text(b)})"
+                yield f"{label(name)} {pair} ({_text(a)}, {_text(b)})"
         turned = slice(None) if sign[i] > 0 else slice(None, None, -1)
         range_i = np.array([model.lower[i], model.upper[i]]) - model.reference[i]
         range_j = sign[i] * (np.array([model.lower[j], model.upper[j]]) - model.reference[j])
