@@ -12,15 +12,7 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
-from heelstrike.robot.model import (
-    AXES,
-    PROPERTIES,
-    JointProperties,
-    Limits,
-    Model,
-    Number,
-    Pair,
-)
+from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Model, Pair
 from heelstrike.robot.robot import Robot
 
 UNLIMITED = (-math.inf, math.inf)
@@ -285,7 +277,7 @@ def _checked(
     at: tuple[float, float],
     given: JointProperties,
 ) -> _Link:
-    numbers = {name: _value(number, given) for name, number in PROPERTIES.items()}
+    numbers = {name: _value(name, given) for name in PROPERTIES}
     numbers["lower"], numbers["upper"] = _ordered("limits", given.get("limits", UNLIMITED))
     gear = _number("gear", given.get("gear", 1.0))
     numbers["armature"] += gear**2 * _positive("motor_inertia", given.get("motor_inertia", 0.0))
@@ -294,13 +286,15 @@ def _checked(
     return _Link(joint, name, parent, axis, at, numbers, limits)
 
 
-def _value(number: Number, given: JointProperties) -> Any:
+def _value(name: str, given: JointProperties) -> Any:
     """Check what is given of a number, or return what a joint has of which nobody said it."""
     values: Any = given  # a key out of a list is not a literal to type checkers
+    number = PROPERTIES[name]
+    key = number.called or name
     if "axes" in number.shape:
-        return _pair(number.given, values.get(number.given, (number.default,) * AXES))
+        return _pair(key, values.get(key, (number.default,) * AXES))
     check = _positive if number.least == 0.0 else _number
-    return check(number.given, values.get(number.given, number.default), infinite=number.infinite)
+    return check(key, values.get(key, number.default), infinite=number.infinite)
 
 
 def _torque(given: Limits) -> tuple[float, float]:

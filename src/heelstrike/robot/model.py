@@ -33,8 +33,8 @@ class Number(Member):
 
     Attributes
     ----------
-    doc, unit : str
-        What it is, and in what unit: that of a hinge, that of a slide.
+    unit : str
+        Unit of a hinge, and of a slide if that is another.
     default : float, optional
         What a robot has of which nobody said it.
     least : float
@@ -43,22 +43,24 @@ class Number(Member):
         Whether it may be infinite, which stands for none.
     alike : bool
         Whether left and right share it as it is, whatever the senses of their joints.
+    given : bool
+        Whether it is one of :class:`JointProperties`, by itself.
     later : bool
-        Whether there are run files that are older, and mean the default.
-    given, label : str
+        Whether there are run files that are older than it, and mean the default.
+    called, label : str
         What the builder and messages call it, if not by its name.
     points : str
         The extent that an index counts.
     """
 
-    doc: str = ""
     unit: str = ""
     default: float | None = None
     least: float = -math.inf
     infinite: bool = False
     alike: bool = False
+    given: bool = False
     later: bool = False
-    given: str = ""
+    called: str = ""
     label: str = ""
     points: str = ""
 
@@ -66,6 +68,11 @@ class Number(Member):
 def of(*shape: str | int, kind: type = float, **about: Any) -> Any:
     """Declare a number of the robot; see :class:`Number`."""
     return Number(role="array" if shape else "number", kind=kind, shape=shape, **about)
+
+
+_POSE: dict[str, Any] = {"default": 0.0, "given": True}
+_PART: dict[str, Any] = {"default": 0.0, "given": True, "least": 0.0, "alike": True}
+_LIMIT: dict[str, Any] = {"infinite": True}
 
 
 class Model(Bundle):
@@ -85,6 +92,44 @@ class Model(Bundle):
         Number of contact points and of actuators.
     axes : int
         Dimension of space.
+    parent : (nl,) int
+        Index of the parent link, smaller than the link's own; -1 for the world.
+    axis : (nj, 3) float
+        Motion of the joint per unit of its coordinate, in the parent's axes: rotation about +y
+        (rad), translation along x and z (m). ``(±1, 0, 0)`` is a hinge, ``(0, x, z)`` a slide.
+    offset : (nj, axes) float
+        Origin of the link frame in the parent's frame when ``q`` equals `reference`.
+    reference : (nq,) float
+        Coordinates at which all link frames are parallel to the world frame.
+    mass, inertia : (nl,) float
+        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²).
+    center_of_mass : (nl, axes) float
+        Centre of mass in the link frame.
+    armature, damping, stiffness, rest : (nv,) float
+        Rotor inertia (kg m²), viscous damping (N m s), spring (N m) and its rest coordinate.
+    dry_friction : (nv,) float
+        Coulomb friction of the joint (N m; N of a slide): what it takes to move it at all, and what
+        opposes it as it moves.
+    lower, upper : (nq,) float
+        Range of the coordinate; infinite where there is no stop.
+    speed_limit : (nv,) float
+        Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
+        infinite where there is none.
+    gravity : (axes,) float
+        Acceleration of free fall, (0, -9.81) on earth.
+    contact_link : (nc,) int
+        Link that carries each contact point.
+    contact_position : (nc, axes) float
+        Centre of each contact disc in the link frame.
+    contact_radius : (nc,) float
+        Radius of each contact disc; zero for a point.
+    actuator_joint : (nu,) int
+        Coordinate that each actuator drives.
+    torque_lower, torque_upper : (nu,) float
+        Torque (N m) or force (N) limits at the joint; infinite where there is none.
+    pivot : int
+        Link whose origin serves as the reference point of spatial vectors, so that a robot far
+        from the world origin loses no digits.
     """
 
     nl: int = extent()
@@ -95,94 +140,35 @@ class Model(Bundle):
     nu: int = extent()
     axes: int = extent()
 
-    parent: Integers = of(
-        "nl", kind=int, points="nl", least=-1,
-        doc="Index of the parent link, smaller than the link's own; -1 for the world.",
-    )  # fmt: skip
-    axis: Floats = of(
-        "nj", 3, unit="1",
-        doc="Motion of the joint per unit of its coordinate, in the parent's axes: rotation about "
-        "+y (rad), translation along x and z (m). (±1, 0, 0) is a hinge, (0, x, z) a slide.",
-    )  # fmt: skip
-    offset: Floats = of(
-        "nj", "axes", unit="m", alike=True, label="place",
-        doc="Origin of the link frame in the parent's frame when q equals reference",
-    )  # fmt: skip
-    reference: Floats = of(
-        "nq", unit="rad, m", default=0.0, given="reference",
-        doc="Coordinate at which the robot stands as it is described, all link frames parallel to "
-        "the world frame",
-    )  # fmt: skip
-    mass: Floats = of("nl", unit="kg", default=0.0, least=0.0, alike=True, given="mass", doc="Mass")
-    center_of_mass: Floats = of(
-        "nl", "axes", unit="m", default=0.0, alike=True, given="center_of_mass",
-        label="centre of mass", doc="Centre of mass (x, z) in the link frame",
-    )  # fmt: skip
-    inertia: Floats = of(
-        "nl", unit="kg m²", default=0.0, least=0.0, alike=True, given="inertia",
-        doc="Moment of inertia about the link's own centre of mass",
-    )  # fmt: skip
-    armature: Floats = of(
-        "nv", unit="kg m², kg", default=0.0, least=0.0, alike=True, given="armature",
-        doc="Rotor inertia as the joint feels it",
-    )  # fmt: skip
-    damping: Floats = of(
-        "nv", unit="N m s/rad, N s/m", default=0.0, least=0.0, alike=True, given="damping",
-        doc="Viscous damping",
-    )  # fmt: skip
-    stiffness: Floats = of(
-        "nv", unit="N m/rad, N/m", default=0.0, least=0.0, alike=True, given="stiffness",
-        doc="Stiffness of the joint's spring",
-    )  # fmt: skip
-    rest: Floats = of(
-        "nq", unit="rad, m", default=0.0, given="rest",
-        doc="Coordinate at which the spring is slack",
-    )  # fmt: skip
-    dry_friction: Floats = of(
-        "nv", unit="N m, N", default=0.0, least=0.0, alike=True, later=True, given="dry_friction",
-        doc="Coulomb friction: what it takes to move the joint at all, and what opposes it as it "
-        "moves",
-    )  # fmt: skip
-    lower: Floats = of(
-        "nq", unit="rad, m", default=-math.inf, infinite=True,
-        doc="Least coordinate, a stop; infinite where there is none",
-    )  # fmt: skip
-    upper: Floats = of(
-        "nq", unit="rad, m", default=math.inf, infinite=True,
-        doc="Greatest coordinate, likewise",
-    )  # fmt: skip
+    parent: Integers = of("nl", kind=int, points="nl", least=-1)
+    axis: Floats = of("nj", 3, unit="rad, m")
+    offset: Floats = of("nj", "axes", unit="m", alike=True, label="place")
+    reference: Floats = of("nq", unit="rad, m", **_POSE)
+    mass: Floats = of("nl", unit="kg", **_PART)
+    center_of_mass: Floats = of("nl", "axes", unit="m", alike=True, label="centre of mass", **_POSE)
+    inertia: Floats = of("nl", unit="kg m²", **_PART)
+    armature: Floats = of("nv", unit="kg m², kg", **_PART)
+    damping: Floats = of("nv", unit="N m s/rad, N s/m", **_PART)
+    stiffness: Floats = of("nv", unit="N m/rad, N/m", **_PART)
+    rest: Floats = of("nq", unit="rad, m", **_POSE)
+    dry_friction: Floats = of("nv", unit="N m, N", later=True, **_PART)
+    lower: Floats = of("nq", unit="rad, m", **_LIMIT)
+    upper: Floats = of("nq", unit="rad, m", **_LIMIT)
     speed_limit: Floats = of(
-        "nv", unit="rad/s, m/s", default=math.inf, least=0.0, infinite=True, alike=True,
-        later=True, given="speed",
-        doc="Greatest speed that the drive stands, which gaits keep to; infinite where there is "
-        "none",
-    )  # fmt: skip
-    gravity: Floats = of("axes", unit="m/s²", doc="Acceleration of free fall")
-    contact_link: Integers = of(
-        "nc", kind=int, points="nl", least=0, doc="Link that carries each contact point."
+        "nv",
+        unit="rad/s, m/s",
+        later=True,
+        called="speed",
+        **_LIMIT | _PART | {"default": math.inf},
     )
-    contact_position: Floats = of(
-        "nc", "axes", unit="m", doc="Centre of each contact disc in the link frame"
-    )
-    contact_radius: Floats = of(
-        "nc", unit="m", default=0.0, least=0.0, doc="Radius of each disc; zero for a point"
-    )
-    actuator_joint: Integers = of(
-        "nu", kind=int, points="nv", least=0, doc="Coordinate that each actuator drives."
-    )
-    torque_lower: Floats = of(
-        "nu", unit="N m, N", default=-math.inf, infinite=True,
-        doc="Least torque at the joint; infinite where there is no limit",
-    )  # fmt: skip
-    torque_upper: Floats = of(
-        "nu", unit="N m, N", default=math.inf, infinite=True,
-        doc="Greatest torque at the joint, likewise",
-    )  # fmt: skip
-    pivot: int = of(
-        kind=int, points="nl", least=0,
-        doc="Link whose origin serves as the reference point of spatial vectors, so that a robot "
-        "far from the world origin loses no digits.",
-    )  # fmt: skip
+    gravity: Floats = of("axes", unit="m/s²")
+    contact_link: Integers = of("nc", kind=int, points="nl", least=0)
+    contact_position: Floats = of("nc", "axes", unit="m")
+    contact_radius: Floats = of("nc", unit="m", least=0.0)
+    actuator_joint: Integers = of("nu", kind=int, points="nv", least=0)
+    torque_lower: Floats = of("nu", unit="N m, N", **_LIMIT)
+    torque_upper: Floats = of("nu", unit="N m, N", **_LIMIT)
+    pivot: int = of(kind=int, points="nl", least=0)
 
     @classmethod
     def made(cls, **members: Any) -> Model:
@@ -201,11 +187,28 @@ class JointProperties(TypedDict, total=False):
 
     Attributes
     ----------
+    mass, inertia : float
+        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²), zero by
+        default.
+    center_of_mass : (2,) float
+        Centre of mass (x, z) in the link frame (m).
+    reference : float
+        Coordinate at which the robot stands as it is described, zero by default.
     limits : (2,) float
         Range of the coordinate (rad, m); unlimited by default.
+    damping : float
+        Viscous damping (N m s/rad, N s/m).
+    stiffness, rest : float
+        Spring (N m/rad, N/m) and the coordinate at which it is slack.
+    dry_friction : float
+        Coulomb friction (N m, N).
+    armature : float
+        Rotor inertia as the joint feels it (kg m², kg).
     torque : float or (2,) float
         Greatest torque of the motor at the joint (N m, N) either way, or its two limits; infinity
         for a motor without limits. A joint without it has no motor.
+    speed : float
+        Greatest speed that the drive stands (rad/s, m/s).
     gear, motor_inertia : float
         Ratio of the gear, and the inertia of the motor before it: they add
         ``gear**2 * motor_inertia`` to the armature. Torque and speed are those at the joint.
@@ -239,17 +242,3 @@ PROPERTIES = {name: number for name, number in NUMBERS.items() if number.given}
 def label(name: str) -> str:
     """Return what messages call a number."""
     return NUMBERS[name].label or name.replace("_", " ")
-
-
-def _described(name: str, number: Number, shape: tuple[str | int, ...]) -> str:
-    size = f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)}) " if shape else ""
-    unit = f" ({number.unit})." if number.unit else ""
-    return f"    {name} : {size}{number.kind.__name__}\n        {number.doc}{unit}\n"
-
-
-Model.__doc__ = f"{Model.__doc__}" + "".join(
-    _described(name, number, number.shape) for name, number in NUMBERS.items()
-)
-JointProperties.__doc__ = f"{JointProperties.__doc__}" + "".join(
-    _described(number.given, number, number.shape[1:]) for number in PROPERTIES.values()
-)
