@@ -9,10 +9,10 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.contact_points import ContactPoint
 from heelstrike.robot.feet import find_feet, name_contacts
-from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.model import NUMBERS, Floats, Model, label
 from heelstrike.robot.plausibility import unlikely_numbers
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.symmetry import find_mirror
 from heelstrike.robot.warning import warn
 
 LARGEST_NUMBER = 1e10

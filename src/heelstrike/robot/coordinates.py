@@ -86,19 +86,6 @@ def by_name(robot: Robot, vector: Floats) -> dict[str, float]:
     return dict(zip(robot.joint_names, vector.tolist(), strict=True))
 
 
-def mirrored(robot: Robot, state: State) -> State:
-    """Exchange left and right; see :meth:`Robot.mirrored`."""
-    state = checked(robot, state)
-    if robot.mirror is None:
-        raise RobotError(
-            f"robot {robot.name!r} has no mirror image: its left and right differ, or its names do "
-            "not tell them apart. heelstrike inspect says which."
-        )
-    return State(
-        robot.mirror.position(state.q, robot.model.reference), robot.mirror.velocity(state.v)
-    )
-
-
 def perturbed(
     robot: Robot,
     state: State,

@@ -19,10 +19,10 @@ from heelstrike.robot.files.saving import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.files.urdf import MASSLESS
 from heelstrike.robot.library import builtin_robots, load_robot
-from heelstrike.robot.mirror import find_mirror
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.symmetry import find_mirror
 from heelstrike.robot.warning import RobotWarning
 
 SAME_HEIGHT = 1e-4

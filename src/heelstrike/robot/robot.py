@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import (
     Spread,
     by_name,
     checked,
     index_of,
-    mirrored,
     perturbed,
     state_by_name,
 )
+from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import Model
 from heelstrike.robot.state import State
 
@@ -40,51 +40,6 @@ class Foot:
     name: str
     link: int
     contacts: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Mirror:
-    """Exchange of left and right.
-
-    Mirrored joint positions are ``sign * (q[joint] - reference[joint]) + reference``, mirrored
-    velocities ``sign * v[joint]``; contact point ``i`` becomes ``contact[i]``, foot likewise.
-
-    Attributes
-    ----------
-    joint : (nv,) int
-        Counterpart of every coordinate (itself for trunk coordinates).
-    sign : (nv,) float
-        +1, or -1 where the two joints turn in opposite senses.
-    contact : (nc,) int
-        Counterpart of every contact point.
-    foot : (nf,) int
-        Counterpart of every foot.
-    """
-
-    joint: NDArray[np.int64]
-    sign: NDArray[np.float64]
-    contact: NDArray[np.int64]
-    foot: NDArray[np.int64]
-
-    def position(
-        self, q: NDArray[np.float64], reference: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return positions with left and right exchanged.
-
-        Parameters
-        ----------
-        q : (..., nq) float
-            Positions.
-        reference : (nq,) float
-            The robot's `Model.reference`.
-        """
-        mirrored: NDArray[np.float64] = self.sign * (q - reference)[..., self.joint] + reference
-        return mirrored
-
-    def velocity(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return velocities or accelerations, of shape (..., nv), left and right exchanged."""
-        mirrored: NDArray[np.float64] = self.sign * v[..., self.joint]
-        return mirrored
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +83,11 @@ class Robot:
     floating: bool
     contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
+
+    def __post_init__(self) -> None:
+        if self.mirror is not None:
+            mirror = replace(self.mirror, reference=self.model.reference)
+            object.__setattr__(self, "mirror", mirror)
 
     @property
     def nl(self) -> int:
@@ -237,7 +197,13 @@ class Robot:
         RobotError
             If the robot has no mirror image.
         """
-        return mirrored(self, state)
+        state = checked(self, state)
+        if self.mirror is None:
+            raise RobotError(
+                f"robot {self.name!r} has no mirror image: its left and right differ, or its names "
+                "do not tell them apart. heelstrike inspect says which."
+            )
+        return self.mirror.state(state)
 
     def perturbed(
         self,

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Model
-from heelstrike.robot.robot import Foot, Mirror, Robot
+from heelstrike.robot.robot import Foot, Robot
 
 if TYPE_CHECKING:
     import xarray
