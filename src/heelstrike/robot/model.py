@@ -105,8 +105,10 @@ class Model(Bundle):
         Mass (kg) and moment of inertia about the link's own centre of mass (kg m²).
     center_of_mass : (nl, axes) float
         Centre of mass in the link frame.
-    armature, damping, stiffness, rest : (nv,) float
-        Rotor inertia (kg m²), viscous damping (N m s), spring (N m) and its rest coordinate.
+    armature, damping, stiffness : (nv,) float
+        Rotor inertia (kg m²), viscous damping (N m s) and spring (N m).
+    rest : (nq,) float
+        Coordinate at which the spring is slack.
     dry_friction : (nv,) float
         Coulomb friction of the joint (N m; N of a slide): what it takes to move it at all, and what
         opposes it as it moves.
@@ -116,7 +118,7 @@ class Model(Bundle):
         Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
         infinite where there is none.
     gravity : (axes,) float
-        Acceleration of free fall, (0, -9.81) on earth.
+        Acceleration of free fall (m/s²), (0, -9.81) on earth.
     contact_link : (nc,) int
         Link that carries each contact point.
     contact_position : (nc, axes) float

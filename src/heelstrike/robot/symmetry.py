@@ -237,10 +237,11 @@ def _differing_contacts(
 
 
 def _same(a: ArrayLike, b: ArrayLike) -> bool:
+    """Whether numbers are equal but for rounding; what is infinite equals only itself."""
     a, b = np.asarray(a), np.asarray(b)
     with np.errstate(invalid="ignore"):
         near = np.abs(a - b) <= TOLERANCE * np.maximum(np.abs(a), np.abs(b)) + 1e-9
-    return bool(np.all(near | (a == b)))
+    return bool(np.all(near & np.isfinite(a) & np.isfinite(b) | (a == b)))
 
 
 def _text(value: ArrayLike) -> str:
