@@ -22,6 +22,7 @@ from math import cos, sin
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.spatial import momentum_of, plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 
@@ -100,30 +101,15 @@ def link_velocities(model: Model, v: Floats, work: Workspace) -> None:
     """
     for i in range(model.nl):
         parent = model.parent[i]
-        m0 = work.motion[i, 0]
-        m1 = work.motion[i, 1]
-        m2 = work.motion[i, 2]
-        if parent < 0:
-            work.velocity[i, 0] = m0 * v[i]
-            work.velocity[i, 1] = m1 * v[i]
-            work.velocity[i, 2] = m2 * v[i]
-            work.bias_acceleration[i, 0] = 0.0
-            work.bias_acceleration[i, 1] = 0.0
-            work.bias_acceleration[i, 2] = 0.0
-        else:
-            w = work.velocity[parent, 0]
-            vx = work.velocity[parent, 1]
-            vz = work.velocity[parent, 2]
-            work.velocity[i, 0] = w + m0 * v[i]
-            work.velocity[i, 1] = vx + m1 * v[i]
-            work.velocity[i, 2] = vz + m2 * v[i]
-            work.bias_acceleration[i, 0] = work.bias_acceleration[parent, 0]
-            work.bias_acceleration[i, 1] = (
-                work.bias_acceleration[parent, 1] + (w * m2 - m0 * vz) * v[i]
-            )
-            work.bias_acceleration[i, 2] = (
-                work.bias_acceleration[parent, 2] + (m0 * vx - w * m1) * v[i]
-            )
+        m0, m1, m2 = spatial(work.motion, i)
+        w, vx, vz, bx, bz = 0.0, 0.0, 0.0, 0.0, 0.0
+        if parent >= 0:
+            w, vx, vz = spatial(work.velocity, parent)
+            _, bx, bz = spatial(work.bias_acceleration, parent)
+        write(work.velocity, i, (w + m0 * v[i], vx + m1 * v[i], vz + m2 * v[i]))
+        bx = bx + (w * m2 - m0 * vz) * v[i]
+        bz = bz + (m0 * vx - w * m1) * v[i]
+        write(work.bias_acceleration, i, (0.0, bx, bz))
 
 
 @kernel
@@ -134,48 +120,23 @@ def inverse_dynamics(model: Model, acceleration: Floats, work: Workspace, force:
     are not part of H; see :func:`passive_force`.
     """
     for i in range(model.nl):
-        parent = model.parent[i]
-        if parent < 0:
-            a0 = 0.0
-            a1 = -model.gravity[0]
-            a2 = -model.gravity[1]
-        else:
-            a0 = work.acceleration[parent, 0]
-            a1 = work.acceleration[parent, 1]
-            a2 = work.acceleration[parent, 2]
-        a0 = a0 + work.motion[i, 0] * acceleration[i]
-        a1 = a1 + work.motion[i, 1] * acceleration[i]
-        a2 = a2 + work.motion[i, 2] * acceleration[i]
-        work.acceleration[i, 0] = a0
-        work.acceleration[i, 1] = a1
-        work.acceleration[i, 2] = a2
+        a = 0.0, -model.gravity[0], -model.gravity[1]
+        if model.parent[i] >= 0:
+            a = spatial(work.acceleration, model.parent[i])
+        a = plus(a, scaled(spatial(work.motion, i), acceleration[i]))
+        write(work.acceleration, i, a)
         # The recursion above carries the part of the joints; the velocity part is ready.
-        a0 = a0 + work.bias_acceleration[i, 0]
-        a1 = a1 + work.bias_acceleration[i, 1]
-        a2 = a2 + work.bias_acceleration[i, 2]
-        mass = work.inertia[i, 0]
-        hx = work.inertia[i, 1]
-        hz = work.inertia[i, 2]
-        w = work.velocity[i, 0]
-        vx = work.velocity[i, 1]
-        vz = work.velocity[i, 2]
-        px = mass * vx + w * hz
-        pz = mass * vz - w * hx
-        work.force[i, 0] = work.inertia[i, 3] * a0 + hz * a1 - hx * a2 + vz * px - vx * pz
-        work.force[i, 1] = mass * a1 + a0 * hz + w * pz
-        work.force[i, 2] = mass * a2 - a0 * hx - w * px
+        a = plus(a, spatial(work.bias_acceleration, i))
+        w, vx, vz = spatial(work.velocity, i)
+        _, px, pz = momentum_of(work.inertia, i, (w, vx, vz))
+        moment, fx, fz = momentum_of(work.inertia, i, a)
+        write(work.force, i, (moment + vz * px - vx * pz, fx + w * pz, fz - w * px))
     for i in range(model.nl - 1, -1, -1):
-        force[i] = (
-            work.motion[i, 0] * work.force[i, 0]
-            + work.motion[i, 1] * work.force[i, 1]
-            + work.motion[i, 2] * work.force[i, 2]
-            + model.armature[i] * acceleration[i]
-        )
+        f = spatial(work.force, i)
+        force[i] = power(spatial(work.motion, i), f) + model.armature[i] * acceleration[i]
         parent = model.parent[i]
         if parent >= 0:
-            work.force[parent, 0] += work.force[i, 0]
-            work.force[parent, 1] += work.force[i, 1]
-            work.force[parent, 2] += work.force[i, 2]
+            write(work.force, parent, plus(spatial(work.force, parent), f))
 
 
 @kernel
@@ -200,23 +161,16 @@ def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
         for j in range(model.nv):
             matrix[i, j] = 0.0
     for i in range(model.nl - 1, -1, -1):
-        mass = work.composite[i, 0]
-        hx = work.composite[i, 1]
-        hz = work.composite[i, 2]
-        m0 = work.motion[i, 0]
-        m1 = work.motion[i, 1]
-        m2 = work.motion[i, 2]
-        moment = work.composite[i, 3] * m0 + hz * m1 - hx * m2
-        px = mass * m1 + m0 * hz
-        pz = mass * m2 - m0 * hx
-        matrix[i, i] = m0 * moment + m1 * px + m2 * pz + model.armature[i]
+        motion = spatial(work.motion, i)
+        p = momentum_of(work.composite, i, motion)
+        matrix[i, i] = power(motion, p) + model.armature[i]
         parent = model.parent[i]
         if parent >= 0:
             for k in range(4):
                 work.composite[parent, k] += work.composite[i, k]
         j = parent
         while j >= 0:
-            entry = work.motion[j, 0] * moment + work.motion[j, 1] * px + work.motion[j, 2] * pz
+            entry = power(spatial(work.motion, j), p)
             matrix[i, j] = entry
             matrix[j, i] = entry
             j = model.parent[j]
@@ -355,9 +309,7 @@ def kinetic_energy(model: Model, v: Floats, work: Workspace, energy: Floats) -> 
     """Kinetic energy of the links and of the rotors (armature), summed link by link."""
     energy[0] = 0.0
     for i in range(model.nl):
-        w = work.velocity[i, 0]
-        vx = work.velocity[i, 1]
-        vz = work.velocity[i, 2]
+        w, vx, vz = spatial(work.velocity, i)
         energy[0] += 0.5 * (
             work.inertia[i, 3] * w * w
             + work.inertia[i, 0] * (vx * vx + vz * vz)
@@ -381,40 +333,34 @@ def potential_energy(model: Model, q: Floats, work: Workspace, energy: Floats) -
 
 
 @kernel
-def center_of_mass(model: Model, work: Workspace, position: Floats) -> None:
-    """World position of the robot's centre of mass."""
+def first_moments(model: Model, work: Workspace) -> tuple[float, float, float]:
+    """Mass of the robot and its first moments (x, z) about the pivot."""
     mass = 0.0
-    x = 0.0
-    z = 0.0
+    hx = 0.0
+    hz = 0.0
     for i in range(model.nl):
         mass = mass + work.inertia[i, 0]
-        x = x + work.inertia[i, 1]
-        z = z + work.inertia[i, 2]
-    position[0] = work.pivot[0] + x / mass
-    position[1] = work.pivot[1] + z / mass
+        hx = hx + work.inertia[i, 1]
+        hz = hz + work.inertia[i, 2]
+    return mass, hx, hz
+
+
+@kernel
+def center_of_mass(model: Model, work: Workspace, position: Floats) -> None:
+    """World position of the robot's centre of mass."""
+    mass, hx, hz = first_moments(model, work)
+    position[0] = work.pivot[0] + hx / mass
+    position[1] = work.pivot[1] + hz / mass
 
 
 @kernel
 def momentum(model: Model, work: Workspace, result: Floats) -> None:
     """Linear momentum (x, z) and moment of momentum about the robot's centre of mass (+y)."""
-    mass = 0.0
-    hx = 0.0
-    hz = 0.0
-    px = 0.0
-    pz = 0.0
-    moment = 0.0
+    mass, hx, hz = first_moments(model, work)
+    total = 0.0, 0.0, 0.0
     for i in range(model.nl):
-        w = work.velocity[i, 0]
-        vx = work.velocity[i, 1]
-        vz = work.velocity[i, 2]
-        mass = mass + work.inertia[i, 0]
-        hx = hx + work.inertia[i, 1]
-        hz = hz + work.inertia[i, 2]
-        px = px + work.inertia[i, 0] * vx + w * work.inertia[i, 2]
-        pz = pz + work.inertia[i, 0] * vz - w * work.inertia[i, 1]
-        moment = moment + (
-            work.inertia[i, 3] * w + work.inertia[i, 2] * vx - work.inertia[i, 1] * vz
-        )
+        total = plus(total, momentum_of(work.inertia, i, spatial(work.velocity, i)))
+    moment, px, pz = total
     result[0] = px
     result[1] = pz
     result[2] = moment - (hz * px - hx * pz) / mass
@@ -427,22 +373,12 @@ def momentum_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
     A joint moves its subtree as one rigid body. Rows x and z over the mass of the robot are the
     Jacobian of the centre of mass.
     """
-    mass = 0.0
-    hx = 0.0
-    hz = 0.0
+    mass, hx, hz = first_moments(model, work)
     for i in range(model.nl):
-        mass = mass + work.inertia[i, 0]
-        hx = hx + work.inertia[i, 1]
-        hz = hz + work.inertia[i, 2]
         for k in range(4):
             work.composite[i, k] = work.inertia[i, k]
     for i in range(model.nl - 1, -1, -1):
-        m0 = work.motion[i, 0]
-        m1 = work.motion[i, 1]
-        m2 = work.motion[i, 2]
-        px = work.composite[i, 0] * m1 + m0 * work.composite[i, 2]
-        pz = work.composite[i, 0] * m2 - m0 * work.composite[i, 1]
-        moment = work.composite[i, 3] * m0 + work.composite[i, 2] * m1 - work.composite[i, 1] * m2
+        moment, px, pz = momentum_of(work.composite, i, spatial(work.motion, i))
         matrix[0, i] = px
         matrix[1, i] = pz
         matrix[2, i] = moment - (hz * px - hx * pz) / mass
