@@ -8,7 +8,7 @@ from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike import dynamics
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import evaluated
+from heelstrike.dynamics.evaluation import Evaluation
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.places import add_point_force, write_point_rows
 
@@ -33,7 +33,7 @@ def test_rows_and_forces_of_a_point(case: RobotCase) -> None:
     robot = case.robot()
     link, local = robot.nl - 1, (0.1, -0.3)
     for q, v in case.states(3):
-        work = evaluated(robot, q, v)
+        work = Evaluation(robot, q, v).work
         jacobian = dynamics.point_jacobian(robot, q, link, local)
         position = dynamics.point_position(robot, q, link, local)
         rows = np.full((4, robot.nv), 7.0)

@@ -81,6 +81,7 @@ def test_a_number_goes_from_the_builder_through_files(name: str, tmp_path: Path)
     if name not in ("mass", "inertia"):
         np.testing.assert_array_equal(getattr(plain.model, name)[3:], number.default)
     assert fingerprint(robot) != fingerprint(plain)
+    assert robot_to_dataset(robot)[name].attrs["units"] == number.unit
     # Run files, also those that are older than the number.
     held = contents(robot)
     np.testing.assert_array_equal(

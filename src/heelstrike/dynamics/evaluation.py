@@ -157,8 +157,3 @@ def contact_indices(robot: Robot, contacts: Any) -> tuple[int, ...]:
     given: Any = (contacts,) if isinstance(contacts, str | int | np.integer) else contacts
     names = robot.contact_names
     return tuple(dict.fromkeys(index_of(robot, "contact point", names, one) for one in given))
-
-
-def evaluated(robot: Robot, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
-    """Workspace with kinematics (and velocities, if `v` is given) of a state."""
-    return Evaluation(robot, q, v).work

@@ -10,14 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.coordinates import (
-    Spread,
-    by_name,
-    checked,
-    index_of,
-    perturbed,
-    state_by_name,
-)
+from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import Model
 from heelstrike.robot.state import State
@@ -179,15 +172,23 @@ class Robot:
         >>> robot.positions(state)["left_knee"], robot.velocities(state)["root_x"]
         (0.4, 0.8)
         """
-        return state_by_name(self, position or {}, velocity or {}, start)
+        state = checked(self, start or self.reference_state())
+        for vector, values, what in (
+            (state.q, position or {}, "position"),
+            (state.v, velocity or {}, "velocity"),
+        ):
+            for joint, value in values.items():
+                index = self.joint_index(joint)
+                vector[index] = finite(self, what, self.joint_names[index], value)
+        return state
 
     def positions(self, state: State) -> dict[str, float]:
         """Positions of a state by the names of the joints, in rad and m."""
-        return by_name(self, checked(self, state).q)
+        return dict(zip(self.joint_names, checked(self, state).q.tolist(), strict=True))
 
     def velocities(self, state: State) -> dict[str, float]:
         """Velocities of a state by the names of the joints, in rad/s and m/s."""
-        return by_name(self, checked(self, state).v)
+        return dict(zip(self.joint_names, checked(self, state).v.tolist(), strict=True))
 
     def mirrored(self, state: State) -> State:
         """Return a state with left and right exchanged.
@@ -239,9 +240,19 @@ class Robot:
         RobotError
             If a joint is unknown, or a standard deviation negative or not finite.
         """
-        return perturbed(
-            self, state, seed=seed, position=position, velocity=velocity, joints=joints
-        )
+        state = checked(self, state)
+        chosen = np.ones(self.nv, dtype=bool)
+        if joints is not None:
+            chosen[:] = False
+            given = (joints,) if isinstance(joints, str | int) else joints
+            chosen[[self.joint_index(joint) for joint in given]] = True
+        # All coordinates draw: the number of one does not depend on which others are chosen.
+        draw = np.random.default_rng(seed).standard_normal((2, self.nv))
+        q = state.q + np.where(chosen, draw[0] * spread_of(self, "position", position), 0.0)
+        v = state.v + np.where(chosen, draw[1] * spread_of(self, "velocity", velocity), 0.0)
+        low = np.minimum(self.model.lower, state.q)
+        high = np.maximum(self.model.upper, state.q)
+        return State(np.clip(q, low, high), v)
 
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.

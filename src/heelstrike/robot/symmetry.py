@@ -220,20 +220,19 @@ def _differing_contacts(
         here, there = (int(np.sum(model.contact_link == k)) for k in (i, j))
         if i < j and here != there:
             yield f"number of contact points on {names[i]} and {names[j]} ({here}, {there})"
-    for i, j in enumerate(contact):
+    for i, j in enumerate(contact.tolist()):
         link, other = model.contact_link[i], joint[model.contact_link[i]]
         if model.contact_link[j] != other or link > other:
             continue  # no counterpart at all (told above), or told from the other side
         pair = f"of {names[link]} and {names[other]}"
-        if contact[j] != i or not _same(model.contact_position[i], model.contact_position[j]):
-            a, b = model.contact_position[i], model.contact_position[j]
-            yield f"contact points {pair} ({_text(a)}, {_text(b)})"
-        if not _same(model.contact_radius[i], model.contact_radius[j]):
-            a, b = model.contact_radius[i], model.contact_radius[j]
-            yield f"radius of the contact points {pair} ({_text(a)}, {_text(b)})"
-        if not _same(friction[i], friction[j]):
-            a, b = friction[i], friction[j]
-            yield f"friction of the contact points {pair} ({_text(a)}, {_text(b)})"
+        for what, values, paired in (
+            ("contact points", model.contact_position, contact[j] == i),
+            ("radius of the contact points", model.contact_radius, True),
+            ("friction of the contact points", friction, True),
+        ):
+            a, b = values[i], values[j]
+            if not (paired and _same(a, b)):
+                yield f"{what} {pair} ({_text(a)}, {_text(b)})"
 
 
 def _same(a: ArrayLike, b: ArrayLike) -> bool:

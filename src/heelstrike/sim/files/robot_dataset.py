@@ -37,7 +37,8 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     import xarray
 
     variables: dict[str, Any] = {
-        name: (dims, getattr(robot.model, name)) for name, dims in _DIMS_OF.items()
+        name: (_DIMS_OF[name], getattr(robot.model, name), {"units": one.unit} if one.unit else {})
+        for name, one in _ARRAYS.items()
     }
     for name, dim in _NAMES.items():
         variables[name] = ((dim,), np.array(getattr(robot, name), dtype=object))
