@@ -62,9 +62,12 @@ def blocks(results: dict[str, Any], folder: Path) -> Iterator[tuple[str, str]]:
             text += f"\n\n![{CAPTIONS[part]}](images/{figure})"
         yield part, text
     kept = json.loads((ROOT / "benchmarks" / "instructions.json").read_text())
-    counts = kept["instructions_a_step"].items()
-    lines = ["| scenario | instructions a step |", "|:---|---:|"]
-    lines += [f"| {name} | {number:.0f} |" for name, number in counts]
+    beside = {name: f"{times:.2f}" for name, times in kept["times_sticking"].items()}
+    lines = ["| scenario | instructions a step | times those of sticking |", "|:---|---:|---:|"]
+    lines += [
+        f"| {name} | {number:.0f} | {beside.get(name, '')} |"
+        for name, number in kept["instructions_a_step"].items()
+    ]
     yield "instructions", "\n".join(lines)
 
 
