@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
@@ -542,7 +541,9 @@ class _Crew:
         self._tally[index] = memory.tally[[STEPS, SATURATIONS]]
         places = [PENETRATION, COMPLEMENTARITY, CONE, NON_PENETRATION]
         self._extreme[index] = memory.extreme[places]
-        self._counters[index] = memory.solver.counters[[SOLVES, SHORTCUTS, FALLBACKS, FAILURES]]
+        tally = memory.solver.tally
+        counts = tally.solves, tally.shortcuts, tally.fallbacks, tally.failures
+        self._counters[index] = counts
         if self._recorded:
             run = loop.result(status, message, timing)
             self._runs[index] = run

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.dynamics.kernels import center_of_mass, forward_kinematics
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.errors import ControllerError, SimulationError
@@ -563,7 +562,7 @@ class Loop:
     def result(self, status: RunStatus, message: str, timing: Timing) -> Run:
         """Return the record of the simulation."""
         rows = joined(self.records)
-        counters = self.memory.solver.counters
+        tally = self.memory.solver.tally
         extreme = self.memory.extreme
         return Run(
             robot=self.robot,
@@ -600,10 +599,10 @@ class Loop:
             ),
             solver=SolverCount(
                 name=self.engine.solver,
-                solves=int(counters[SOLVES]),
-                shortcuts=int(counters[SHORTCUTS]),
-                fallbacks=int(counters[FALLBACKS]),
-                failures=int(counters[FAILURES]),
+                solves=tally.solves,
+                shortcuts=tally.shortcuts,
+                fallbacks=tally.fallbacks,
+                failures=tally.failures,
             ),
             steps=int(self.memory.tally[STEPS]),
             saturations=int(self.memory.tally[SATURATIONS]),

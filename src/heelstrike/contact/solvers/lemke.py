@@ -20,16 +20,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
-from heelstrike.contact.workspace import (
-    CONE,
-    MATRIX,
-    NORMAL,
-    OFFSET,
-    PLACE,
-    TANGENT,
-    TRIAL_MODE,
-    ContactWorkspace,
-)
+from heelstrike.contact.workspace import Dictionary, Floats, Integers, ReducedProblem, Tally
 
 PATHS = 9
 """How many covering vectors are tried: what rounding spoils on one path it spares on another, and
@@ -49,20 +40,19 @@ def covering(path: int, row: int) -> float:
 
 
 @kernel
-def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
+def load_frictional(count: int, path: int, reduced: ReducedProblem, tableau: Floats) -> int:
     """Write the reduced problem as a dictionary; return the number of pairs.
 
     The pairs of a contact are consecutive, in the order of the module's docstring. The free
     velocity is scaled to one.
     """
-    normal, tangent = work.labels[NORMAL], work.labels[TANGENT]
-    offset, cone = work.vectors[OFFSET], work.vectors[CONE]
-    matrix, tableau = work.squares[MATRIX], work.tableau
+    normal, tangent = reduced.normal, reduced.tangent
+    offset, cone, matrix = reduced.offset, reduced.cone, reduced.matrix
     size = 0.0
-    for i in range(unknowns):
+    for i in range(reduced.unknowns):
         size = max(size, abs(offset[i]))
     size = 1.0 / size if size > 0.0 else 1.0
-    pairs = unknowns
+    pairs = reduced.unknowns
     for contact in range(count):
         if tangent[contact] >= 0:
             pairs += 2
@@ -94,14 +84,21 @@ def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace
 
 
 @kernel
-def value(variable: int, work: ContactWorkspace) -> float:
+def value(variable: int, dictionary: Dictionary) -> float:
     """Return the value of a variable in the final dictionary."""
-    row = work.labels[PLACE, variable]
-    return work.tableau[row, 0] if row >= 0 else 0.0
+    row = dictionary.place[variable]
+    return dictionary.tableau[row, 0] if row >= 0 else 0.0
 
 
 @kernel
-def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
+def lemke(
+    count: int,
+    path: int,
+    reduced: ReducedProblem,
+    tally: Tally,
+    dictionary: Dictionary,
+    mode: Integers,
+) -> int:
     """Find the contact modes of the reduced problem by Lemke's method; return the status.
 
     ``path``, from 0 to ``PATHS`` - 1, chooses the covering vector and how close a tie is.
@@ -111,20 +108,20 @@ def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
         tie = 1e-13
     elif path % 3 == 2:
         tie = 1e-9
-    pairs = load_frictional(count, unknowns, path, work)
-    status = pivot_to_solution(work.tableau, pairs, tie, work)
-    place, tangent, mode = work.labels[PLACE], work.labels[TANGENT], work.labels[TRIAL_MODE]
+    pairs = load_frictional(count, path, reduced, dictionary.tableau)
+    status = pivot_to_solution(pairs, tie, tally, dictionary)
+    place = dictionary.place
     row = 0
     for contact in range(count):
-        frictional = tangent[contact] >= 0
+        frictional = reduced.tangent[contact] >= 0
         mode[contact] = STICK if place[pairs + row] >= 0 else OPEN
         if path == 0:
             # By the velocities. The other paths are for problems that rounding makes difficult,
             # and go by the basis.
-            if mode[contact] == OPEN and value(row, work) <= AT_REST:
+            if mode[contact] == OPEN and value(row, dictionary) <= AT_REST:
                 mode[contact] = STICK
             if mode[contact] == STICK and frictional:
-                slip = 0.5 * (value(row + 1, work) - value(row + 2, work))
+                slip = 0.5 * (value(row + 1, dictionary) - value(row + 2, dictionary))
                 if slip > AT_REST:
                     mode[contact] = SLIP_FORWARD
                 elif slip < -AT_REST:

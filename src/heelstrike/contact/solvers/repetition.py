@@ -15,21 +15,13 @@ from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
-    BASIS,
-    EQUATION,
-    ORDER,
-    PIVOT_ROW,
-    POINT,
-    REST,
-    ROOT,
-    SETTINGS,
-    SHARERS,
-    SPAN,
-    SPEED,
-    STEP,
-    ContactWorkspace,
+    ContactAnswer,
+    ContactProblem,
     Floats,
     Integers,
+    Settings,
+    StickingRows,
+    Yardstick,
 )
 
 SAME_ROW = 1e-14
@@ -43,17 +35,12 @@ NO_PIVOT = 1e-11
 
 
 @dissolved_kernel
-def list_equations(
-    count: int, delassus: Floats, friction: Floats, mode: Integers, work: ContactWorkspace
-) -> int:
-    """List the rows that shall have no velocity; return how many differ, or -1 to give up.
-
-    ``EQUATION`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for
-    none, and ``SHARERS`` how many rows share an equation.
-    """
-    source, equation, sharers = work.labels[EQUATION], work.labels[PIVOT_ROW], work.vectors[SHARERS]
+def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) -> int:
+    """List the rows that shall have no velocity; return how many differ, or -1 to give up."""
+    delassus, friction = problem.delassus, problem.friction
+    source, equation, sharers = rows.row, rows.equation, rows.sharers
     size = 0
-    for contact in range(count):
+    for contact in range(problem.count):
         row = 2 * contact
         tangent = row + 1
         equation[row] = -1
@@ -86,20 +73,20 @@ def list_equations(
 
 
 @dissolved_kernel
-def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> bool:
     """Like :func:`solve_equations` for few equations, by straight-line code."""
-    if size >= work.eliminations.shape[0] or work.eliminations[size] == 0:
+    if size >= rows.programs.shape[0] or rows.programs[size] == 0:
         return False
-    source, matrix = work.labels[EQUATION], work.lower_half
-    x, pivot = work.vectors[POINT], work.vectors[STEP]
+    delassus, source, matrix = problem.delassus, rows.row, rows.lower_half
+    x, pivot = rows.x, rows.pivot
     place = 0
     for i in range(size):
         row = source[i]
-        x[i] = -free[row]
+        x[i] = -problem.free[row]
         for j in range(i + 1):
             matrix[place] = delassus[row, source[j]]
             place += 1
-    play(work.eliminations[size], (matrix, x, pivot))
+    play(rows.programs[size], (matrix, x, pivot))
     rank = 0
     for i in range(size):
         diagonal = delassus[source[i], source[i]]
@@ -108,12 +95,12 @@ def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorksp
         elif abs(pivot[i]) > NO_PIVOT * diagonal:
             return False
     if rank < size:
-        leave_out_idle(size, work)
+        leave_out_idle(size, rows)
     return True
 
 
 @kernel
-def leave_out_idle(size: int, work: ContactWorkspace) -> None:
+def leave_out_idle(size: int, rows: StickingRows) -> None:
     """Take from the solution what lies along directions that change no velocity.
 
     For few equations it is quicker than :func:`shorten`, which needs them in another order. There
@@ -121,8 +108,7 @@ def leave_out_idle(size: int, work: ContactWorkspace) -> None:
     orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
     counts 1/m.
     """
-    matrix, x, basis = work.lower_half, work.vectors[POINT], work.squares[BASIS]
-    sharers = work.vectors[SHARERS]
+    matrix, x, basis, sharers = rows.lower_half, rows.x, rows.square, rows.sharers
     found = 0
     for row in range(size):
         if matrix[row * (row + 1) // 2 + row] != 0.0:
@@ -154,16 +140,16 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
 
 
 @dissolved_kernel
-def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
-    """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
+def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> bool:
+    """Solve ``G x = -b`` over the listed rows, of least norm; return success.
 
     Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
     end of the list and bring no column to L: their number costs little. Neighbours among many
     points of a sole nearly do, and are tried again after the others.
     """
-    if solve_at_once(size, delassus, free, work):
+    if solve_at_once(size, problem, rows):
         return True
-    source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
+    delassus, source, matrix, x = problem.delassus, rows.row, rows.factor, rows.x
     rank = 0
     rest = size
     least = GOOD_PIVOT
@@ -171,7 +157,7 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
     moved = False
     while rank < rest:
         row = source[rank]
-        total = -free[row]
+        total = -problem.free[row]
         for j in range(rank):
             entry = delassus[row, source[j]]
             for k in range(j):
@@ -192,12 +178,12 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
         elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
             poor = poor or pivot > POOR_PIVOT * diagonal
             rest -= 1
-            work.labels[SPAN, rest] = rank
+            rows.span[rest] = rank
             if rest > rank:
                 if not moved:
-                    begin_order(size, work)
+                    begin_order(size, rows)
                     moved = True
-                exchange(rank, rest, work)
+                exchange(rank, rest, rows)
         else:
             return False
         if poor and rank == rest:
@@ -210,24 +196,23 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
         for j in range(i):
             x[j] -= matrix[i, j] * x[i]
     if rank < size:
-        shorten(rank, size, work)
+        shorten(rank, size, rows)
     if moved:
-        put_back(size, work)
+        put_back(size, rows)
     return True
 
 
 @kernel
-def begin_order(size: int, work: ContactWorkspace) -> None:
+def begin_order(size: int, rows: StickingRows) -> None:
     """List the equations in their order."""
     for i in range(size):
-        work.labels[ORDER, i] = i
+        rows.order[i] = i
 
 
 @kernel
-def exchange(rank: int, rest: int, work: ContactWorkspace) -> None:
+def exchange(rank: int, rest: int, rows: StickingRows) -> None:
     """Exchange the equation in hand for the last that is untried."""
-    source, order, matrix = work.labels[EQUATION], work.labels[ORDER], work.tableau
-    sharers = work.vectors[SHARERS]
+    source, order, matrix, sharers = rows.row, rows.order, rows.factor, rows.sharers
     source[rank], source[rest] = source[rest], source[rank]
     order[rank], order[rest] = order[rest], order[rank]
     sharers[rank], sharers[rest] = sharers[rest], sharers[rank]
@@ -236,18 +221,17 @@ def exchange(rank: int, rest: int, work: ContactWorkspace) -> None:
 
 
 @kernel
-def put_back(size: int, work: ContactWorkspace) -> None:
+def put_back(size: int, rows: StickingRows) -> None:
     """Undo all exchanges in the solution and the list of sharers."""
-    order, x, sharers = work.labels[ORDER], work.vectors[POINT], work.vectors[SHARERS]
-    for vector in (x, sharers):
+    for vector in (rows.x, rows.sharers):
         for place in range(size):
-            work.vectors[SPEED, place] = vector[place]
+            rows.spare[place] = vector[place]
         for place in range(size):
-            vector[order[place]] = work.vectors[SPEED, place]
+            vector[rows.order[place]] = rows.spare[place]
 
 
 @kernel
-def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
+def shorten(rank: int, size: int, rows: StickingRows) -> None:
     """Spread the solution from the independent rows over all, to the least norm.
 
     The other rows are combinations of these, C = L₂ L₁⁻¹. Where y solves for these alone, every x
@@ -256,11 +240,11 @@ def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
 
         x₂ = M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
     """
-    matrix, x, sharers = work.tableau, work.vectors[POINT], work.vectors[SHARERS]
-    y, system = work.vectors[STEP], work.squares[BASIS]
+    matrix, x, sharers = rows.factor, rows.x, rows.sharers
+    y, system = rows.pivot, rows.square
     for place in range(rank, size):
         part = matrix[place]
-        for j in range(work.labels[SPAN, place], rank):
+        for j in range(rows.span[place], rank):
             part[j] = 0.0
         for j in range(rank - 2, -1, -1):
             entry = part[j]
@@ -313,29 +297,28 @@ def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
 
 
 @dissolved_kernel
-def share_impulses(count: int, friction: Floats, impulse: Floats, work: ContactWorkspace) -> bool:
+def share_impulses(problem: ContactProblem, rows: StickingRows, impulse: Floats) -> bool:
     """Write the solution out to all rows in equal shares; return whether it is in the cones."""
-    equation, sharers, x = work.labels[PIVOT_ROW], work.vectors[SHARERS], work.vectors[POINT]
-    for row in range(2 * count):
-        place = equation[row]
-        impulse[row] = x[place] / sharers[place] if place >= 0 else 0.0
-    for contact in range(count):
+    for row in range(2 * problem.count):
+        place = rows.equation[row]
+        impulse[row] = rows.x[place] / rows.sharers[place] if place >= 0 else 0.0
+    for contact in range(problem.count):
         normal = impulse[2 * contact]
-        if not (normal >= 0.0 and abs(impulse[2 * contact + 1]) <= friction[contact] * normal):
+        limit = problem.friction[contact] * normal
+        if not (normal >= 0.0 and abs(impulse[2 * contact + 1]) <= limit):
             return False
     return True
 
 
 @dissolved_kernel
-def moves_as_named(
-    count: int, friction: Floats, mode: Integers, velocity: Floats, work: ContactWorkspace
-) -> bool:
+def moves_as_named(problem: ContactProblem, yardstick: Yardstick, answer: ContactAnswer) -> bool:
     """Whether the velocity has every contact do what its mode says.
 
     A contact without friction takes the name of its velocity.
     """
-    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
-    for contact in range(count):
+    mode, velocity = answer.mode, answer.velocity
+    root, rest = yardstick.root, yardstick.rest
+    for contact in range(problem.count):
         normal = 2 * contact
         tangent = normal + 1
         departs = velocity[normal] > rest * root[normal]
@@ -344,7 +327,7 @@ def moves_as_named(
         if departs:
             continue
         if abs(velocity[tangent]) > rest * root[tangent]:
-            if friction[contact] > 0.0:
+            if problem.friction[contact] > 0.0:
                 return False
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
     return True
@@ -352,35 +335,22 @@ def moves_as_named(
 
 @dissolved_kernel
 def repeat(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    mode: Integers,
-    impulse: Floats,
-    velocity: Floats,
-    residual: Floats,
+    problem: ContactProblem,
     tolerance: float,
-    work: ContactWorkspace,
+    settings: Settings,
+    rows: StickingRows,
+    yardstick: Yardstick,
+    answer: ContactAnswer,
 ) -> bool:
-    """Solve the contact problem if its contacts do what ``mode`` says; return success.
+    """Solve the contact problem if its contacts do what their modes say; return success.
 
-    Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`. After a
-    success they hold the one solution of least norm, certified to ``tolerance``.
+    After a success the answer is the one of least norm, certified to ``tolerance``.
     """
-    size = list_equations(count, delassus, friction, mode, work)
-    if size < 0 or not solve_equations(size, delassus, free, work):
-        return False
-    if not share_impulses(count, friction, impulse, work):
-        return False
-    worst = certify(
-        count,
-        delassus,
-        free,
-        friction,
-        impulse,
-        velocity,
-        residual,
-        work,
+    size = list_equations(problem, answer.mode, rows)
+    return (
+        size >= 0
+        and solve_equations(size, problem, rows)
+        and share_impulses(problem, rows, answer.impulse)
+        and certify(problem, settings, yardstick, answer) <= tolerance
+        and moves_as_named(problem, yardstick, answer)
     )
-    return worst <= tolerance and moves_as_named(count, friction, mode, velocity, work)

@@ -384,27 +384,17 @@ def solve_contacts(
     if count == 0:
         return True
     straight = are_usual(memory, count)
-    delassus = memory.delassus
+    problem = memory.problem
     if straight:
         gather_delassus(model, memory, count)
         if count == memory.usual_points.shape[0]:
-            delassus = memory.point_delassus
+            problem = memory.usual_problem
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
         press_dry_joints(model, step, count, memory)
-    status = solve_contact_kernel(
-        count,
-        delassus,
-        memory.free,
-        memory.problem_friction,
-        order,
-        memory.problem_mode,
-        memory.impulse,
-        memory.velocity,
-        memory.residual,
-        memory.solver,
-    )
+    problem.count = count
+    status = solve_contact_kernel(problem, order, memory.solver, memory.answer)
     if straight:
         push_candidates(model, memory, count)
     else:
