@@ -201,6 +201,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     place[usual] = np.arange(len(usual))
     problem = ContactProblem.allocate(nc=capacity)
     usual_problem = ContactProblem(
+        count=0,
         delassus=np.zeros((2 * len(usual), 2 * len(usual))),
         free=problem.free[: 2 * len(usual)],
         friction=problem.friction[: len(usual)],
