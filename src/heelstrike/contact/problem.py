@@ -17,7 +17,7 @@ from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
 from heelstrike.contact.solvers.repetition import repeat
-from heelstrike.contact.solvers.search import CLEAN, contact_workspace
+from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -58,8 +58,7 @@ def solve_contact_kernel(
     tally.solver = WARM_START
     for contact in range(problem.count):
         yardstick.slope[contact] = 0.0
-    clean = min(settings.tolerance, CLEAN)
-    if settings.skewed == 0 and repeat(problem, clean, settings, work.sticking, yardstick, answer):
+    if settings.skewed == 0 and repeat(problem, settings, work.sticking, yardstick, answer):
         tally.shortcuts += 1
         return SOLVED
     return int(call_at(work.solvers[0], (problem, order, work, answer)))

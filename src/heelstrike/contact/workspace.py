@@ -131,6 +131,8 @@ class StickingRows(Bundle):
         Equation of each row of the problem, -1 for none.
     sharers : (2 nc,) float
         How many rows share each equation.
+    pulled : (nc,) int
+        Whether each contact would have pulled in an attempt before.
     x, pivot : (2 nc,) float
         Solution; pivots, and a right side.
     order : (2 nc,) int
@@ -148,6 +150,7 @@ class StickingRows(Bundle):
     row: Integers = array("2 nc", of=int)
     equation: Integers = array("2 nc", of=int)
     sharers: Floats = array("2 nc")
+    pulled: Integers = array("nc", of=int)
     x: Floats = array("2 nc")
     pivot: Floats = array("2 nc")
     order: Integers = array("2 nc", of=int)

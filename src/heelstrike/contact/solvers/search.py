@@ -9,7 +9,7 @@ from numba import types
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import separate_kernel
-from heelstrike.contact.certificate import REST_TOLERANCE, certify
+from heelstrike.contact.certificate import certify
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import (
     COMBINATIONS,
@@ -34,7 +34,7 @@ from heelstrike.contact.solvers.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.lemke import PATHS, lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.solvers.repetition import repeat
+from heelstrike.contact.solvers.repetition import AS_GOOD, CLEAN
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -46,12 +46,6 @@ from heelstrike.contact.workspace import (
     StickingRows,
     Yardstick,
 )
-
-CLEAN = 1e-11
-"""Modes with smaller residuals are taken at once; others may be nearly right, and better follow."""
-
-AS_GOOD = 2.0 * REST_TOLERANCE
-"""Residual up to which released contacts are preferred to a smaller residual without."""
 
 NEARLY_SINGULAR = 1e-10
 """Pivots of the unit-diagonal matrix below this allow of impulses 1e5 times the data."""
@@ -129,17 +123,6 @@ def nearly_singular(problem: ContactProblem, reduced: ReducedProblem) -> bool:
     return False
 
 
-@kernel
-def stick_or_open(problem: ContactProblem, tolerance: float, work: ContactWorkspace) -> bool:
-    """Try the modes under trial the quick way, if no contact is prescribed to slide."""
-    if work.settings.skewed != 0:
-        return False
-    for contact in range(problem.count):
-        if work.reduced.prescribed[contact] != OPEN:
-            return False
-    return repeat(problem, tolerance, work.settings, work.sticking, work.yardstick, work.trial)
-
-
 def _signature() -> Any:
     return types.int64(
         ContactProblem.compiled_type(),
@@ -211,10 +194,6 @@ def try_solvers(
                 if not proposing:
                     break
             call += 1
-            if attempt >= 0 and stick_or_open(problem, clean, work):
-                keep(count, trial, answer)
-                tally.solver = solver
-                return SOLVED
             worst = evaluate(problem, work)
             if solver == COMBINATIONS:
                 note_residual(count, worst, trial.mode, work.combinations)
@@ -224,7 +203,8 @@ def try_solvers(
                 keep(count, trial, answer)
             if worst <= clean:
                 break
-        if attempt >= 0 or best <= clean:
+        found = best
+        if attempt >= 0 or found <= clean:
             if not latest:
                 certify(problem, work.settings, work.yardstick, answer)
             # The same answer whichever solver found it: contacts at rest are released to carry
@@ -242,9 +222,9 @@ def try_solvers(
                 keep(count, trial, answer)
         if best < before and attempt >= 0:
             tally.solver = solver
-        if best <= tolerance and (attempt >= 0 or best <= clean):
+        if best <= tolerance and (attempt >= 0 or found <= clean):
             status = SOLVED
-            if best <= clean:
+            if found <= clean:
                 break
         elif attempt == 0 or outcome == RAY:
             status = outcome if outcome != SOLVED else UNCERTIFIED
