@@ -178,7 +178,7 @@ def count(folder: Path, switch: Any) -> None:
     from heelstrike.compiler.separate_kernel import SeparateKernel
     from heelstrike.sim import CompiledController
     from heelstrike.sim.controller.guard import guarded
-    from heelstrike.sim.engine import PAUSED
+    from heelstrike.sim.method import PAUSED
     from heelstrike.sim.simulation import compiled_form, prepared
 
     for file in sorted(folder.glob("scenario*.npz")):

@@ -16,7 +16,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import CompiledController, Contacts, RunStatus, controller_kernel
 from heelstrike.sim import batch as batch_module
 from heelstrike.sim.batch import Batch
-from heelstrike.sim.engine import Engine, Method, Setting
+from heelstrike.sim.method import Engine, Method, Setting
 from heelstrike.sim.status import EventKind
 
 ROWS = ("time", "position", "velocity", "torque", "contact_force", "gap", "slip_velocity")

@@ -16,8 +16,8 @@ from synthetic_runs import box, make_run
 
 import heelstrike as hs
 from heelstrike.sim import record_size
-from heelstrike.sim.engine import Setting
 from heelstrike.sim.memory import allocate_memory
+from heelstrike.sim.method import Setting
 
 SHORT: dict[str, Any] = {
     "step": lambda step: hs.TimeStepping(step=step),

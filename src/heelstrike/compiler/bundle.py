@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, TypeVar, dataclass_transform
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -89,7 +89,6 @@ def part(kind: type[Bundle]) -> Any:
     return Member("part", kind)
 
 
-@dataclass_transform(eq_default=False, field_specifiers=(array, cell, number, part))
 class Bundle:
     """Base class of bundles; a subclass declares its members.
 

@@ -14,7 +14,7 @@ from heelstrike.errors import GaitError, SimulationError
 from heelstrike.gait import Gait, PiecewiseGait, optimize_gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Controller, Run, simulate
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 
 HEIGHT = 1.044
 """Height of bravo7's centre of mass above its soles, in m."""

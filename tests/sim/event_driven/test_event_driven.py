@@ -23,9 +23,9 @@ from heelstrike.sim import (
     RunStatus,
     controller_kernel,
 )
-from heelstrike.sim.engine import DIVERGED
 from heelstrike.sim.event_driven.method import EVENTS_WITHOUT_END, LOOKS
 from heelstrike.sim.event_driven.phase import REASON, allocate_phase
+from heelstrike.sim.method import DIVERGED
 from heelstrike.sim.simulation import prepared
 
 Floats = NDArray[np.float64]

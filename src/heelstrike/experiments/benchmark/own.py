@@ -10,7 +10,7 @@ from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import Work
 from heelstrike.sim import Run, TimeStepping, simulate
 from heelstrike.sim.controller.interface import CompiledController
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 from heelstrike.sim.whole_run import whole
 
 NEVER = 2**62

@@ -19,7 +19,7 @@ from heelstrike.experiments.benchmark.peer import Peer, Setting, reason
 from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import Work, best_of
 from heelstrike.sim import Compliant, EventDriven, EventKind, HuntCrossley, Scheme, TimeStepping
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 
 Floats = NDArray[np.float64]
 
