@@ -86,6 +86,8 @@ class Memory(Bundle):
         Whether each contact point is on the ground, and whether it slips.
     stop_torque : (nv,) float
         Generalised force of the joint stops in the last solve.
+    stop_mode : (nv, 2) int
+        Contact mode of each joint's lower and upper stop in the last solve.
     stopped : (nv,) int
         Whether each joint pressed against a stop.
     dry_joint : (nd,) int
@@ -159,6 +161,7 @@ class Memory(Bundle):
     closed: Integers = array("capacity", of=int)
     slipping: Integers = array("capacity", of=int)
     stop_torque: Floats = array("nv")
+    stop_mode: Integers = array("nv", 2, of=int)
     stopped: Integers = array("nv", of=int)
     dry_joint: Integers = array("nd", of=int)
     friction_torque: Floats = array("nv")
