@@ -81,7 +81,9 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
         times = []
         shortcuts = 0
         for delassus, free in problems:
-            problem = ContactProblem(count=count, delassus=delassus, free=free, friction=friction)
+            problem = ContactProblem.allocate(
+                nc=count, count=count, delassus=delassus, free=free, friction=friction
+            )
             solve_contact_kernel(problem, order, work, answer)
             first = answer.mode.copy() if name == "warm" else cold
             rest = (problem, order, first, work, answer)

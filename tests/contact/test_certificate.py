@@ -53,7 +53,7 @@ def verdict(
     work.yardstick.slope[: mu.size] = slope
     work.settings.floor = floor
     work.settings.skewed = skewed
-    problem = ContactProblem(count=mu.size, delassus=G, free=b, friction=mu)
+    problem = ContactProblem.allocate(nc=mu.size, count=mu.size, delassus=G, free=b, friction=mu)
     answer = ContactAnswer.allocate(nc=mu.size, impulse=x)
     worst = certify(problem, work.settings, work.yardstick, answer)
     error = velocity_error(worst, mu, work.yardstick)

@@ -239,8 +239,8 @@ def test_many_points_of_two_soles_that_stick(points: int, close: bool) -> None:
     pressed = np.ravel(np.column_stack([1.0 + 0.0 * x, draw.uniform(-0.01, 0.01, points)]))
     free = -delassus @ pressed
     work = contact_workspace(points)
-    problem = ContactProblem(
-        count=points, delassus=delassus, free=free, friction=np.full(points, 0.8)
+    problem = ContactProblem.allocate(
+        nc=points, count=points, delassus=delassus, free=free, friction=np.full(points, 0.8)
     )
     answer = ContactAnswer.allocate(nc=points, mode=np.full(points, STICK))
     assert repeat(problem, work.settings, work.sticking, work.yardstick, answer)

@@ -23,6 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
+from heelstrike.contact.sets import LINE, opening, room
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -120,7 +121,7 @@ def certify(
 
     Writes ``velocity`` and ``residual`` of the answer, and the rest of the yardstick.
     """
-    count, friction = problem.count, problem.friction
+    count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     root, slope = yardstick.root, yardstick.slope
     weigh(problem, settings, impulse, yardstick)
@@ -144,9 +145,9 @@ def certify(
         tangent = normal + 1
         normal_impulse = impulse[normal]
         tangent_impulse = impulse[tangent]
-        limit = friction[contact] * normal_impulse
-        beyond = product_error(friction[contact], normal_impulse, limit) if sharply else 0.0
-        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (limit + beyond)
+        # What friction lacks to either edge.
+        upper, lower = room(problem, contact, normal_impulse, tangent_impulse, sharply)
+        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (upper + lower)
 
         speed = relative_speed(velocity[normal], root[normal], inverse)
         force_scale = root[normal] * inverse
@@ -155,18 +156,20 @@ def certify(
         else:  # it moves nothing
             force = 1.0 if normal_impulse > 0.0 else (-1.0 if normal_impulse < 0.0 else 0.0)
         penetration = max(penetration, -speed)
-        cone = max(cone, -force)
-        complementarity = max(complementarity, min(speed, force))
+        if problem.set[contact] == LINE:
+            penetration = max(penetration, speed)
+        else:
+            cone = max(cone, -force)
+            complementarity = max(complementarity, min(speed, force))
 
+        friction = opening(problem, contact)
         if root[tangent] > 0.0:
             force_scale = root[tangent] * inverse
-        elif friction[contact] > 0.0 and force_scale > 0.0:
-            force_scale /= friction[contact]
+        elif friction > 0.0 and force_scale > 0.0:
+            force_scale /= friction
         else:
-            both = abs(limit) + abs(tangent_impulse)
+            both = abs(friction * normal_impulse) + abs(tangent_impulse)
             force_scale = 1.0 / both if both > 0.0 else 0.0
-        upper = (limit - tangent_impulse) + beyond  # what friction lacks to either edge
-        lower = (limit + tangent_impulse) + beyond
         if slope[contact] != 0.0:
             cone = max(cone, abs(upper if slope[contact] > 0.0 else lower) * force_scale)
             continue

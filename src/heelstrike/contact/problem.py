@@ -210,7 +210,9 @@ def run_solvers(
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
     work.settings.skewed = 0 if semidefinite else 1
-    problem = ContactProblem(count=count, delassus=matrix, free=offset, friction=friction)
+    problem = ContactProblem.allocate(
+        nc=count, count=count, delassus=matrix, free=offset, friction=friction
+    )
     answer = ContactAnswer.allocate(nc=count, mode=mode)
     status = SolveStatus(solve_contact_kernel(problem, order, work, answer))
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.

@@ -28,13 +28,16 @@ class ContactProblem(Bundle):
     free : (2 nc,) float
         Free velocity (or acceleration), the free term b.
     friction : (nc,) float
-        Friction coefficient of each contact; zero for a joint stop.
+        Friction coefficient of each contact.
+    set : (nc,) int
+        Where its impulses may lie; see :mod:`heelstrike.contact.sets`.
     """
 
     count: int = cell(int)
     delassus: Floats = array("2 nc", "2 nc")
     free: Floats = array("2 nc")
     friction: Floats = array("nc")
+    set: Integers = array("nc", of=int)
 
 
 class ContactAnswer(Bundle):
@@ -172,6 +175,8 @@ class ReducedProblem(Bundle):
         Unknowns of each contact; the tangential one is -1 where there is none.
     prescribed : (nc,) int
         The mode the caller prescribes, ``OPEN`` for none.
+    set : (nc,) int
+        Where the impulses of each contact may lie.
     cone : (nc,) float
         Friction coefficient of the scaled problem.
     source : (2 nc,) int
@@ -185,6 +190,7 @@ class ReducedProblem(Bundle):
     normal: Integers = array("nc", of=int)
     tangent: Integers = array("nc", of=int)
     prescribed: Integers = array("nc", of=int)
+    set: Integers = array("nc", of=int)
     cone: Floats = array("nc")
     source: Integers = array("2 nc", of=int)
     scale: Floats = array("2 nc")

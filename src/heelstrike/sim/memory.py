@@ -205,9 +205,8 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     place = np.full(nc, -1)
     place[usual] = np.arange(len(usual))
     problem = ContactProblem.allocate(nc=capacity)
-    usual_problem = ContactProblem(
-        count=0,
-        delassus=np.zeros((2 * len(usual), 2 * len(usual))),
+    usual_problem = ContactProblem.allocate(
+        nc=len(usual),
         free=problem.free[: 2 * len(usual)],
         friction=problem.friction[: len(usual)],
     )

@@ -64,8 +64,8 @@ def test_sticking_contacts_are_solved_alike_with_and_without_programs(freedom: i
         for programs in (elimination_programs(), np.zeros(1, np.int64)):
             work = contact_workspace(count)
             work = work.replaced(sticking=work.sticking.replaced(programs=programs))
-            problem = ContactProblem(
-                count=count, delassus=delassus, free=free, friction=np.full(count, 3.0)
+            problem = ContactProblem.allocate(
+                nc=count, count=count, delassus=delassus, free=free, friction=np.full(count, 3.0)
             )
             answer = ContactAnswer.allocate(nc=count, mode=np.full(count, STICK, np.int64))
             assert solve_contact_kernel(problem, solver_order("lemke"), work, answer) == SOLVED

@@ -15,7 +15,9 @@ from heelstrike.contact.workspace import ContactProblem, Floats, Integers, Reduc
 def reduced_to(delassus: Floats, free: Floats, friction: Floats, mode: Integers) -> ReducedProblem:
     """Write the scaled problem with its matrix."""
     count, work = len(friction), contact_workspace(len(friction))
-    problem = ContactProblem(count=count, delassus=delassus, free=free, friction=friction)
+    problem = ContactProblem.allocate(
+        nc=count, count=count, delassus=delassus, free=free, friction=friction
+    )
     uncompiled(reduce_problem)(problem, mode, work.yardstick.slope, work.reduced)
     uncompiled(scale_matrix)(problem, work.yardstick.slope, work.reduced)
     return work.reduced

@@ -14,6 +14,7 @@ import math
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.sets import LINE, projected
 from heelstrike.contact.solvers.least_norm import split
 from heelstrike.contact.solvers.pivoting import pivot
 from heelstrike.contact.workspace import (
@@ -173,17 +174,18 @@ def expand(
         impulse[row + 1] = 0.0
         if mode[contact] == OPEN:
             continue
-        along = max(point[place], 0.0)
-        limit = problem.friction[contact]
+        sticks = tangent[contact] >= 0 and mode[contact] == STICK
+        across = point[place + 1] if sticks else 0.0
+        along, across = projected(problem, contact, point[place], across)
         place += 1
-        if tangent[contact] >= 0 and mode[contact] == STICK:
-            limit *= along
+        if sticks:
             impulse[row] = along
-            impulse[row + 1] = min(max(point[place], -limit), limit)
+            impulse[row + 1] = across
             place += 1
             continue
         across = slope[contact]
         if tangent[contact] >= 0:
+            limit = problem.friction[contact]
             across = -limit if mode[contact] == SLIP_FORWARD else limit
         impulse[row] = along / math.sqrt(1.0 + across * across)
         impulse[row + 1] = across * impulse[row]
@@ -197,6 +199,9 @@ def evaluate(problem: ContactProblem, work: ContactWorkspace) -> float:
     """
     equations, reduced, yardstick = work.equations, work.reduced, work.yardstick
     trial, point, before = work.trial, equations.point, equations.before
+    for contact in range(problem.count):
+        if problem.set[contact] == LINE:
+            trial.mode[contact] = STICK
     assemble(problem, trial.mode, yardstick.slope, reduced, equations)
     symmetric = work.settings.skewed == 0
     for j in range(equations.size):
@@ -253,7 +258,7 @@ def refine(reduced: ReducedProblem, velocity: Floats, equations: Equations) -> N
 
 @kernel
 def label(
-    count: int, velocity: Floats, tangent: Integers, yardstick: Yardstick, mode: Integers
+    count: int, velocity: Floats, reduced: ReducedProblem, yardstick: Yardstick, mode: Integers
 ) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
@@ -266,13 +271,13 @@ def label(
     for contact in range(count):
         row = 2 * contact
         name = STICK
-        if velocity[row] > rest * root[row]:
+        if velocity[row] > rest * root[row] and reduced.set[contact] != LINE:
             name = OPEN
         elif velocity[row + 1] > rest * root[row + 1]:
             name = SLIP_FORWARD
         elif velocity[row + 1] < -rest * root[row + 1]:
             name = SLIP_BACKWARD
-        if tangent[contact] >= 0:
+        if reduced.tangent[contact] >= 0:
             changed = changed or name != mode[contact]
         else:
             changed = changed or (name == OPEN) != (mode[contact] == OPEN)

@@ -26,6 +26,7 @@ from heelstrike.contact.modes import (
     SOLVED,
     STICK,
 )
+from heelstrike.contact.sets import LINE
 from heelstrike.contact.workspace import Integers, Iteration, ReducedProblem, Tally
 
 STEPS = 30
@@ -50,7 +51,7 @@ def read_iterate(count: int, reduced: ReducedProblem, iteration: Iteration, mode
     for contact in range(count):
         first = normal[contact]
         name = STICK
-        if iterate[first] < speed[first]:
+        if iterate[first] < speed[first] and reduced.set[contact] != LINE:
             name = OPEN
         elif tangent[contact] >= 0:
             limit = cone[contact] * iterate[first]
@@ -79,6 +80,12 @@ def equations(count: int, size: float, reduced: ReducedProblem, iteration: Itera
             speed[i] += matrix[i, j] * iterate[j]
     for contact in range(count):
         first = normal[contact]
+        if reduced.set[contact] == LINE:
+            value[first] = speed[first]
+            merit += 0.5 * value[first] * value[first]
+            for j in range(unknowns):
+                tableau[first, j] = matrix[first, j]
+            continue
         force = iterate[first]
         root = math.sqrt(force * force + speed[first] * speed[first])
         value[first] = force + speed[first] - root

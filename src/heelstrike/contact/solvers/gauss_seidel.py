@@ -15,6 +15,7 @@ from heelstrike.contact.modes import (
     SOLVED,
     STICK,
 )
+from heelstrike.contact.sets import LINE
 from heelstrike.contact.workspace import Floats, Integers, Iteration, ReducedProblem, Tally
 
 SWEEPS = 2000
@@ -31,6 +32,9 @@ def solve_block(contact: int, reduced: ReducedProblem, iterate: Floats) -> int:
     for j in range(unknowns):
         rest += matrix[first, j] * iterate[j]
     inertia = matrix[first, first]
+    if reduced.set[contact] == LINE:
+        iterate[first] = -rest / inertia if inertia > 0.0 else 0.0
+        return STICK
     if second < 0:
         iterate[first] = max(-rest / inertia, 0.0) if inertia > 0.0 else 0.0
         return STICK if rest < 0.0 else OPEN

@@ -6,6 +6,7 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
+from heelstrike.contact.sets import LINE, contains
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import (
     ContactProblem,
@@ -158,17 +159,13 @@ def split(
     for contact in range(count):
         if mode[contact] == OPEN:
             continue
-        along = point[place]
-        longest = max(longest, abs(along))
-        largest = max(largest, abs(along) / weight[place])
-        place += 1
-        if tangent[contact] >= 0 and mode[contact] == STICK:
-            inside = inside and abs(point[place]) <= friction[contact] * along
-            longest = max(longest, abs(point[place]))
-            largest = max(largest, abs(point[place]) / weight[place])
-            place += 1
-        else:
-            inside = inside and along >= 0.0
+        first = place
+        place += 2 if tangent[contact] >= 0 and mode[contact] == STICK else 1
+        across = point[place - 1] if place == first + 2 else 0.0
+        inside = inside and contains(problem, contact, point[first], across)
+        for i in range(first, place):
+            longest = max(longest, abs(point[i]))
+            largest = max(largest, abs(point[i]) / weight[i])
     if inside:
         return dropped > 0
 
@@ -179,7 +176,7 @@ def split(
         if mode[contact] == OPEN:
             continue
         sides = 2 if tangent[contact] >= 0 and mode[contact] == STICK else 1
-        for side in range(sides):
+        for side in range(0 if problem.set[contact] == LINE else sides):
             along = friction[contact] if sides == 2 else 1.0
             across = 2.0 * side - 1.0 if sides == 2 else 0.0
             second = place + sides - 1

@@ -11,14 +11,16 @@ contact with friction brings four pairs::
     friction still available       0 <= mu lambda_n - beta_+ - beta_-  _|_  sigma >= 0
 
 with ``lambda_t = beta_+ - beta_-`` and ``sigma`` the slip speed; one without friction brings
-the first. The matrix is copositive, so with lexicographic pivoting a ray means that the problem
-has internal forces that the free velocity works against, not that the method was unlucky.
+the first, and a line the first twice, once in each direction. The matrix is copositive, so with
+lexicographic pivoting a ray means that the problem has internal forces that the free velocity works
+against, not that the method was unlucky.
 """
 
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.sets import LINE
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import Dictionary, Floats, Integers, ReducedProblem, Tally
 
@@ -40,46 +42,55 @@ def covering(path: int, row: int) -> float:
 
 
 @kernel
+def faces_of(contact: int, reduced: ReducedProblem) -> int:
+    """How many velocities of a contact are held: with friction three, on a line both ways."""
+    if reduced.tangent[contact] >= 0:
+        return 3
+    return 2 if reduced.set[contact] == LINE else 1
+
+
+@kernel
 def load_frictional(count: int, path: int, reduced: ReducedProblem, tableau: Floats) -> int:
     """Write the reduced problem as a dictionary; return the number of pairs.
 
     The pairs of a contact are consecutive, in the order of the module's docstring. The free
     velocity is scaled to one.
     """
-    normal, tangent = reduced.normal, reduced.tangent
+    normal = reduced.normal
     offset, cone, matrix = reduced.offset, reduced.cone, reduced.matrix
     size = 0.0
     for i in range(reduced.unknowns):
         size = max(size, abs(offset[i]))
     size = 1.0 / size if size > 0.0 else 1.0
-    pairs = reduced.unknowns
+    pairs = 0
     for contact in range(count):
-        if tangent[contact] >= 0:
-            pairs += 2
+        faces = faces_of(contact, reduced)
+        pairs += 4 if faces == 3 else faces
     for i in range(pairs):
         for j in range(pairs + 1):
             tableau[i, j] = 0.0
         tableau[i, pairs + 1] = covering(path, i)
     row = 0
     for contact in range(count):
-        height = 3 if tangent[contact] >= 0 else 1
+        height = faces_of(contact, reduced)
         for i in range(height):
-            own = normal[contact] + min(i, 1)
-            own_sign = -1.0 if i == 2 else 1.0
+            own = normal[contact] + (min(i, 1) if height == 3 else 0)
+            own_sign = -1.0 if i > 0 and i == height - 1 else 1.0
             tableau[row + i, 0] = own_sign * size * offset[own]
             column = 1
             for other in range(count):
-                width = 3 if tangent[other] >= 0 else 1
+                width = faces_of(other, reduced)
                 for j in range(width):
-                    entry = matrix[own, normal[other] + min(j, 1)]
-                    tableau[row + i, column + j] = -own_sign * entry if j == 2 else own_sign * entry
-                column += 4 if width == 3 else 1
-            if i > 0:
+                    entry = matrix[own, normal[other] + (min(j, 1) if width == 3 else 0)]
+                    sign = -own_sign if j > 0 and j == width - 1 else own_sign
+                    tableau[row + i, column + j] = sign * entry
+                column += 4 if width == 3 else width
+            if i > 0 and height == 3:
                 tableau[row + i, row + 4] = 1.0
                 tableau[row + 3, row + 1 + i] = -1.0
         if height == 3:
             tableau[row + 3, row + 1] = cone[contact]
-        row += 4 if height == 3 else 1
+        row += 4 if height == 3 else height
     return pairs
 
 
@@ -134,5 +145,5 @@ def lemke(
                 mode[contact] = SLIP_FORWARD
             elif backward and not forward:
                 mode[contact] = SLIP_BACKWARD
-        row += 4 if frictional else 1
+        row += 4 if frictional else faces_of(contact, reduced)
     return status

@@ -13,6 +13,7 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
+from heelstrike.contact.sets import opening
 from heelstrike.contact.workspace import ContactProblem, Floats, Integers, ReducedProblem
 
 
@@ -25,20 +26,20 @@ def reduce_problem(
     The unknowns of a contact are consecutive, normal first. A contact whose sliding is
     prescribed has a normal unknown only, its friction following along.
     """
-    delassus, friction, scale = problem.delassus, problem.friction, reduced.scale
+    delassus, scale = problem.delassus, reduced.scale
     unknowns = 0
     for contact in range(problem.count):
         reduced.normal[contact] = unknowns
         reduced.tangent[contact] = -1
         reduced.prescribed[contact] = OPEN
         slope[contact] = 0.0
+        reduced.set[contact] = problem.set[contact]
+        friction = opening(problem, contact)
         components = 1
         if mode[contact] == SLIDING_FORWARD or mode[contact] == SLIDING_BACKWARD:
             reduced.prescribed[contact] = mode[contact]
-            slope[contact] = friction[contact]
-            if mode[contact] == SLIDING_FORWARD:
-                slope[contact] = -friction[contact]
-        elif friction[contact] > 0.0:
+            slope[contact] = -friction if mode[contact] == SLIDING_FORWARD else friction
+        elif friction > 0.0:
             reduced.tangent[contact] = unknowns + 1
             components = 2
         for component in range(components):
@@ -55,7 +56,7 @@ def reduce_problem(
             unknowns += 1
         reduced.cone[contact] = 0.0
         if components == 2:
-            reduced.cone[contact] = friction[contact] * scale[unknowns - 2] / scale[unknowns - 1]
+            reduced.cone[contact] = friction * scale[unknowns - 2] / scale[unknowns - 1]
     reduced.unknowns = unknowns
 
 

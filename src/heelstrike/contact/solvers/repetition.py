@@ -13,6 +13,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.sets import LINE, opening, projected
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -50,7 +51,7 @@ NO_PIVOT = 1e-11
 @dissolved_kernel
 def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) -> int:
     """List the rows that shall have no velocity; return how many differ, or -1 to give up."""
-    delassus, friction = problem.delassus, problem.friction
+    delassus = problem.delassus
     source, equation, sharers = rows.row, rows.equation, rows.sharers
     size = 0
     for contact in range(problem.count):
@@ -58,9 +59,9 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
         tangent = row + 1
         equation[row] = -1
         equation[tangent] = -1
-        if mode[contact] == OPEN:
+        if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
-        has_friction = friction[contact] > 0.0
+        has_friction = opening(problem, contact) > 0.0
         if mode[contact] >= SLIDING_FORWARD or (has_friction and mode[contact] != STICK):
             return -1
         equation[row] = size
@@ -324,16 +325,15 @@ def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactA
         largest = max(largest, abs(impulse[row]))
     pulling = 0
     for contact in range(problem.count):
-        normal = impulse[2 * contact]
-        if normal < -CLEAN * largest:
+        if problem.set[contact] != LINE and impulse[2 * contact] < -CLEAN * largest:
             answer.mode[contact] = OPEN
             rows.pulled[contact] = 1
             pulling += 1
-        impulse[2 * contact] = max(normal, 0.0)
     if pulling == 0:
         for contact in range(problem.count):
-            limit = problem.friction[contact] * impulse[2 * contact]
-            if not abs(impulse[2 * contact + 1]) <= limit:
+            row = 2 * contact
+            impulse[row], across = projected(problem, contact, impulse[row], impulse[row + 1])
+            if across != impulse[row + 1]:
                 return -1
     return pulling
 
@@ -353,17 +353,17 @@ def name_by_velocity(
     for contact in range(problem.count):
         normal = 2 * contact
         tangent = normal + 1
-        if velocity[normal] > rest * root[normal]:
+        if velocity[normal] > rest * root[normal] and problem.set[contact] != LINE:
             if mode[contact] != OPEN:
                 return -1
             continue
-        if mode[contact] == OPEN:
+        if mode[contact] == OPEN and problem.set[contact] != LINE:
             moves = velocity[normal] > BARELY * yardstick.unit * root[normal]
             pressed += not (moves and pulled[contact] == 1)
         mode[contact] = STICK
         if abs(velocity[tangent]) > rest * root[tangent]:
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
-            if problem.friction[contact] > 0.0:
+            if opening(problem, contact) > 0.0:
                 return -1
     return pressed
 

@@ -211,7 +211,7 @@ def try_solvers(
             # any impulse in their cone, so that the split is of least norm among all. And a
             # candidate that is not quite a solution may become one.
             for _ in range(ROUNDS):
-                if not label(count, answer.velocity, reduced.tangent, work.yardstick, mode):
+                if not label(count, answer.velocity, reduced, work.yardstick, mode):
                     break
                 for contact in range(count):
                     trial.mode[contact] = mode[contact]

@@ -27,6 +27,7 @@ from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Integers, Model
@@ -291,6 +292,7 @@ def select_candidates(
             normal += memory.restitution[contact] * before
         memory.free[2 * count] = normal
         memory.free[2 * count + 1] = velocity[contact, 1]
+        memory.problem.set[count] = CONE
         memory.problem_friction[count] = memory.friction[contact]
         memory.problem_mode[count] = memory.mode[contact]
         memory.candidate[count] = contact
@@ -323,7 +325,7 @@ def select_stops(
                 continue
             memory.free[2 * count] = normal
             memory.free[2 * count + 1] = 0.0
-            memory.problem_friction[count] = 0.0
+            memory.problem.set[count] = HALF_LINE
             memory.problem_mode[count] = memory.stop_mode[joint, end]
             memory.candidate[count] = points + 2 * joint + end
             count += 1
