@@ -324,6 +324,37 @@ class Robot:
 
         return save_robot(self, path)
 
+    def c_code(self, name: str | None = None) -> str:
+        """Return its equations of motion as a page of C99, for other programs.
+
+        Four functions of plain arrays of doubles, without branches; the robot's numbers stand in
+        tables at the head. Nothing is included but ``math.h``.
+
+        - ``NAME_kinematics(q, angle, origin)``: poses of the links, (nv,) and (nv, 2);
+        - ``NAME_mass_matrix(q, matrix)``: the mass matrix A, (nv, nv);
+        - ``NAME_bias_force(q, v, bias)``: centrifugal, Coriolis and gravitational forces H, (nv,);
+        - ``NAME_solve(q, v, force, acceleration)``: A⁻¹ (force − H), (nv,).
+
+        Parameters
+        ----------
+        name : str, optional
+            What the functions' names begin with; the robot's own name if none is given.
+
+        Returns
+        -------
+        str
+            The page, to be written to a file.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> "void bravo7_mass_matrix(" in hs.load_robot("bravo7").c_code()
+        True
+        """
+        from heelstrike.dynamics.c_code import c_code
+
+        return c_code(self.model, name or self.name, self.joint_names)
+
     def __repr__(self) -> str:
         return (
             f"Robot({self.name!r}: {self.nv} coordinates, {self.nu} actuators, "
