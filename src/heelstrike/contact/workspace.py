@@ -146,6 +146,7 @@ class StickingRows(Bundle):
     lower_half : (any,) float
         Matrix of a small system.
     spare : (2 nc,) float
+        Solution in the order of the elimination.
     programs : (any,) int
         Addresses of the programs that solve small systems, by size; zero where there is none.
     """

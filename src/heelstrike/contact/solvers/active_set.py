@@ -16,7 +16,6 @@ from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.sets import LINE, projected
 from heelstrike.contact.solvers.least_norm import split
-from heelstrike.contact.solvers.pivoting import pivot
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -27,19 +26,7 @@ from heelstrike.contact.workspace import (
     ReducedProblem,
     Yardstick,
 )
-
-RANK_TOLERANCE = 1e-12
-"""Pivots of the unit-diagonal matrix below this count as zero."""
-
-GOOD_PIVOT = 0.03
-"""Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
-matrix is stable in any order, and only its rank needs the large pivots first."""
-
-SINGULAR = 2e-15
-"""Pivots of the unit-diagonal matrix below this are rounding."""
-
-CONSISTENT = 1e-12
-"""Equations that are left with less than this, relative to the largest, are met."""
+from heelstrike.dynamics.dense import eliminate
 
 SHARP = 1e-13
 """Residuals above this are worth a step of iterative refinement."""
@@ -102,63 +89,6 @@ def assemble(
 
 
 @kernel
-def eliminate(symmetric: bool, equations: Equations) -> int:
-    """Solve the equations as far as their rank allows; return their nullity.
-
-    The solution with the free unknowns at zero goes to ``point``; ``pivot_row`` tells which
-    unknowns stayed free. Symmetric equations pivot on a large diagonal element, others on the
-    largest element of all.
-    """
-    pivot_row, taken, tableau = equations.pivot_row, equations.taken, equations.tableau
-    size = equations.size
-    speeds = 0.0
-    for i in range(size):
-        pivot_row[i] = -1
-        taken[i] = 0
-        speeds = max(speeds, abs(tableau[i, 0]))
-    nullity = size
-    smallest = RANK_TOLERANCE
-    while nullity > 0:
-        largest = smallest
-        row = size
-        column = size
-        for i in range(size):
-            if taken[i] != 0:
-                continue
-            if symmetric:
-                if tableau[i, i + 1] > largest:
-                    largest = tableau[i, i + 1]
-                    row = i
-                    column = i
-                    if largest > GOOD_PIVOT:
-                        break
-                continue
-            for j in range(size):
-                if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
-                    largest = abs(tableau[i, j + 1])
-                    row = i
-                    column = j
-        if row < size:
-            pivot(tableau, size, size + 1, row, column + 1)
-            taken[row] = 1
-            pivot_row[column] = row
-            nullity -= 1
-            continue
-        # What is left is singular. If it is not consistent, it was not quite singular.
-        left = 0.0
-        for i in range(size):
-            if taken[i] == 0:
-                left = max(left, abs(tableau[i, 0]))
-        if smallest == SINGULAR or left <= CONSISTENT * speeds:
-            break
-        smallest = SINGULAR
-    for j in range(size):
-        row = pivot_row[j]
-        equations.point[j] = equations.weight[j] * tableau[row, 0] if row >= 0 else 0.0
-    return nullity
-
-
-@kernel
 def expand(
     problem: ContactProblem, point: Floats, slope: Floats, tangent: Integers, answer: ContactAnswer
 ) -> None:
@@ -206,7 +136,15 @@ def evaluate(problem: ContactProblem, work: ContactWorkspace) -> float:
     symmetric = work.settings.skewed == 0
     for j in range(equations.size):
         symmetric = symmetric and equations.lean[j] == 0.0
-    singular = eliminate(symmetric, equations) > 0
+    singular = (
+        eliminate(
+            equations.size, symmetric, equations.tableau, equations.pivot_row, equations.taken
+        )
+        > 0
+    )
+    for j in range(equations.size):
+        row = equations.pivot_row[j]
+        point[j] = equations.weight[j] * equations.tableau[row, 0] if row >= 0 else 0.0
     held = not symmetric  # whether directions that change a velocity are held back
     if singular:
         held = split(problem, trial.mode, held, reduced, work.tally, equations)

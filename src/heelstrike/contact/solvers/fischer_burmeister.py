@@ -28,6 +28,7 @@ from heelstrike.contact.modes import (
 )
 from heelstrike.contact.sets import LINE
 from heelstrike.contact.workspace import Integers, Iteration, ReducedProblem, Tally
+from heelstrike.dynamics.dense import solve_positive
 
 STEPS = 30
 """Newton steps from one starting point."""
@@ -134,16 +135,7 @@ def newton_step(unknowns: int, damping: float, iteration: Iteration) -> None:
                 step[i] -= factor * value[k]
                 for j in range(unknowns):
                     square[i, j] += factor * tableau[k, j]
-    for k in range(unknowns):
-        for i in range(k + 1, unknowns):
-            factor = square[i, k] / square[k, k]
-            step[i] -= factor * step[k]
-            for j in range(k + 1, unknowns):
-                square[i, j] -= factor * square[k, j]
-    for i in range(unknowns - 1, -1, -1):
-        for j in range(i + 1, unknowns):
-            step[i] -= square[i, j] * step[j]
-        step[i] /= square[i, i]
+    solve_positive(unknowns, square, step)
 
 
 @kernel

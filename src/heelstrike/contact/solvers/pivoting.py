@@ -1,29 +1,11 @@
-"""Pivoting of a dictionary: the operation, and Lemke's way of choosing what to pivot.
-
-A dictionary writes its basic variables in terms of the others: row i reads
-``basic_i = tableau[i, 0] + sum_j tableau[i, j] * other_j`` with columns j from 1.
-"""
+"""Lemke's way of choosing what to pivot."""
 
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import ITERATION_LIMIT, RAY, SOLVED
 from heelstrike.contact.workspace import Dictionary, Floats, Integers, Tally
-
-
-@kernel
-def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> None:
-    """Exchange the basic variable of ``row`` with the other variable of ``column``."""
-    inverse = 1.0 / tableau[row, column]
-    for j in range(columns):
-        tableau[row, j] *= -inverse
-    tableau[row, column] = inverse
-    for i in range(rows):
-        factor = tableau[i, column]
-        if i != row and factor != 0.0:
-            tableau[i, column] = 0.0
-            for j in range(columns):
-                tableau[i, j] += factor * tableau[row, j]
+from heelstrike.dynamics.dense import pivot
 
 
 @kernel

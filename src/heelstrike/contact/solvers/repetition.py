@@ -24,6 +24,7 @@ from heelstrike.contact.workspace import (
     StickingRows,
     Yardstick,
 )
+from heelstrike.dynamics.dense import solve_positive
 
 SAME_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
@@ -163,17 +164,19 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> b
     """
     if solve_at_once(size, problem, rows):
         return True
-    delassus, source, matrix, x = problem.delassus, rows.row, rows.factor, rows.x
+    delassus, source, order = problem.delassus, rows.row, rows.order
+    matrix, x = rows.factor, rows.spare
+    for i in range(size):
+        order[i] = i
     rank = 0
     rest = size
     least = GOOD_PIVOT
     poor = False
-    moved = False
     while rank < rest:
-        row = source[rank]
+        row = source[order[rank]]
         total = -problem.free[row]
         for j in range(rank):
-            entry = delassus[row, source[j]]
+            entry = delassus[row, source[order[j]]]
             for k in range(j):
                 entry -= matrix[rank, k] * matrix[j, k]
             # Until the row is finished, its entries still carry their D.
@@ -193,11 +196,9 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> b
             poor = poor or pivot > POOR_PIVOT * diagonal
             rest -= 1
             rows.span[rest] = rank
-            if rest > rank:
-                if not moved:
-                    begin_order(size, rows)
-                    moved = True
-                exchange(rank, rest, rows)
+            order[rank], order[rest] = order[rest], order[rank]
+            for i in range(rank):
+                matrix[rest, i] = matrix[rank, i]
         else:
             return False
         if poor and rank == rest:
@@ -211,37 +212,9 @@ def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> b
             x[j] -= matrix[i, j] * x[i]
     if rank < size:
         shorten(rank, size, rows)
-    if moved:
-        put_back(size, rows)
+    for place in range(size):
+        rows.x[order[place]] = x[place]
     return True
-
-
-@kernel
-def begin_order(size: int, rows: StickingRows) -> None:
-    """List the equations in their order."""
-    for i in range(size):
-        rows.order[i] = i
-
-
-@kernel
-def exchange(rank: int, rest: int, rows: StickingRows) -> None:
-    """Exchange the equation in hand for the last that is untried."""
-    source, order, matrix, sharers = rows.row, rows.order, rows.factor, rows.sharers
-    source[rank], source[rest] = source[rest], source[rank]
-    order[rank], order[rest] = order[rest], order[rank]
-    sharers[rank], sharers[rest] = sharers[rest], sharers[rank]
-    for i in range(rank):
-        matrix[rest, i] = matrix[rank, i]
-
-
-@kernel
-def put_back(size: int, rows: StickingRows) -> None:
-    """Undo all exchanges in the solution and the list of sharers."""
-    for vector in (rows.x, rows.sharers):
-        for place in range(size):
-            rows.spare[place] = vector[place]
-        for place in range(size):
-            vector[rows.order[place]] = rows.spare[place]
 
 
 @kernel
@@ -254,7 +227,7 @@ def shorten(rank: int, size: int, rows: StickingRows) -> None:
 
         x₂ = M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
     """
-    matrix, x, sharers = rows.factor, rows.x, rows.sharers
+    matrix, x, sharers, order = rows.factor, rows.spare, rows.sharers, rows.order
     y, system = rows.pivot, rows.square
     for place in range(rank, size):
         part = matrix[place]
@@ -269,45 +242,23 @@ def shorten(rank: int, size: int, rows: StickingRows) -> None:
         y[i] = x[i]
         for j in range(i):
             system[i, j] = 0.0
-        system[i, i] = sharers[i]
+        system[i, i] = sharers[order[i]]
     for place in range(rank, size):
         part = matrix[place]
         for i in range(rank):
-            weighted = sharers[place] * part[i]
+            weighted = sharers[order[place]] * part[i]
             for j in range(i + 1):
                 system[i, j] += weighted * part[j]
-    solve_regular(rank, system, y)
+    solve_positive(rank, system, y)
     for place in range(rank, size):
         part = matrix[place]
         entry = 0.0
         for i in range(rank):
             entry += part[i] * y[i]
-        entry *= sharers[place]
+        entry *= sharers[order[place]]
         x[place] = entry
         for i in range(rank):
             x[i] -= part[i] * entry
-
-
-@dissolved_kernel
-def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
-    """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
-    for i in range(size):
-        for j in range(i):
-            entry = matrix[i, j]
-            for k in range(j):
-                entry -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = entry
-        for j in range(i):
-            ratio = matrix[i, j] * matrix[j, j]
-            matrix[i, i] -= ratio * matrix[i, j]
-            x[i] -= ratio * x[j]
-            matrix[i, j] = ratio
-        matrix[i, i] = 1.0 / matrix[i, i]
-    for j in range(size - 1, -1, -1):
-        total = x[j] * matrix[j, j]
-        for i in range(j + 1, size):
-            total -= matrix[i, j] * x[i]
-        x[j] = total
 
 
 @dissolved_kernel
