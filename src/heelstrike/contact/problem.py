@@ -7,6 +7,7 @@ impulse with ``w = G lambda + b`` and, at every contact, ``0 <= w_n _|_ lambda_n
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,6 +87,11 @@ class ContactSolution:
     mode: tuple[ContactMode, ...]
     certificate: Certificate
 
+
+KEPT_CONTACTS = 16
+"""Problems of up to so many contacts are solved in memory that is kept."""
+
+_kept = threading.local()
 
 DEFAULT_ORDER = (Solver.LEMKE, Solver.FISCHER_BURMEISTER, Solver.GAUSS_SEIDEL)
 """The order in which solvers are tried; a chosen solver moves to the front."""
@@ -206,7 +212,7 @@ def run_solvers(
     count = friction.size
     matrix, matrix_shift = _near_one(delassus, even=True)
     offset, offset_shift = _near_one(free)
-    work = contact_workspace(count)
+    work = _memory(count)
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
     work.settings.skewed = 0 if semidefinite else 1
@@ -240,6 +246,16 @@ def run_solvers(
         velocity_error=error,
     )
     return impulse, velocity, certificate
+
+
+def _memory(count: int) -> ContactWorkspace:
+    """Return memory to solve in; that of few contacts is kept, one for each thread."""
+    if count > KEPT_CONTACTS:
+        return contact_workspace(count)
+    if not hasattr(_kept, "memory"):
+        _kept.memory = contact_workspace(KEPT_CONTACTS)
+    memory: ContactWorkspace = _kept.memory
+    return memory
 
 
 def _near_one(values: Floats, *, even: bool = False) -> tuple[Floats, int]:
