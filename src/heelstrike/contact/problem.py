@@ -290,6 +290,21 @@ def check_accuracy(tolerance: float, floor: float) -> None:
         raise ContactProblemError(f"floor must be a number ≥ 0; got {floor}")
 
 
+def check_finite(**arrays: Floats) -> None:
+    """Refuse infinite entries and such that are no numbers.
+
+    Raises
+    ------
+    ContactProblemError
+        With the name of the array and the place of the entry.
+    """
+    for name, values in arrays.items():
+        for where in np.argwhere(~np.isfinite(values)):
+            raise ContactProblemError(
+                f"{name}{where.tolist()} is {values[tuple(where)]}; all entries must be finite"
+            )
+
+
 def _solver(solver: str | Solver) -> Solver:
     choices = ", ".join(choice.value for choice in DEFAULT_ORDER)
     try:
@@ -329,12 +344,7 @@ def _checked(
             f"friction has shape {coefficient.shape}; give one number, or one for each of the "
             f"{count} contacts"
         )
-    for name, values in (("delassus", matrix), ("free", offset), ("friction", coefficient)):
-        if not np.all(np.isfinite(values)):
-            where = np.argwhere(~np.isfinite(values))[0]
-            raise ContactProblemError(
-                f"{name}{where.tolist()} is {values[tuple(where)]}; all entries must be finite"
-            )
+    check_finite(delassus=matrix, free=offset, friction=coefficient)
     if np.any(coefficient < 0.0):
         contact = int(np.argmin(coefficient))
         raise ContactProblemError(
