@@ -116,8 +116,9 @@ def certify(
     """Compute the velocity an impulse gives and the residuals; return the largest of them.
 
     The residuals are complementarity, cone and non-penetration, scaled as in :class:`Certificate`;
-    what is returned includes rounding. ``yardstick.slope`` is not zero where a contact is prescribed
-    to slide; its friction then lies on the given edge and its tangential velocity is not constrained.
+    what is returned includes rounding. ``yardstick.slope`` is not zero where a contact is
+    prescribed to slide; its friction then lies on the given edge and its tangential velocity is not
+    constrained.
 
     Writes ``velocity`` and ``residual`` of the answer, and the rest of the yardstick.
     """
