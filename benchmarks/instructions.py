@@ -36,9 +36,7 @@ import heelstrike as hs
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.experiments.engines import Scenario
 from heelstrike.robot import read_mjcf
-from heelstrike.sim.controller.guard import guarded
-from heelstrike.sim.engine import PAUSED
-from heelstrike.sim.simulation import compiled_form, prepared
+from heelstrike.sim.frame import Outcome
 
 KEPT = Path(__file__).with_name("instructions.json")
 TOLERANCE = 0.02
@@ -160,32 +158,27 @@ class Loop:
 
     def __init__(self, counted: Counted) -> None:
         scenario = counted.scenario
-        controller = scenario.feedback if counted.controller is None else counted.controller
-        compiled = compiled_form(scenario.robot, controller)
-        assert compiled is not None
-        self._loop = prepared(
-            robot=scenario.robot,
+        self._simulation = hs.Simulation(
+            scenario.robot,
+            scenario.feedback if counted.controller is None else counted.controller,
             state=scenario.state,
-            duration=10.0,
             method=counted.method,
             ground=scenario.ground,
-            control_period=None,
             record_every=2**62,
             stop_when_fallen=False,
-            pushes=(),
         )
-        self._loop.begin()
-        self._arguments = compiled.kernel, guarded(compiled.parameters), guarded(compiled.memory)
+        self._simulation._clock.until = 10.0
 
     @property
     def time(self) -> float:
         """Simulated time now (s)."""
-        return self._loop.engine.time
+        return self._simulation.time
 
     def advance(self, steps: int) -> None:
         """Take some steps of the method."""
-        self._loop.engine.pause_after(steps)
-        if self._loop.engine.advance(*self._arguments, self._loop.records[-1]) != PAUSED:
+        clock = self._simulation._clock
+        clock.pause = clock.index + steps
+        if self._simulation._run_loop() is not Outcome.PAUSED:
             raise RuntimeError(f"the run ended early at t = {self.time} s")
 
 

@@ -21,8 +21,8 @@ import robot_cases
 
 from heelstrike.cli.main import app
 from heelstrike.cli.walk import walk
-from heelstrike.compiler.straight_line import Recording
-from heelstrike.compiler.tape import ADD, COSINE, DIVIDE, MULTIPLY, NEGATE, READ, SINE, SUBTRACT
+from heelstrike.compiler.recording import Program, Recording
+from heelstrike.compiler.tape import Entry, Operation, Result
 from heelstrike.dynamics.kernels import state_equations
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot import builtin_robots, load_robot
@@ -179,22 +179,23 @@ def test_operations_are_those_that_are_recorded() -> None:
     """What straight-line code of bravo7's equations of motion computes, and reads to do so."""
     robot = load_robot("bravo7")
     matrix, vector = np.zeros((robot.nv, robot.nv)), np.zeros(robot.nv)
-    recording = Recording(
+    equations = Program(
         state_equations,
         {
             "model": robot.model, "q": vector, "v": vector, "tree": workspace(robot.nv),
             "matrix": matrix, "factor": matrix, "bias": vector,
         },
-        known={"tree.zero": np.zeros(robot.nv, object)},
     )  # fmt: skip
-    tape = recording.tape.operations
-    operations = [entry for entry in tape if entry[0] != READ]
-    count = Counter(entry[0] for entry in operations)
-    assert count[SINE] == count[COSINE]
-    operands = {place for _, *places in operations for place in places if isinstance(place, int)}
-    read = sum(tape[place][0] == READ for place in operands)
+    recording = Recording(equations, known={"tree.zero": np.zeros(robot.nv)})
+    results = [value for value in recording.tape.values if isinstance(value, Result)]
+    count = Counter(value.operation for value in results)
+    sines = count[Operation.SINE]
+    assert sines == count[Operation.COSINE]
+    operands = {operand for value in results for operand in value.operands}
+    read = sum(isinstance(operand, Entry) for operand in operands)
     assert (
-        f"{len(operations) + read} operations for bravo7: {count[MULTIPLY]} products, "
-        f"{count[ADD] + count[SUBTRACT]} sums and differences, {count[NEGATE]} negations, "
-        f"{count[DIVIDE]} divisions, {count[SINE]} sines and cosines, {read} numbers read"
+        f"{len(results) + read} operations for bravo7: {count[Operation.MULTIPLY]} products, "
+        f"{count[Operation.ADD] + count[Operation.SUBTRACT]} sums and differences, "
+        f"{count[Operation.NEGATE]} negations, {count[Operation.DIVIDE]} divisions, "
+        f"{sines} sines and cosines, {read} numbers read"
     ) in " ".join(PERFORMANCE.split())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from heelstrike.experiments.engines import Engine, Peer, Scenario, simulators
 from heelstrike.sim import Compliant, EventDriven, EventKind, HuntCrossley, Scheme, TimeStepping
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 from speed import scenarios
 from speed.race import reason
 from speed.stopwatch import Work, best_of

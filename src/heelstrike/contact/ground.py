@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -185,6 +186,32 @@ class Ground:
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
 
+    def numbers(self) -> dict[str, Floats]:
+        """Return the ground as arrays that :meth:`of_numbers` makes it of."""
+        return {
+            "corner": self._model.vertices,
+            "friction": self._model.friction,
+            "restitution": self._model.restitution,
+            "slope": np.array(self.slope),
+            "has_profile": np.array(self.profile is not None, dtype=np.float64),
+        }
+
+    @classmethod
+    def of_numbers(cls, numbers: Mapping[str, Floats]) -> Ground:
+        """Make the ground of :meth:`numbers`.
+
+        Parameters
+        ----------
+        numbers : mapping of str to array
+            What that returned.
+        """
+        return cls(
+            friction=_one_if_equal(numbers["friction"]),
+            restitution=_one_if_equal(numbers["restitution"]),
+            slope=float(numbers["slope"]),
+            profile=numbers["corner"] if numbers["has_profile"] else None,
+        )
+
     def model(self) -> GroundModel:
         """Return the arrays that the kernels use."""
         return self._model
@@ -212,6 +239,10 @@ class Ground:
         slope = (right[..., 1] - left[..., 1]) / np.where(run > 0.0, run, np.inf)
         height: Floats = left[..., 1] + slope * (x - left[..., 0])
         return height
+
+
+def _one_if_equal(values: Floats) -> Floats | float:
+    return float(values[0]) if len(values) and np.all(values == values[0]) else values
 
 
 def _polyline(profile: ArrayLike) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from heelstrike.dynamics.coordinates import difference, integrate
 from heelstrike.dynamics.energies import energy, kinetic_energy, potential_energy
 from heelstrike.dynamics.equations_of_motion import (
     applied_force,
@@ -55,9 +56,11 @@ __all__ = [
     "contact_jacobian",
     "contact_positions",
     "coriolis_force",
+    "difference",
     "energy",
     "forward_dynamics",
     "gravity_force",
+    "integrate",
     "inverse_dynamics",
     "kinetic_energy",
     "linearize",

@@ -9,7 +9,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Run, simulate
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 from heelstrike.sim.whole_run import whole
 
 NEVER = 2**62

@@ -12,9 +12,8 @@ from gait_motion import contact_rates, foot_jacobian, place, selection, standing
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.dynamics.symbolic import expression, symbols
-from heelstrike.gait.impact import Impact
-from heelstrike.gait.single_support import SingleSupport
 from heelstrike.gait.sole import sole
+from heelstrike.gait.support import Impact, Support
 
 
 class Evaluated(NamedTuple):
@@ -38,7 +37,7 @@ def evaluated(robot: hs.Robot, *motion: np.ndarray) -> Evaluated:
     names = ("position", "velocity", "acceleration", "velocity_after")
     inputs = [casadi.SX.sym(name, robot.nv - 3) for name in names]
     q, v, a, after = (symbols(part) for part in inputs)
-    support = SingleSupport(robot, sole(robot, 0), q, v, a)
+    support = Support(robot, sole(robot, 0), q, v, a)
     impact = Impact(support, sole(robot, 1), after)
     function = casadi.Function(
         "evaluate",
@@ -47,10 +46,10 @@ def evaluated(robot: hs.Robot, *motion: np.ndarray) -> Evaluated:
             expression(support.q),
             expression(support.v),
             expression(support.torque),
-            casadi.vertcat(support.force_x, support.force_z, support.moment),
+            expression(support.wrench),
             expression(impact.v),
-            casadi.vertcat(impact.impulse_x, impact.impulse_z, impact.impulse_moment),
-            expression(impact.joint_impulse),
+            expression(impact.impulse),
+            expression(impact.rest),
         ],
     )
     return Evaluated(*(np.array(part).ravel() for part in function(*motion)))
