@@ -44,6 +44,16 @@ class Mirror:
         """Return the mirror of vectors that have these coordinates only, in this order.
 
         The counterpart of a coordinate that is not among them is the coordinate itself.
+
+        Parameters
+        ----------
+        coordinates : sequence of int
+            Places of the coordinates in q.
+
+        Returns
+        -------
+        Mirror
+            Their mirror.
         """
         chosen = np.asarray(coordinates, dtype=np.int64)
         place = {coordinate: i for i, coordinate in enumerate(chosen.tolist())}
@@ -62,25 +72,82 @@ class Mirror:
         return offset
 
     def position(self, q: Any, reference: Floats | None = None) -> Any:
-        """Mirror positions (..., nq); about another reference than the robot's if one is given."""
+        """Mirror positions (..., nq); about another reference than the robot's if one is given.
+
+        Parameters
+        ----------
+        q : (..., nq) float
+            Positions.
+        reference : (nq,) float, optional
+            Another reference.
+
+        Returns
+        -------
+        (..., nq) float
+            Positions of the mirror image.
+        """
         about = self.reference if reference is None else reference
         return self.sign * (self._exchanged(q) - about[self.joint]) + about
 
     def velocity(self, v: Any) -> Any:
-        """Mirror velocities, accelerations or generalised forces, (..., nv)."""
+        """Mirror velocities, accelerations or generalised forces, (..., nv).
+
+        Parameters
+        ----------
+        v : (..., nv) float
+            Velocities or accelerations.
+
+        Returns
+        -------
+        (..., nv) float
+            Those of the mirror image.
+        """
         return self.sign * self._exchanged(v)
 
     def state(self, state: State) -> State:
-        """Mirror a state."""
+        """Mirror a state.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        State
+            Its mirror image.
+        """
         return State(self.position(state.q), self.velocity(state.v))
 
     def ranges(self, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-        """Mirror the ends of ranges of the coordinates, (nq,) each."""
+        """Mirror the ends of ranges of the coordinates, (nq,) each.
+
+        Parameters
+        ----------
+        lower, upper : (nq,) float
+            The ends.
+
+        Returns
+        -------
+        tuple
+            Lower and upper ends of the mirror image.
+        """
         ends = self.position(lower), self.position(upper)
         return np.minimum(*ends), np.maximum(*ends)
 
     def at_contacts(self, values: Floats) -> Floats:
-        """Mirror forces, positions … of the contact points in x–z, (nc, ...)."""
+        """Mirror forces, positions … of the contact points in x–z, (nc, ...).
+
+        Parameters
+        ----------
+        values : (nc, ...) float
+            A value of each contact point.
+
+        Returns
+        -------
+        (nc, ...) float
+            Those of the mirror image.
+        """
         return values[self.contact]
 
     def _exchanged(self, vector: Any) -> Any:

@@ -174,7 +174,18 @@ class Model(Bundle):
 
     @classmethod
     def made(cls, **members: Any) -> Model:
-        """Make a model of anything array-like; lists may be empty."""
+        """Make a model of anything array-like; lists may be empty.
+
+        Parameters
+        ----------
+        **members : array
+            Every member by its name.
+
+        Returns
+        -------
+        Model
+            The model.
+        """
         made = dict(members)
         for name, number in NUMBERS.items():
             if number.shape:
