@@ -31,7 +31,8 @@ from heelstrike.contact.solvers.search import try_solvers
 from heelstrike.dynamics import kernels
 from heelstrike.robot import load_robot
 from heelstrike.sim import programs
-from heelstrike.sim.time_stepping import method as time_stepping
+from heelstrike.sim.frame import frame
+from heelstrike.sim.time_stepping import TimeStepping
 
 keys = []
 def keep(names, described, made_of, write):
@@ -43,7 +44,7 @@ programs._programs(robot.model, programs.usual_points(robot))
 elimination._programs()
 made_of = PrivateNumba().made_of
 print(json.dumps({
-    "loop": made_of(time_stepping._advance),
+    "loop": made_of(frame(TimeStepping.kernels)),
     "solvers": made_of(try_solvers._function),
     "kinematics": made_of(kernels.forward_kinematics.py_func),
     "programs": keys[0],

@@ -7,8 +7,8 @@
 ====================  ==========================  =========================================
 
 A group has two rows, normal and tangent. Only cones have friction; that of other sets is zero. An
-interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a normal impulse that is
-known (:func:`press`).
+interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a normal impulse that
+is known (:func:`press`).
 """
 
 from __future__ import annotations
