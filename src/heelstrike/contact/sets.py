@@ -7,8 +7,8 @@
 ====================  ==========================  =========================================
 
 A group has two rows, normal and tangent. Only cones have friction; that of other sets is zero. An
-interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a normal impulse that is
-known (:func:`press`).
+interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a normal impulse that
+is known (:func:`press`).
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ def projected(
 @kernel
 def contains(problem: ContactProblem, group: int, normal: float, tangent: float) -> bool:
     """Whether an impulse is in its set."""
-    if normal < 0.0 and problem.set[group] == LINE:
-        return tangent == 0.0
+    if normal < 0.0:
+        return problem.set[group] == LINE and tangent == 0.0
     return abs(tangent) <= problem.friction[group] * normal
 
 
