@@ -62,7 +62,7 @@ test-documented: $(VENV)/installed-dev
 	$(PYTEST)
 
 bench: $(VENV)/installed
-	$(BIN)/heelstrike bench --out bench
+	$(BIN)/python benchmarks/speed run --out bench
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff format --check .

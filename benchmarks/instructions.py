@@ -30,10 +30,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from speed.scenarios import falling, plank, standing, walk_gait
+
+import heelstrike as hs
+from heelstrike.control.joint_feedback import JointFeedback
+from heelstrike.experiments.engines import Scenario
+from heelstrike.robot import read_mjcf
+from heelstrike.sim.frame import Outcome
 
 KEPT = Path(__file__).with_name("instructions.json")
 TOLERANCE = 0.02
 STEP = 1e-3
+TIME_STEPPING = hs.TimeStepping(step=STEP)
 
 # What valgrind 3.19 can run.
 TARGET = {
@@ -60,173 +68,135 @@ class Counted:
     scenario : Scenario
     first, count : int
         Steps to let pass, and steps to count.
-    method : str
+    method : Method
         Way through time.
-    friction : float
-        Coefficient of the ground.
+    controller : controller, optional
+        Instead of the scenario's own law.
     beside : str
         Scenario of the same robot that only sticks, whose count this one's is held against.
     """
 
-    scenario: Any
+    scenario: Scenario
     first: int
     count: int
-    method: str = "TimeStepping"
-    friction: float = 0.75
+    method: Any = TIME_STEPPING
+    controller: Any = None
     beside: str = ""
 
 
-def scenarios() -> dict[str, Counted]:
-    """What is counted, by name."""
-    from heelstrike import State, load_robot
-    from heelstrike.control.joint_feedback import JointFeedback
-    from heelstrike.experiments.benchmark.scenarios import (
-        Scenario,
-        falling,
-        plank,
-        standing,
-        walking,
-    )
-    from heelstrike.robot import Robot, read_mjcf
-
-    def at_reference(robot: Robot, speed: float, feedback: JointFeedback | None = None) -> Scenario:
-        """Return a robot in its reference position, moving forward at a speed (m/s)."""
-        state = State(robot.model.reference, speed * np.eye(robot.nv)[0])
-        return Scenario(robot.name, robot, state, 1.0, feedback)
-
-    def held(robot: Robot, beyond: float) -> JointFeedback:
-        """Return springs that want hips and knees some angle (rad) beyond their stops."""
-        bent = np.array(["ankle" not in name for name in robot.actuator_names])
-        target = robot.model.reference[robot.model.actuator_joint] + beyond * bent
-        return JointFeedback(robot, target, kp=1000.0, kd=15.0)
-
-    def stamping() -> Scenario:
-        """Return bravo7 whose hips jump ± 0.05 rad every 20 ms: contacts change in most steps."""
-        still = standing("bravo7")
-        law, robot = still.feedback, still.robot
-        assert law is not None
-        sign = np.array([1.0 if "right" in name else -1.0 for name in robot.actuator_names])
-        jump = 0.05 * law.kp * sign * ["hip" in name for name in robot.actuator_names]
-        begins = 0.02 * np.arange(50)
-        command = law.coefficients[0, :, 0] + np.where(np.arange(50)[:, None] % 2, -jump, jump)
-        law = JointFeedback(
-            robot, 0.0, torque=command[..., None], kp=law.kp, kd=law.kd, begins=begins
-        )
-        return replace(still, feedback=law)
-
-    walk = replace(walking(), feedback=walking().own)
+def scenarios(gait: hs.Gait | None = None) -> dict[str, Counted]:
+    """What is counted, by name; designs the gait that is walked, unless it is given."""
+    walker, eight = hs.load_robot("walker2d"), read_mjcf(plank(8))
     bent = standing("bravo7")
-    sliding = replace(bent, state=State(bent.state.q, 0.5 * np.eye(bent.robot.nv)[0]))
-    walker, eight = load_robot("walker2d"), read_mjcf(plank(8))
+    robot = bent.robot
+    gait = walk_gait()[1] if gait is None else gait
+    walk = Scenario("bravo7 walking", robot, gait.initial_state, 1.0)
+    law = hs.ComputedTorque(robot, gait)
+    sliding = hs.State(bent.state.q, 0.5 * np.eye(robot.nv)[0])
     on_stops = {"beside": "standing, walker2d"}
     return {
         "standing, knees straight": Counted(standing("bravo7", bent=False), 100, 500),
         "standing, knees bent": Counted(bent, 100, 500),
         "standing, walker2d": Counted(standing("walker2d"), 100, 500),
-        "standing, plank on 8 points": Counted(at_reference(eight, 0.0), 100, 500),
-        "walking, computed torque": Counted(walk, 0, 1000),
-        "walking, event driven": Counted(walk, 20, 200, "EventDriven"),
-        "walking, compliant": Counted(walk, 20, 900, "Compliant"),
+        "standing, plank on 8 points": Counted(at_reference(eight), 100, 500),
+        "walking, computed torque": Counted(walk, 0, 1000, controller=law),
+        "walking, event driven": Counted(walk, 20, 200, hs.EventDriven(), law),
+        "walking, compliant": Counted(walk, 20, 900, hs.Compliant(), law),
         "falling": Counted(falling("bravo7"), 0, 400),
-        "at its stops, walker2d left alone": Counted(at_reference(walker, 0.0), 0, 600, **on_stops),
+        "at its stops, walker2d left alone": Counted(at_reference(walker), 0, 600, **on_stops),
         "at its stops, walker2d held": Counted(
-            at_reference(walker, 0.0, held(walker, 0.0)), 0, 600, **on_stops
+            at_reference(walker, feedback=held(walker, 0.0)), 0, 600, **on_stops
         ),
         "against its stops, walker2d": Counted(
-            at_reference(walker, 0.0, held(walker, 0.02)), 0, 600, **on_stops
+            at_reference(walker, feedback=held(walker, 0.02)), 0, 600, **on_stops
         ),
-        "slipping, bravo7": Counted(sliding, 50, 500, friction=0.05, beside="standing, knees bent"),
+        "slipping, bravo7": Counted(
+            replace(bent, state=sliding, friction=0.05), 50, 500, beside="standing, knees bent"
+        ),
         "stamping, bravo7": Counted(
-            stamping(), 0, 600, friction=0.1, beside="standing, knees bent"
+            replace(bent, feedback=stamping(bent), friction=0.1), 0, 600,
+            beside="standing, knees bent",
         ),
         "slipping, plank on 8 points": Counted(
-            at_reference(eight, 5.0), 50, 500, friction=0.2, beside="standing, plank on 8 points"
+            replace(at_reference(eight, speed=5.0), friction=0.2), 50, 500,
+            beside="standing, plank on 8 points",
         ),
-    }
+    }  # fmt: skip
 
 
-def prepare(folder: Path) -> None:
-    """Write down what the counted process needs, and compile everything it will run."""
-    from heelstrike.experiments.benchmark.scenarios import plank
+def at_reference(
+    robot: hs.Robot, *, speed: float = 0.0, feedback: JointFeedback | None = None
+) -> Scenario:
+    """Return a robot in its reference position, moving forward at a speed (m/s)."""
+    state = hs.State(robot.model.reference, speed * np.eye(robot.nv)[0])
+    return Scenario(robot.name, robot, state, 1.0, feedback)
 
-    (folder / "plank.xml").write_text(plank(8))
-    for number, (name, counted) in enumerate(scenarios().items()):
+
+def held(robot: hs.Robot, beyond: float) -> JointFeedback:
+    """Return springs that want hips and knees some angle (rad) beyond their stops."""
+    bent = np.array(["ankle" not in name for name in robot.actuator_names])
+    target = robot.model.reference[robot.model.actuator_joint] + beyond * bent
+    return JointFeedback(robot, target, kp=1000.0, kd=15.0)
+
+
+def stamping(still: Scenario) -> JointFeedback:
+    """Return a law under which knees jump ± 0.02 rad every 5 ms: contacts change in most steps.
+
+    What it does must not hang on rounding: a change of 1e-12 stays one.
+    """
+    law, robot = still.feedback, still.robot
+    assert law is not None
+    sign = np.array([1.0 if "right" in name else -1.0 for name in robot.actuator_names])
+    jump = 0.02 * law.kp * sign * ["knee" in name for name in robot.actuator_names]
+    command = law.coefficients[0, :, 0] + np.where(np.arange(200)[:, None] % 2, -jump, jump)
+    begins = 0.005 * np.arange(200)
+    return JointFeedback(robot, 0.0, torque=command[..., None], kp=law.kp, kd=law.kd, begins=begins)
+
+
+class Loop:
+    """The compiled loop of a simulation, begun."""
+
+    def __init__(self, counted: Counted) -> None:
         scenario = counted.scenario
-        compiled = None if scenario.feedback is None else scenario.feedback.compiled()
-        robot = scenario.robot.name
-        np.savez(
-            folder / f"scenario{number:02d}.npz",
-            name=name,
-            robot=str(folder / "plank.xml") if robot == "plank" else robot,
-            kernel="" if compiled is None else compiled.kernel.__name__,
-            q=scenario.state.q,
-            v=scenario.state.v,
-            parameters=np.zeros(0) if compiled is None else compiled.parameters,
-            memory=np.zeros(0) if compiled is None else compiled.memory,
-            first=counted.first,
-            count=counted.count,
+        self._simulation = hs.Simulation(
+            scenario.robot,
+            scenario.feedback if counted.controller is None else counted.controller,
+            state=scenario.state,
             method=counted.method,
-            friction=counted.friction,
-            beside=counted.beside,
+            ground=scenario.ground,
+            record_every=2**62,
+            stop_when_fallen=False,
         )
+        self._simulation._clock.until = 10.0
+
+    @property
+    def time(self) -> float:
+        """Simulated time now (s)."""
+        return self._simulation.time
+
+    def advance(self, steps: int) -> None:
+        """Take some steps of the method."""
+        clock = self._simulation._clock
+        clock.pause = clock.index + steps
+        if self._simulation._run_loop() is not Outcome.PAUSED:
+            raise RuntimeError(f"the run ended early at t = {self.time} s")
 
 
 def count(folder: Path, switch: Any) -> None:
     """Run the scenarios, counting (or, without a switch, only compiling)."""
-    import heelstrike
-    from heelstrike import Ground, State, load_robot
-    from heelstrike.compiler.separate_kernel import SeparateKernel
-    from heelstrike.sim import CompiledController
-    from heelstrike.sim.controller.guard import guarded
-    from heelstrike.sim.method import PAUSED
-    from heelstrike.sim.simulation import compiled_form, prepared
-
-    for file in sorted(folder.glob("scenario*.npz")):
-        given = np.load(file)
-        robot = load_robot(str(given["robot"]))
-        name = str(given["kernel"])
-        controller = compiled_form(robot, None)
-        if name:
-            module = "computed_torque" if name == "computed_torque" else "joint_feedback"
-            kernel = getattr(__import__(f"heelstrike.control.{module}", fromlist=[name]), name)
-            kernel = kernel.finish() if isinstance(kernel, SeparateKernel) else kernel
-            controller = CompiledController(kernel, given["parameters"], given["memory"])
-        assert controller is not None
-        loop = prepared(
-            robot=robot,
-            state=State(given["q"], given["v"]),
-            duration=10.0,
-            method=getattr(heelstrike, str(given["method"]))(),
-            ground=Ground(friction=float(given["friction"])),
-            control_period=None,
-            record_every=2**62,
-            stop_when_fallen=False,
-            pushes=(),
-        )
-        loop.begin()
-        parameters = guarded(controller.parameters)
-        memory = guarded(controller.memory)
-
-        def advance(
-            steps: int,
-            loop: Any = loop,
-            kernel: Any = controller.kernel,
-            parameters: Any = parameters,
-            memory: Any = memory,
-        ) -> None:
-            loop.engine.pause_after(steps)
-            if loop.engine.advance(kernel, parameters, memory, loop.records[-1]) != PAUSED:
-                raise RuntimeError(f"the run ended early at t = {loop.engine.time} s")
-
-        advance(int(given["first"]))
-        begin = loop.engine.time
-        for label, steps in (("call", 0), ("steps", int(given["count"]))):
+    seconds = {}
+    for name, counted in scenarios(hs.load_gait(folder / "gait.json")).items():
+        loop = Loop(counted)
+        loop.advance(counted.first)
+        begin = loop.time
+        for label, steps in (("call", 0), ("steps", counted.count)):
             if switch is not None:
                 switch.begin()
-            advance(steps)
+            loop.advance(steps)
             if switch is not None:
-                switch.end(f"{file.stem} {label}".encode())
-        np.save(file.with_suffix(".npy"), loop.engine.time - begin)
+                switch.end(f"{label}: {name}".encode())
+        seconds[name] = loop.time - begin
+    (folder / "seconds.json").write_text(json.dumps(seconds))
 
 
 def measure() -> tuple[dict[str, float], dict[str, float]]:
@@ -242,8 +212,9 @@ def measure() -> tuple[dict[str, float], dict[str, float]]:
             [compiler, "-shared", "-fPIC", "-O1", "-o", library, folder / "switch.c"], check=True
         )
         environment = os.environ | TARGET
+        walk_gait()[1].save(folder / "gait.json")
         child = [sys.executable, __file__, "--child", name]
-        subprocess.run([*child, "--prepare"], env=environment, check=True)
+        subprocess.run([*child, "--compile"], env=environment, check=True)
         subprocess.run(
             [
                 "valgrind",
@@ -260,18 +231,17 @@ def measure() -> tuple[dict[str, float], dict[str, float]]:
         totals = {}
         for file in folder.glob("counts*"):
             text = file.read_text(errors="replace")
-            said = re.search(r"Client Request: (\S+) (\w+)", text)
+            said = re.search(r"Client Request: (\w+): (.+)", text)
             total = re.search(r"^(?:totals|summary): (\d+)", text, re.MULTILINE)
             if said and total:
                 totals[said.group(1), said.group(2)] = int(total.group(1))
-        result, partner = {}, {}
-        for file in sorted(folder.glob("scenario*.npz")):
-            given, seconds = np.load(file), float(np.load(file.with_suffix(".npy")))
-            extra = totals[file.stem, "steps"] - totals[file.stem, "call"]
-            result[str(given["name"])] = round(extra * STEP / seconds, 1)
-            if given["beside"]:
-                partner[str(given["name"])] = str(given["beside"])
-        return result, {name: round(result[name] / result[of], 2) for name, of in partner.items()}
+        seconds = json.loads((folder / "seconds.json").read_text())
+    found = {
+        name: round((totals["steps", name] - totals["call", name]) * STEP / simulated, 1)
+        for name, simulated in seconds.items()
+    }
+    partners = {name: each.beside for name, each in scenarios().items() if each.beside}
+    return found, {name: round(found[name] / found[of], 2) for name, of in partners.items()}
 
 
 def compare(found: dict[str, float], kept: dict[str, Any]) -> list[str]:
@@ -293,14 +263,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--update", action="store_true", help="keep the counts of this run")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--prepare", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--compile", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child is not None:
-        if options.prepare:
-            prepare(options.child)
-            count(options.child, None)
-        else:
-            count(options.child, ctypes.CDLL(str(options.child / "switch.so")))
+        library = options.child / "switch.so"
+        count(options.child, None if options.compile else ctypes.CDLL(str(library)))
         return
     kept = json.loads(KEPT.read_text()) if KEPT.exists() else {}
     found, beside = measure()

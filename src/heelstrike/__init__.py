@@ -55,7 +55,6 @@ if TYPE_CHECKING:
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
-    from heelstrike.gait import PiecewiseGait as PiecewiseGait
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
@@ -104,7 +103,6 @@ _HOME = {
     "KelvinVoigt": "heelstrike.sim",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
-    "PiecewiseGait": "heelstrike.gait",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.compiler.bundle import Bundle, array, cell, extent, number, part
 from heelstrike.compiler.compilation import kernel
 
 
@@ -23,6 +23,8 @@ class Outer(Bundle):
     scale: float = number(float)
     turns: int = cell(int)
     row: np.ndarray = array("columns + 1")
+    rows: int = extent()
+    columns: int = extent()
     matrix: np.ndarray = array("rows", "columns")
     cube: np.ndarray = array("rows", 3, "2 rows")
     labels: np.ndarray = array(2, of=int)
@@ -44,7 +46,7 @@ def everything(bundle: Outer, result: np.ndarray) -> int:
     bundle.cube[1, :, 0] = 7.0
     bundle.turns += 2
     bundle.angle = 0.5 * bundle.turns
-    return bundle.matrix.shape[0] * bundle.cube.size
+    return bundle.rows * bundle.cube.size
 
 
 def make() -> Outer:

@@ -80,7 +80,7 @@ def along_motion(case: RobotCase, quantity: Callable[[TracedDynamics], Any]) -> 
 def test_power_balances(case: RobotCase) -> None:
     """d(T + V)/dt = vᵀ force, where the force includes that of the springs within V."""
     robot = case.robot()
-    rate = along_motion(case, lambda traced: sum(traced.energies()))
+    rate = along_motion(case, lambda traced: sum(traced.energy()))
     for q, v in case.states(20):
         force = np.cos(np.arange(robot.nv) + 1.0) * 30.0
         springs = -robot.model.stiffness * (q - robot.model.rest)

@@ -31,7 +31,7 @@ def test_traced_equals_compiled(case: RobotCase) -> None:
             expression(traced.passive_force()),
             expression(traced.point_jacobian(link, position)),
             expression(traced.point_bias_acceleration(link, position)),
-            casadi.vertcat(*traced.energies()),
+            casadi.vertcat(*traced.energy()),
         ],
     )
     for position_now, velocity_now in case.states(50):

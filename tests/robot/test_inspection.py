@@ -278,7 +278,7 @@ def test_the_text_shows_what_joints_have() -> None:
         speed=6,
     )
     text = inspect_robot(build.build()).text()
-    assert "damping 0.2, armature 0.3, spring 4, dry friction 5, speed 6" in text
+    assert "armature 0.3, damping 0.2, spring 4, dry friction 5, speed 6" in text
 
 
 def test_facts_are_plain() -> None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import warnings
+from dataclasses import replace
 
+import casadi
 import mujoco
 import numpy as np
 import pytest
 
-from heelstrike.robot import Robot, RobotWarning, builtin_robots, load_robot, read_mjcf
+from heelstrike import dynamics
+from heelstrike.robot import Robot, RobotWarning, State, builtin_robots, load_robot, read_mjcf
 
 LEG = """<body name="{hip}_link" pos="0 0 0">
   <joint name="{hip}" axis="0 {sense} 0" range="{low} {high}" damping="0.1"/>
@@ -168,12 +171,72 @@ def test_a_mirrored_state_has_the_energy_of_the_state(opposite: bool) -> None:
     assert mirror is not None
     draw = np.random.default_rng(0)
     q, v = draw.normal(size=robot.nq), draw.normal(size=robot.nv)
-    mirrored = mirror.position(q, robot.model.reference), mirror.velocity(v)
+    mirrored = mirror.position(q), mirror.velocity(v)
     energies = []
     for position, velocity in ((q, v), mirrored):
         data.qpos[:], data.qvel[:] = position, velocity
         mujoco.mj_forward(model, data)
         energies.append(data.energy.copy())
     np.testing.assert_allclose(energies[0], energies[1], rtol=1e-13)
-    np.testing.assert_allclose(mirror.position(mirrored[0], robot.model.reference), q)
+    np.testing.assert_allclose(mirror.position(mirrored[0]), q)
     np.testing.assert_allclose(mirror.velocity(mirrored[1]), v)
+
+
+@pytest.mark.parametrize("opposite", [False, True])
+def test_mirrored_torques_accelerate_the_mirrored_robot_in_the_mirror(opposite: bool) -> None:
+    motors = "".join(
+        f'<motor joint="{joint}"/>'
+        for joint in ("left_ankle", "right_hip", "left_hip", "right_ankle")
+    )
+    robot = read_mjcf(biped_text(opposite=opposite, motors=motors))
+    mirror = robot.mirror
+    assert mirror is not None
+    motors_mirror = mirror.among(robot.model.actuator_joint)
+    draw = np.random.default_rng(1)
+    state = State(draw.normal(size=robot.nq), draw.normal(size=robot.nv))
+    torque = draw.normal(size=robot.nu)
+
+    def acceleration(at: State, by: np.ndarray) -> np.ndarray:
+        force = dynamics.applied_force(robot, at.q, at.v, by)
+        return dynamics.forward_dynamics(robot, at.q, at.v, force)
+
+    image = mirror.state(state)
+    expected = mirror.velocity(acceleration(state, torque))
+    found = acceleration(image, motors_mirror.velocity(torque))
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+    np.testing.assert_array_equal(motors_mirror.joint, [3, 2, 1, 0])
+    # Places of the contact points, and the driven coordinates by themselves.
+    np.testing.assert_allclose(
+        dynamics.contact_positions(robot, image.q),
+        mirror.at_contacts(dynamics.contact_positions(robot, state.q)),
+        atol=1e-14,
+    )
+    driven = robot.model.actuator_joint
+    np.testing.assert_array_equal(motors_mirror.position(state.q[driven]), image.q[driven])
+    np.testing.assert_allclose(
+        motors_mirror.sign * state.q[driven][motors_mirror.joint] + motors_mirror.offset,
+        image.q[driven],
+        atol=1e-14,
+    )
+
+
+def test_ranges_and_symbols_are_mirrored_as_numbers_are() -> None:
+    robot = read_mjcf(biped_text(opposite=True))
+    mirror = robot.mirror
+    assert mirror is not None
+    lower, upper = mirror.ranges(robot.model.lower, robot.model.upper)
+    np.testing.assert_allclose(lower, robot.model.lower)  # left and right are alike
+    np.testing.assert_allclose(upper, robot.model.upper)
+    legs = mirror.among(range(3, robot.nq))
+    q = np.arange(1.0, robot.nq - 2.0)
+    column = casadi.SX.sym("q", robot.nq - 3)
+    image = casadi.Function("image", [column], [legs.position(column)])
+    np.testing.assert_array_equal(np.array(image(q)).ravel(), legs.position(q))
+
+
+def test_the_mirror_is_about_the_reference_of_its_robot() -> None:
+    robot = load_robot("bravo7")
+    reference = robot.model.reference + 0.1
+    other = replace(robot, model=robot.model.replaced(reference=reference))
+    assert other.mirror is not None
+    np.testing.assert_array_equal(other.mirror.position(reference), reference)

@@ -15,7 +15,8 @@ from heelstrike.dynamics.kernels import (
     link_velocities,
     potential_energy,
 )
-from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.run import Run
@@ -29,9 +30,9 @@ class Motion:
 
     Attributes
     ----------
-    link_origin : (nt, nv, 2) float
+    link_origin : (nt, nl, 2) float
         Position (x, z) of every link frame, in m.
-    link_angle : (nt, nv) float
+    link_angle : (nt, nl) float
         Rotation of every link about +y from the reference configuration, in rad.
     center_of_mass : (nt, 2) float
         Position (x, z) of the robot's centre of mass, in m.
@@ -66,19 +67,17 @@ def _follow(
     for row in range(position.shape[0]):
         forward_kinematics(model, position[row], work)
         link_velocities(model, velocity[row], work)
-        for link in range(model.parent.shape[0]):
+        for link in range(model.nl):
             origin[row, link, 0] = work.origin[link, 0]
             origin[row, link, 1] = work.origin[link, 1]
             angle[row, link] = work.angle[link]
         center_of_mass(model, work, center[row])
         kinetic_energy(model, velocity[row], work, kinetic[row : row + 1])
         potential_energy(model, position[row], work, potential[row : row + 1])
-        for contact in range(model.contact_link.shape[0]):
-            link = model.contact_link[contact]
-            x = contact_point[row, contact, 0] - work.pivot[0]
-            z = contact_point[row, contact, 1] - work.pivot[1]
-            contact_velocity[row, contact, 0] = work.velocity[link, 1] + work.velocity[link, 0] * z
-            contact_velocity[row, contact, 1] = work.velocity[link, 2] - work.velocity[link, 0] * x
+        for contact in range(model.nc):
+            place = place_of(work, contact_point[row, contact])
+            speed = velocity_at(work.velocity, model.contact_link[contact], place)
+            contact_velocity[row, contact, 0], contact_velocity[row, contact, 1] = speed
 
 
 def motion(
@@ -102,8 +101,8 @@ def motion(
     point = np.ascontiguousarray(contact_point, dtype=np.float64)
     rows = len(q)
     result = Motion(
-        link_origin=np.zeros((rows, robot.nv, 2)),
-        link_angle=np.zeros((rows, robot.nv)),
+        link_origin=np.zeros((rows, robot.nl, 2)),
+        link_angle=np.zeros((rows, robot.nl)),
         center_of_mass=np.zeros((rows, 2)),
         contact_velocity=np.zeros((rows, robot.nc, 2)),
         kinetic=np.zeros(rows),
@@ -114,7 +113,7 @@ def motion(
         q,
         v,
         point,
-        workspace(robot.nv),
+        Workspace.allocate(**robot.model.extents),
         result.link_origin,
         result.link_angle,
         result.center_of_mass,
@@ -126,5 +125,16 @@ def motion(
 
 
 def run_motion(run: Run) -> Motion:
-    """Follow the robot of a run through its rows; see :func:`motion`."""
+    """Follow the robot of a run through its rows; see :func:`motion`.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    Motion
+        Where its links and its centre of mass are in each row.
+    """
     return motion(run.robot, run.position, run.velocity, run.contact_point)

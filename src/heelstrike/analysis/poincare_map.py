@@ -293,7 +293,7 @@ def exchanged(robot: Robot, state: State) -> State:
     mirror = robot.mirror
     if mirror is None:
         raise LimitCycleError(f"robot {robot.name!r} has no mirror image")
-    return State(mirror.position(state.q, robot.model.reference), mirror.velocity(state.v))
+    return mirror.state(state)
 
 
 def is_wheel(robot: Robot) -> bool:

@@ -48,8 +48,8 @@ class Member:
     Attributes
     ----------
     role : str
-        ``"array"``, ``"cell"`` (a number that changes), ``"number"`` (one that does not) or
-        ``"part"`` (another bundle).
+        ``"array"``, ``"cell"`` (a number that changes), ``"number"`` (one that does not),
+        ``"part"`` (another bundle) or ``"extent"`` (how long arrays are).
     kind : type
         ``float`` or ``int``, or the class of a part.
     shape : tuple of str and int
@@ -89,6 +89,11 @@ def part(kind: type[Bundle]) -> Any:
     return Member("part", kind)
 
 
+def extent() -> Any:
+    """Declare an extent of the arrays of a bundle that is read by its name: ``bundle.nv``."""
+    return Member("extent", int)
+
+
 class Bundle:
     """Base class of bundles; a subclass declares its members.
 
@@ -125,12 +130,18 @@ class Bundle:
     declared: ClassVar[dict[str, Member]] = {}
     """The members that the class declares, by name."""
 
+    named: ClassVar[frozenset[str]] = frozenset()
+    """The extents that it declares to be read by name."""
+
     def __init_subclass__(cls) -> None:
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Member)}
-        cls.declared = cls.declared | own
+        cls.named = cls.named | {name for name, value in own.items() if value.role == "extent"}
+        cls.declared = cls.declared | {k: v for k, v in own.items() if k not in cls.named}
         cells = [name for name, member in cls.declared.items() if member.role == "cell"]
         for name in own:
-            if name in cells:
+            if name in cls.named:
+                setattr(cls, name, _extent_property(name))
+            elif name in cells:
                 setattr(cls, name, _cell_property(cells.index(name), own[name]))
             else:
                 delattr(cls, name)
@@ -138,7 +149,7 @@ class Bundle:
     def __init__(self, **members: Any) -> None:
         own = self.__dict__
         own["_cells"] = np.zeros(self._cell_count(), dtype=np.int64)
-        extents: dict[str, int] = {}
+        extents = own["_extents"] = {}
         for name, member in self.declared.items():
             if name not in members:
                 if member.role != "cell":
@@ -205,6 +216,11 @@ class Bundle:
     def _numba_type_(self) -> Any:
         """Its type to Numba, which looks for it under this name."""
         return self.compiled_type()
+
+    @property
+    def extents(self) -> dict[str, int]:
+        """How long its arrays are, by the names of their extents, as :meth:`allocate` takes it."""
+        return dict(self.__dict__["_extents"])
 
     @property
     def table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
@@ -308,6 +324,16 @@ def _cell_property(place: int, member: Member) -> property:
     return property(get, put)
 
 
+def _extent_property(name: str) -> property:
+    """Read an extent from Python."""
+
+    def get(bundle: Bundle) -> int:
+        known: dict[str, int] = bundle.__dict__["_extents"]
+        return known[name]
+
+    return property(get)
+
+
 def _extent(extent: str | int, known: Mapping[str, int]) -> int:
     """Return the size that an extent stands for."""
     if isinstance(extent, int):
@@ -345,12 +371,18 @@ def _check_shape(
 
 
 class BundleType(types.Type):
-    """Type of a bundle: its members and theirs."""
+    """Type of a bundle: its members and theirs, and of what array an extent is which one."""
 
-    def __init__(self, name: str, members: tuple[tuple[str, Any, bool], ...]) -> None:
+    def __init__(
+        self,
+        name: str,
+        members: tuple[tuple[str, Any, bool], ...],
+        extents: dict[str, tuple[str, int]],
+    ) -> None:
         self.members = {member: kind for member, kind, _ in members}
         self.cells = {member for member, _, changes in members if changes}
-        described = ", ".join(map(str, members))
+        self.extents = extents
+        described = ", ".join(map(str, (*members, *extents.items())))
         # The name goes into every symbol of the machine code: short, but never that of another.
         super().__init__(name=f"{name}_{hashlib.sha256(described.encode()).hexdigest()[:12]}")
 
@@ -372,6 +404,12 @@ def _bundle_type(cls: Any) -> BundleType:
             (name, _member_type(member), member.role == "cell")
             for name, member in cls.declared.items()
         ),
+        {
+            extent: (name, place)
+            for name, member in cls.declared.items()
+            for place, extent in enumerate(member.shape)
+            if extent in cls.named
+        },
     )
 
 
@@ -407,7 +445,7 @@ class _BundleAttribute(AttributeTemplate):
     key = BundleType
 
     def generic_resolve(self, kind: BundleType, name: str) -> Any:  # type: ignore[override]
-        return kind.members.get(name)
+        return types.int64 if name in kind.extents else kind.members.get(name)
 
 
 def _word(builder: Any, table: Any, place: int) -> Any:
@@ -432,6 +470,9 @@ def _get_member(context: Any, builder: Any, kind: BundleType, table: Any, name: 
     """Read a member. Arrays carry no reference count."""
     if name in kind.cells:
         return builder.load(_cell(context, builder, kind, table, name))
+    if name in kind.extents:
+        member, dimension = kind.extents[name]
+        return _word(builder, table, kind.place(member) + 1 + dimension)
     place = kind.place(name)
     member = kind.members[name]
     word = _word(builder, table, place)

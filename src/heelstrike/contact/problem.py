@@ -240,7 +240,7 @@ def run_solvers(
         fallbacks=work.tally.last_fallbacks,
         complementarity=float(residual[0]),
         cone=float(residual[1]),
-        penetration=float(residual[2]),
+        non_penetration=float(residual[2]),
         rounding=work.yardstick.rounding,
         tolerance=float(tolerance),
         velocity_error=error,

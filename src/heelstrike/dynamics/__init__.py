@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from heelstrike.dynamics.coordinates import difference, integrate
 from heelstrike.dynamics.energies import energy, kinetic_energy, potential_energy
 from heelstrike.dynamics.equations_of_motion import (
     applied_force,
@@ -36,6 +37,9 @@ from heelstrike.dynamics.points import (
 )
 from heelstrike.dynamics.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
 
+if TYPE_CHECKING:
+    from heelstrike.dynamics.casadi_functions import CasadiDynamics as CasadiDynamics
+
 __all__ = [
     "CasadiDynamics",
     "Linearization",
@@ -52,9 +56,11 @@ __all__ = [
     "contact_jacobian",
     "contact_positions",
     "coriolis_force",
+    "difference",
     "energy",
     "forward_dynamics",
     "gravity_force",
+    "integrate",
     "inverse_dynamics",
     "kinetic_energy",
     "linearize",

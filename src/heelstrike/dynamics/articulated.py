@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 
@@ -36,7 +37,7 @@ class ArticulatedBodies(Bundle):
 
     Attributes
     ----------
-    inertia : (nv, 6) float
+    inertia : (nl, 6) float
         Their inertia about the pivot: rows of the upper triangle, in the order of spatial vectors.
     momentum : (nv, 3) float
         U, the momentum of the articulated body per unit velocity of its joint.
@@ -45,8 +46,8 @@ class ArticulatedBodies(Bundle):
     """
 
     inertia: Floats = array("nl", 6)
-    momentum: Floats = array("nl", 3)
-    inverse: Floats = array("nl")
+    momentum: Floats = array("nv", 3)
+    inverse: Floats = array("nv")
 
 
 @kernel
@@ -57,31 +58,22 @@ def articulate(model: Model, work: Workspace, added: Floats, bodies: Articulated
     """
     parents, armature, rigid, motion = model.parent, model.armature, work.inertia, work.motion
     inertia, momentum, inverse = bodies.inertia, bodies.momentum, bodies.inverse
-    count = parents.shape[0]
-    for i in range(count):
+    for i in range(model.nl):
         inertia[i, 0] = rigid[i, 3]
         inertia[i, 1] = rigid[i, 2]
         inertia[i, 2] = -rigid[i, 1]
         inertia[i, 3] = rigid[i, 0]
         inertia[i, 4] = 0.0
         inertia[i, 5] = rigid[i, 0]
-    for i in range(count - 1, -1, -1):
-        m0 = motion[i, 0]
-        m1 = motion[i, 1]
-        m2 = motion[i, 2]
-        i00 = inertia[i, 0]
-        i01 = inertia[i, 1]
-        i02 = inertia[i, 2]
-        i11 = inertia[i, 3]
-        i12 = inertia[i, 4]
-        i22 = inertia[i, 5]
+    for i in range(model.nl - 1, -1, -1):
+        m0, m1, m2 = spatial(motion, i)
+        i00, i01, i02 = spatial(inertia, i)
+        i11, i12, i22 = inertia[i, 3], inertia[i, 4], inertia[i, 5]
         u0 = i00 * m0 + i01 * m1 + i02 * m2
         u1 = i01 * m0 + i11 * m1 + i12 * m2
         u2 = i02 * m0 + i12 * m1 + i22 * m2
+        write(momentum, i, (u0, u1, u2))
         scale = 1.0 / (m0 * u0 + m1 * u1 + m2 * u2 + armature[i] + added[i])
-        momentum[i, 0] = u0
-        momentum[i, 1] = u1
-        momentum[i, 2] = u2
         inverse[i] = scale
         parent = parents[i]
         if parent >= 0:
@@ -101,22 +93,17 @@ def solve_articulated(model: Model, work: Workspace, bodies: ArticulatedBodies, 
     """Replace x by A⁻¹ x, after :func:`articulate`."""
     parents, motion, force = model.parent, work.motion, work.force
     momentum, inverse = bodies.momentum, bodies.inverse
-    count = parents.shape[0]
-    for i in range(count):
-        force[i, 0] = 0.0
-        force[i, 1] = 0.0
-        force[i, 2] = 0.0
-    for i in range(count - 1, -1, -1):
-        p0 = force[i, 0]
-        p1 = force[i, 1]
-        p2 = force[i, 2]
+    for i in range(model.nl):
+        write(force, i, (0.0, 0.0, 0.0))
+    for i in range(model.nl - 1, -1, -1):
+        p0, p1, p2 = spatial(force, i)
         share = inverse[i] * (x[i] + motion[i, 0] * p0 + motion[i, 1] * p1 + motion[i, 2] * p2)
         x[i] = share
         parent = parents[i]
         if parent >= 0:
-            force[parent, 0] += p0 - momentum[i, 0] * share
-            force[parent, 1] += p1 - momentum[i, 1] * share
-            force[parent, 2] += p2 - momentum[i, 2] * share
+            u0, u1, u2 = spatial(momentum, i)
+            left = p0 - u0 * share, p1 - u1 * share, p2 - u2 * share
+            write(force, parent, plus(spatial(force, parent), left))
     carry_along(model, work, bodies, x)
 
 
@@ -125,18 +112,12 @@ def carry_along(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Flo
     """Second half of :func:`solve_articulated`: x holds u / D and receives accelerations."""
     parents, motion, acceleration = model.parent, work.motion, work.acceleration
     momentum, inverse = bodies.momentum, bodies.inverse
-    for i in range(parents.shape[0]):
+    for i in range(model.nl):
         parent = parents[i]
         own = x[i]
-        a0 = 0.0
-        a1 = 0.0
-        a2 = 0.0
+        a = 0.0, 0.0, 0.0
         if parent >= 0:
-            a0 = acceleration[parent, 0]
-            a1 = acceleration[parent, 1]
-            a2 = acceleration[parent, 2]
-            own -= inverse[i] * (momentum[i, 0] * a0 + momentum[i, 1] * a1 + momentum[i, 2] * a2)
+            a = spatial(acceleration, parent)
+            own -= inverse[i] * power(spatial(momentum, i), a)
             x[i] = own
-        acceleration[i, 0] = a0 + motion[i, 0] * own
-        acceleration[i, 1] = a1 + motion[i, 1] * own
-        acceleration[i, 2] = a2 + motion[i, 2] * own
+        write(acceleration, i, plus(a, scaled(spatial(motion, i), own)))

@@ -2,16 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+import inspect
+from collections.abc import Callable, Iterable
+from typing import Any, Concatenate, ParamSpec
 
 import casadi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.evaluation import contact_indices, link_index, plane_vector
+from heelstrike import dynamics
+from heelstrike.dynamics.evaluation import contact_indices
+from heelstrike.dynamics.query import VECTORS, Query, docstring
 from heelstrike.dynamics.symbolic import TracedDynamics, expression, symbols
 from heelstrike.robot.robot import Robot
+
+P = ParamSpec("P")
+
+
+def _function_of(
+    query: Query[P, Any],
+) -> Callable[Concatenate[CasadiDynamics, P], casadi.Function]:
+    """Make the method that returns a query as a function of symbols; it takes the other arguments.
+
+    Points and frames that the query tells apart become rows below each other.
+    """
+    asked: Any = query
+    names = [name for name in inspect.signature(asked).parameters if name in VECTORS]
+
+    def method(self: CasadiDynamics, /, *others: Any, **named: Any) -> casadi.Function:
+        inputs = {name: self._symbol(name) for name in names}
+        more = [symbols(value) for name, value in inputs.items() if name not in ("q", "v")]
+        value = asked.at(self._traced, *more, *others, **named)
+        return self._function(asked.__name__, inputs, _sx(value))
+
+    signature = inspect.signature(asked.at)
+    others = {k: one for k, one in signature.parameters.items() if k not in ("at", *VECTORS)}
+    itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
+    method.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[itself, *others.values()], return_annotation="casadi.Function"
+    )
+    method.__name__, method.__qualname__ = asked.__name__, f"CasadiDynamics.{asked.__name__}"
+    summary = (asked.__doc__ or "").split("\n\nParameters")[0]
+    meaning = f"Of ({', '.join(names)}), it is a {asked.returns}"
+    method.__doc__ = docstring(summary, others, "casadi.Function", meaning)
+    return method
+
+
+def _function_with(
+    query: Query[[ArrayLike], Any],
+) -> Callable[[CasadiDynamics], casadi.Function]:
+    """Do the same with a query whose other argument is a vector, and so an input."""
+    method: Any = _function_of(query)
+    made: Callable[[CasadiDynamics], casadi.Function] = method
+    return made
 
 
 class CasadiDynamics:
@@ -38,51 +81,40 @@ class CasadiDynamics:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._q = casadi.SX.sym("q", robot.nv)
-        self._v = casadi.SX.sym("v", robot.nv)
+        self._q, self._v = self._symbol("q"), self._symbol("v")
         self._traced = TracedDynamics(robot, symbols(self._q), symbols(self._v))
 
-    def mass_matrix(self) -> casadi.Function:
-        """Return (q) → mass matrix, (nv, nv)."""
-        return self._of_q("mass_matrix", self._traced.mass_matrix())
-
-    def bias_force(self) -> casadi.Function:
-        """Return (q, v) → bias force H, (nv,)."""
-        return self._of_state("bias_force", self._traced.bias_force())
-
-    def gravity_force(self) -> casadi.Function:
-        """Return (q) → gravitational part of the bias force, (nv,)."""
-        return self._of_q("gravity_force", self._traced.gravity_force())
-
-    def coriolis_force(self) -> casadi.Function:
-        """Return (q, v) → centrifugal and Coriolis part of the bias force, (nv,)."""
-        return self._of_state("coriolis_force", self._traced.coriolis_force())
-
-    def passive_force(self) -> casadi.Function:
-        """Return (q, v) → force of dampers and springs, (nv,)."""
-        return self._of_state("passive_force", self._traced.passive_force())
-
-    def inverse_dynamics(self) -> casadi.Function:
-        """Return (q, v, acceleration) → generalised force, (nv,)."""
-        a = casadi.SX.sym("acceleration", self.robot.nv)
-        force = expression(self._traced.inverse_dynamics(symbols(a)))
-        return self._function("inverse_dynamics", {"acceleration": a}, force)
-
-    def forward_dynamics(self) -> casadi.Function:
-        """Return (q, v, force) → acceleration without contact, (nv,)."""
-        force = casadi.SX.sym("force", self.robot.nv)
-        acceleration = expression(self._traced.forward_dynamics(symbols(force)))
-        return self._function("forward_dynamics", {"force": force}, acceleration)
+    mass_matrix = _function_of(dynamics.mass_matrix)
+    bias_force = _function_of(dynamics.bias_force)
+    gravity_force = _function_of(dynamics.gravity_force)
+    coriolis_force = _function_of(dynamics.coriolis_force)
+    passive_force = _function_of(dynamics.passive_force)
+    applied_force = _function_with(dynamics.applied_force)
+    inverse_dynamics = _function_with(dynamics.inverse_dynamics)
+    forward_dynamics = _function_with(dynamics.forward_dynamics)
+    point_position = _function_of(dynamics.point_position)
+    point_velocity = _function_of(dynamics.point_velocity)
+    point_jacobian = _function_of(dynamics.point_jacobian)
+    point_bias_acceleration = _function_of(dynamics.point_bias_acceleration)
+    center_of_mass = _function_of(dynamics.center_of_mass)
+    center_of_mass_jacobian = _function_of(dynamics.center_of_mass_jacobian)
+    center_of_mass_velocity = _function_of(dynamics.center_of_mass_velocity)
+    center_of_mass_bias_acceleration = _function_of(dynamics.center_of_mass_bias_acceleration)
+    momentum = _function_of(dynamics.momentum)
+    angular_momentum = _function_of(dynamics.angular_momentum)
+    momentum_matrix = _function_of(dynamics.momentum_matrix)
+    kinetic_energy = _function_of(dynamics.kinetic_energy)
+    potential_energy = _function_of(dynamics.potential_energy)
+    contact_jacobian = _function_of(dynamics.contact_jacobian)
+    contact_bias_acceleration = _function_of(dynamics.contact_bias_acceleration)
 
     def state_derivative(self) -> casadi.Function:
         """Return (state, torque) → d/dt (q, v) without contact, (nq + nv,).
 
         The state is (q; v) in one column; motors, dampers and springs act.
         """
-        torque = casadi.SX.sym("torque", self.robot.nu)
-        force = self._traced.passive_force()
-        for place, joint in enumerate(self.robot.model.actuator_joint):
-            force[joint] = force[joint] + torque[place]
+        torque = self._symbol("torque")
+        force = self._traced.applied_force(symbols(torque))
         rate = casadi.vertcat(self._v, expression(self._traced.forward_dynamics(force)))
         state = casadi.vertcat(self._q, self._v)
         x = casadi.SX.sym("state", state.numel())
@@ -93,14 +125,14 @@ class CasadiDynamics:
 
     def linearization(self) -> casadi.Function:
         """Return (state, torque) → (A, B), the derivatives of :meth:`state_derivative`."""
-        x = casadi.SX.sym("state", 2 * self.robot.nv)
-        torque = casadi.SX.sym("torque", self.robot.nu)
+        x = casadi.SX.sym("state", self.robot.nq + self.robot.nv)
+        torque = self._symbol("torque")
         rate = self.state_derivative()(x, torque)
         parts = [casadi.jacobian(rate, x), casadi.jacobian(rate, torque)]
         return casadi.Function("linearization", [x, torque], parts, ["state", "torque"], ["A", "B"])
 
     def link_poses(self) -> casadi.Function:
-        """Return (q) → origin (nv, 2) and angle (nv,) of all link frames."""
+        """Return (q) → origin (nl, 2) and angle (nl,) of all link frames."""
         work: Any = self._traced.work
         return casadi.Function(
             "link_poses",
@@ -110,65 +142,6 @@ class CasadiDynamics:
             ["origin", "angle"],
         )
 
-    def point_position(self, link: int | str, local: ArrayLike) -> casadi.Function:
-        """Return (q) → world position of a point of a link, (2,)."""
-        return self._of_q("point_position", self._point(link, local)[1])
-
-    def point_velocity(self, link: int | str, local: ArrayLike) -> casadi.Function:
-        """Return (q, v) → velocity (x, z) of a point and its link's rotation, (3,)."""
-        jacobian = self._traced.point_jacobian(*self._point(link, local))
-        return self._of_state("point_velocity", jacobian @ self._traced.v)
-
-    def point_jacobian(self, link: int | str, local: ArrayLike) -> casadi.Function:
-        """Return (q) → rows (x, z, rotation) of the Jacobian of a point, (3, nv)."""
-        jacobian = self._traced.point_jacobian(*self._point(link, local))
-        return self._of_q("point_jacobian", jacobian)
-
-    def point_bias_acceleration(self, link: int | str, local: ArrayLike) -> casadi.Function:
-        """Return (q, v) → J̇v of :meth:`point_jacobian`, (3,)."""
-        bias = self._traced.point_bias_acceleration(*self._point(link, local))
-        return self._of_state("point_bias_acceleration", bias)
-
-    def center_of_mass(self) -> casadi.Function:
-        """Return (q) → world position of the robot's centre of mass, (2,)."""
-        return self._of_q("center_of_mass", self._traced.center_of_mass())
-
-    def center_of_mass_jacobian(self) -> casadi.Function:
-        """Return (q) → Jacobian of the robot's centre of mass, (2, nv)."""
-        rows = self._traced.momentum_matrix()[:2] / self.robot.total_mass
-        return self._of_q("center_of_mass_jacobian", rows)
-
-    def momentum(self) -> casadi.Function:
-        """Return (q, v) → momentum (x, z) and moment of momentum about the centre of mass, (3,)."""
-        return self._of_state("momentum", self._traced.momentum())
-
-    def momentum_matrix(self) -> casadi.Function:
-        """Return (q) → centroidal momentum matrix, (3, nv)."""
-        return self._of_q("momentum_matrix", self._traced.momentum_matrix())
-
-    def kinetic_energy(self) -> casadi.Function:
-        """Return (q, v) → kinetic energy, J."""
-        return self._of_state("kinetic_energy", self._traced.energies()[0])
-
-    def potential_energy(self) -> casadi.Function:
-        """Return (q) → potential energy, J."""
-        return self._of_q("potential_energy", self._traced.energies()[1])
-
-    def contact_jacobian(self, contacts: Iterable[int | str] | None = None) -> casadi.Function:
-        """Return (q) → rows n₀ t₀ n₁ t₁ … of contact points on level ground, (2k, nv).
-
-        All contact points of the robot by default.
-        """
-        rows = self._traced.contact_jacobian(self._contacts(contacts))
-        return self._of_q("contact_jacobian", rows)
-
-    def contact_bias_acceleration(
-        self, contacts: Iterable[int | str] | None = None
-    ) -> casadi.Function:
-        """Return (q, v) → J̇v of :meth:`contact_jacobian`, (2k,)."""
-        bias = self._traced.contact_bias_acceleration(self._contacts(contacts))
-        return self._of_state("contact_bias_acceleration", bias)
-
     def contact_equations(self, contacts: Iterable[int | str] | None = None) -> casadi.Function:
         """Return (q, v, acceleration, contact_force, torque) → residual, (nv + 2k,).
 
@@ -176,14 +149,23 @@ class CasadiDynamics:
         zero: A v̇ + H − passive − SᵀΓ − Jᵀλ, and J v̇ + J̇v. Whatever is unknown of them, and whatever
         inequality the forces obey, is the user's choice; redundant points do no harm. The contact
         force is n₀ t₀ n₁ t₁ …, in N, on the robot.
+
+        Parameters
+        ----------
+        contacts : iterable of int or str, optional
+            Contact points, all k = nc by default.
+
+        Returns
+        -------
+        casadi.Function
+            Of the inputs above, (nv + 2k,).
         """
         held = self._contacts(contacts)
-        a = casadi.SX.sym("acceleration", self.robot.nv)
-        force = casadi.SX.sym("contact_force", 2 * len(held))
-        torque = casadi.SX.sym("torque", self.robot.nu)
-        residual = contact_equations(self.robot, held, self._q, self._v, a, force, torque)
-        extra = {"acceleration": a, "contact_force": force, "torque": torque}
-        return self._function("contact_equations", extra, residual)
+        inputs = {name: self._symbol(name) for name in ("q", "v", "acceleration")}
+        inputs["contact_force"] = casadi.SX.sym("contact_force", 2 * len(held))
+        inputs["torque"] = self._symbol("torque")
+        residual = contact_equations(self.robot, held, *inputs.values())
+        return self._function("contact_equations", inputs, residual, output="residual")
 
     def contact_forward_dynamics(
         self, contacts: Iterable[int | str] | None = None
@@ -192,11 +174,21 @@ class CasadiDynamics:
 
         The points must be independent: two of one flat foot make the equations singular, and
         :meth:`contact_equations` is what to use then.
+
+        Parameters
+        ----------
+        contacts : iterable of int or str, optional
+            Contact points, all k = nc by default.
+
+        Returns
+        -------
+        casadi.Function
+            Of the inputs above, (nv,) and (2k,).
         """
         held = self._contacts(contacts)
         n, k = self.robot.nv, 2 * len(held)
         unknown = casadi.SX.sym("unknown", n + k)
-        torque = casadi.SX.sym("torque", self.robot.nu)
+        torque = self._symbol("torque")
         residual = contact_equations(
             self.robot, held, self._q, self._v, unknown[:n], unknown[n:], torque
         )
@@ -221,20 +213,15 @@ class CasadiDynamics:
         every = range(self.robot.nc)
         return contact_indices(self.robot, every if contacts is None else contacts)
 
-    def _point(self, link: int | str, local: ArrayLike) -> tuple[int, Any]:
-        place = link_index(self.robot, link)
-        return place, self._traced.point_position(place, plane_vector("local", local))
+    def _symbol(self, name: str) -> casadi.SX:
+        """Return the symbol of an input: always the same one of the state."""
+        known = {"q": self._q, "v": self._v} if hasattr(self, "_v") else {}
+        return known.get(name, casadi.SX.sym(name, getattr(self.robot, VECTORS[name])))
 
-    def _of_q(self, name: str, value: Any) -> casadi.Function:
-        return casadi.Function(name, [self._q], [_sx(value)], ["q"], [name])
-
-    def _of_state(self, name: str, value: Any) -> casadi.Function:
-        return self._function(name, {}, _sx(value))
-
-    def _function(self, name: str, extra: dict[str, Any], value: Any) -> casadi.Function:
-        inputs = {"q": self._q, "v": self._v, **extra}
-        output = "residual" if name == "contact_equations" else name
-        return casadi.Function(name, [*inputs.values()], [value], [*inputs], [output])
+    def _function(
+        self, name: str, inputs: dict[str, Any], value: Any, output: str = ""
+    ) -> casadi.Function:
+        return casadi.Function(name, [*inputs.values()], [value], [*inputs], [output or name])
 
 
 def contact_equations(
@@ -247,18 +234,20 @@ def contact_equations(
     torque: casadi.SX,
 ) -> casadi.SX:
     """Residual of the equations of motion and of the contact points that the ground holds."""
-    dynamics = TracedDynamics(robot, symbols(q), symbols(v))
-    force = dynamics.inverse_dynamics(symbols(acceleration)) - dynamics.passive_force()
-    for place, joint in enumerate(robot.model.actuator_joint):
-        force[joint] = force[joint] - torque[place]
+    at = TracedDynamics(robot, symbols(q), symbols(v))
+    force = at.inverse_dynamics(symbols(acceleration)) - at.passive_force()
+    force[robot.model.actuator_joint] -= symbols(torque)
     if not contacts:
         return casadi.SX(expression(force))
-    jacobian = dynamics.contact_jacobian(contacts)
+    jacobian = at.contact_jacobian(contacts).reshape(-1, robot.nv)
     force = force - jacobian.T @ symbols(contact_force)
-    held = jacobian @ symbols(acceleration) + dynamics.contact_bias_acceleration(contacts)
+    held = jacobian @ symbols(acceleration) + at.contact_bias_acceleration(contacts).ravel()
     return casadi.vertcat(expression(force), expression(held))
 
 
 def _sx(value: Any) -> casadi.SX:
     """CasADi expression of an object array or a scalar; structural zeros stay sparse."""
-    return casadi.SX(expression(value)) if isinstance(value, np.ndarray) else casadi.SX(value)
+    if not isinstance(value, np.ndarray):
+        return casadi.SX(value)
+    rows = value.reshape(-1, value.shape[-1]) if value.ndim == 3 else value
+    return casadi.SX(expression(rows))

@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import evaluated, joint_vector
-from heelstrike.robot.robot import Robot
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.query import of_position, of_state
 
 
-def kinetic_energy(robot: Robot, q: ArrayLike, v: ArrayLike) -> float:
-    """Kinetic energy of links and rotors, in J."""
-    result = np.zeros(1)
-    velocity = joint_vector(robot, "v", v)
-    kernels.kinetic_energy(robot.model, velocity, evaluated(robot, q, v), result)
-    return float(result[0])
+@of_state("float: In J.")
+def kinetic_energy(at: Evaluation) -> float:
+    """Kinetic energy of links and rotors."""
+    return at.number(kernels.kinetic_energy, at.model, at.v, at.work)
 
 
-def potential_energy(robot: Robot, q: ArrayLike) -> float:
-    """Energy in the gravity field, zero at the world's origin, and of the joint springs, in J."""
-    result = np.zeros(1)
-    position = joint_vector(robot, "q", q)
-    kernels.potential_energy(robot.model, position, evaluated(robot, q), result)
-    return float(result[0])
+@of_position("float: In J, zero at the world's origin with all springs slack.")
+def potential_energy(at: Evaluation) -> float:
+    """Energy in the gravity field and of the joint springs."""
+    return at.number(kernels.potential_energy, at.model, at.q, at.work)
 
 
-def energy(robot: Robot, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
-    """Kinetic and potential energy in J; the potential includes joint springs."""
-    return kinetic_energy(robot, q, v), potential_energy(robot, q)
+@of_state("tuple of float: Both in J.")
+def energy(at: Evaluation) -> tuple[float, float]:
+    """Kinetic and potential energy; the potential includes joint springs."""
+    return kinetic_energy.at(at), potential_energy.at(at)

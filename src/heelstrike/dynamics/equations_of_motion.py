@@ -12,98 +12,79 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import Floats, evaluated, joint_vector, torque_vector
-from heelstrike.robot.model import Model
-from heelstrike.robot.robot import Robot
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.robot.model import Floats, Model
 
 
-def mass_matrix(robot: Robot, q: ArrayLike) -> Floats:
-    """Mass matrix A(q), (nv, nv), in kg, kg m and kg m² (paper eq. 1)."""
-    matrix = np.zeros((robot.nv, robot.nv))
-    kernels.mass_matrix(robot.model, evaluated(robot, q), matrix)
-    return matrix
+@of_position("(nv, nv) float: In kg, kg m and kg m².")
+def mass_matrix(at: Evaluation) -> Floats:
+    """Mass matrix A(q) (paper eq. 1)."""
+    return at.filled((at.model.nv, at.model.nv), kernels.mass_matrix, at.model, at.work)
 
 
-def bias_force(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Centrifugal, Coriolis and gravitational forces H(q, v), (nv,), in N and N m.
+@of_state("(nv,) float: In N and N m.")
+def bias_force(at: Evaluation) -> Floats:
+    """Centrifugal, Coriolis and gravitational forces H(q, v).
 
     It stands on the left-hand side of the equations of motion: the force that must be applied so
     that no coordinate accelerates. Dampers and springs are not part of it (:func:`passive_force`).
     """
-    force = np.zeros(robot.nv)
-    kernels.bias_force(robot.model, evaluated(robot, q, v), force)
-    return force
+    return at.filled(at.v.shape, kernels.bias_force, at.model, at.work)
 
 
-def gravity_force(robot: Robot, q: ArrayLike) -> Floats:
-    """Gravitational part of the bias force, (nv,), in N and N m: what holds the robot at rest."""
-    return bias_force(robot, q, np.zeros(robot.nv))
+@of_position("(nv,) float: In N and N m.")
+def gravity_force(at: Evaluation) -> Floats:
+    """Gravitational part of the bias force: what holds the robot at rest."""
+    return bias_force.at(Evaluation(at.robot, at.q))
 
 
-def coriolis_force(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Centrifugal and Coriolis part C(q, v) v of the bias force, (nv,), in N and N m.
+@of_state("(nv,) float: In N and N m.")
+def coriolis_force(at: Evaluation) -> Floats:
+    """Centrifugal and Coriolis part C(q, v) v of the bias force.
 
     It is computed without gravity, not as a difference, and loses no digits when it is small.
     """
-    force = np.zeros(robot.nv)
-    kernels.bias_force(weightless(robot.model), evaluated(robot, q, v), force)
-    return force
+    return at.filled(at.v.shape, kernels.bias_force, weightless(at.model), at.work)
 
 
 def weightless(model: Model) -> Model:
     """Return a model without gravity."""
-    return Model(**(model.members() | {"gravity": np.zeros(2)}))
+    return model.replaced(gravity=np.zeros(model.axes))
 
 
-def passive_force(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Force of joint dampers and springs on the robot, (nv,), in N and N m."""
-    force = np.zeros(robot.nv)
-    kernels.passive_force(
-        robot.model, joint_vector(robot, "q", q), joint_vector(robot, "v", v), force
-    )
+@of_state("(nv,) float: In N and N m, on the robot.")
+def passive_force(at: Evaluation) -> Floats:
+    """Force of joint dampers and springs."""
+    return at.filled(at.v.shape, kernels.passive_force, at.model, at.q, at.v)
+
+
+@of_state("(nv,) float: In N and N m, on the robot.")
+def applied_force(at: Evaluation, torque: ArrayLike) -> Floats:
+    """Generalised force SᵀΓ + passive of motors, dampers and springs."""
+    force = passive_force.at(at)
+    force[at.model.actuator_joint] += at.vector("torque", torque)
     return force
 
 
-def applied_force(robot: Robot, q: ArrayLike, v: ArrayLike, torque: ArrayLike) -> Floats:
-    """Generalised force SᵀΓ + passive of motors, dampers and springs, (nv,), in N and N m.
-
-    `torque` (nu,) is ordered as ``robot.actuator_names``.
-    """
-    force = passive_force(robot, q, v)
-    force[robot.model.actuator_joint] += torque_vector(robot, torque)
-    return force
-
-
-def inverse_dynamics(robot: Robot, q: ArrayLike, v: ArrayLike, acceleration: ArrayLike) -> Floats:
-    """Generalised force A(q) a + H(q, v) that yields an acceleration, (nv,), in N and N m.
+@of_state("(nv,) float: In N and N m.")
+def inverse_dynamics(at: Evaluation, acceleration: ArrayLike) -> Floats:
+    """Generalised force A(q) a + H(q, v) that yields an acceleration.
 
     It is the sum of all forces, whoever supplies them; see
     :func:`heelstrike.contact_inverse_dynamics` for motors and ground apart.
     """
-    force = np.zeros(robot.nv)
-    kernels.inverse_dynamics(
-        robot.model,
-        joint_vector(robot, "acceleration", acceleration),
-        evaluated(robot, q, v),
-        force,
-    )
-    return force
+    rate = at.vector("acceleration", acceleration)
+    return at.filled(at.v.shape, kernels.inverse_dynamics, at.model, rate, at.work)
 
 
-def forward_dynamics(robot: Robot, q: ArrayLike, v: ArrayLike, force: ArrayLike) -> Floats:
-    """Acceleration A⁻¹(force − H), (nv,), under a generalised force that includes passive ones.
+@of_state("(nv,) float: In m/s² and rad/s².")
+def forward_dynamics(at: Evaluation, force: ArrayLike) -> Floats:
+    """Acceleration A⁻¹(force − H) under a generalised force that includes passive ones.
 
     Without contact. The force of given joint torques is :func:`applied_force`; for the ground see
     :func:`heelstrike.contact_forward_dynamics`.
     """
-    matrix = np.zeros((robot.nv, robot.nv))
-    acceleration = np.zeros(robot.nv)
-    kernels.forward_dynamics(
-        robot.model,
-        matrix,
-        np.zeros_like(matrix),
-        joint_vector(robot, "force", force),
-        evaluated(robot, q, v),
-        acceleration,
-    )
-    return acceleration
+    total, size = at.vector("force", force), at.model.nv
+    scratch = at.zeros(size, size), at.zeros(size, size)
+    return at.filled((size,), kernels.forward_dynamics, at.model, *scratch, total, at.work)

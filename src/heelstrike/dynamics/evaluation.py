@@ -1,16 +1,105 @@
-"""From what a person hands in to what the kernels work on: checked vectors, links, workspaces."""
+"""A robot in one state, in numbers or in symbols; what a person hands in, checked."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import RobotError
+from heelstrike.robot.coordinates import index_of
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
-Floats = NDArray[np.float64]
+
+class Evaluation:
+    """A robot in one state, and what the kernels know of it.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, v : (nq,) and (nv,) array
+        State; at rest by default. Object arrays of CasADi symbols make everything symbolic.
+
+    Raises
+    ------
+    RobotError
+        If a vector has the wrong length.
+    """
+
+    def __init__(self, robot: Robot, q: ArrayLike, v: ArrayLike | None = None) -> None:
+        self.robot, self.model = robot, robot.model
+        self.symbolic = isinstance(q, np.ndarray) and q.dtype == object
+        self.q = self.vector("q", q)
+        self.v = self.zeros(robot.nv) if v is None else self.vector("v", v)
+
+    @cached_property
+    def work(self) -> Workspace:
+        """Kinematics and velocities of the state, for the kernels that follow."""
+        dtype = object if self.symbolic else None
+        made = Workspace.allocate(dtype=dtype, **self.model.extents)
+        self.run(kernels.forward_kinematics, self.model, self.q, made)
+        self.run(kernels.link_velocities, self.model, self.v, made)
+        return made
+
+    def run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
+        """Run a kernel, over symbols as plain Python."""
+        if self.symbolic:
+            from heelstrike.dynamics.symbolic import traced
+
+            kernel = traced(kernel)
+        kernel(*arguments)
+
+    def zeros(self, *shape: int) -> Floats:
+        """Make an array of zeros of the right kind."""
+        return np.zeros(shape, dtype=object if self.symbolic else np.float64)
+
+    def filled(self, shape: tuple[int, ...], kernel: Callable[..., Any], *arguments: Any) -> Floats:
+        """Return an array that a kernel has filled, its last argument."""
+        result = self.zeros(*shape)
+        self.run(kernel, *arguments, result)
+        return result
+
+    def number(self, kernel: Callable[..., Any], *arguments: Any) -> float:
+        """Return the number that a kernel has written."""
+        (result,) = self.filled((1,), kernel, *arguments).tolist()
+        value: float = result
+        return value
+
+    def vector(self, name: str, value: ArrayLike) -> Floats:
+        """Check a vector over the coordinates, or the actuators if it is "torque"; symbols pass."""
+        symbolic: Any = value
+        entries = self.robot.actuator_names if name == "torque" else self.robot.joint_names
+        return symbolic if self.symbolic else _vector(self.robot, name, value, entries)
+
+    def point(self, link: int | str, local: ArrayLike) -> tuple[int, Floats]:
+        """Return the index of a link and the world position of a point of it."""
+        place, within = link_index(self.robot, link), plane_vector("local", local)
+        return place, self.filled(within.shape, kernels.point_position, self.work, place, within)
+
+    def jacobian(self, link: int, position: Floats) -> Floats:
+        """Return rows (x, z, rotation) of the Jacobian of a point at a world position, (3, nv)."""
+        shape = (3, self.model.nv)
+        return self.filled(shape, kernels.point_jacobian, self.model, self.work, link, position)
+
+    def bias_acceleration(self, link: int, position: Floats) -> Floats:
+        """Return J̇v of :meth:`jacobian`, (3,)."""
+        return self.filled((3,), kernels.point_bias_acceleration, self.work, link, position)
+
+    def contact_centers(self, contacts: Any) -> list[tuple[int, int, Floats]]:
+        """Return index, link and centre of contact points, of all if None are named."""
+        every = range(self.robot.nc) if contacts is None else contacts
+        model = self.model
+        return [
+            (i, *self.point(int(model.contact_link[i]), model.contact_position[i]))
+            for i in contact_indices(self.robot, every)
+        ]
 
 
 def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:
@@ -51,19 +140,13 @@ def link_index(robot: Robot, link: int | str) -> int:
     RobotError
         If the robot has no such link.
     """
-    if isinstance(link, str):
-        places = [i for i, name in enumerate(robot.link_names) if name == link]
-        if places:
-            return places[-1]
-    elif -robot.nv <= int(link) < robot.nv:
-        return int(link) % robot.nv
-    raise RobotError(
-        f"robot {robot.name!r} has no link {link!r}; its links are "
-        f"{', '.join(dict.fromkeys(robot.link_names))} (or 0 to {robot.nv - 1})"
-    )
+    names = robot.link_names
+    if link in names:
+        return len(names) - 1 - names[::-1].index(str(link))
+    return index_of(robot, "link", names, link)
 
 
-def contact_indices(robot: Robot, contacts: object) -> tuple[int, ...]:
+def contact_indices(robot: Robot, contacts: Any) -> tuple[int, ...]:
     """Return indices of contact points given by index or name, in the order given.
 
     Raises
@@ -71,25 +154,6 @@ def contact_indices(robot: Robot, contacts: object) -> tuple[int, ...]:
     RobotError
         If the robot has no such contact point.
     """
-    given = (contacts,) if isinstance(contacts, str | int | np.integer) else tuple(contacts)  # type: ignore[arg-type]
-    found: list[int] = []
-    for contact in given:
-        if isinstance(contact, str) and contact in robot.contact_names:
-            found.append(robot.contact_names.index(contact))
-        elif not isinstance(contact, str) and 0 <= int(contact) < robot.nc:
-            found.append(int(contact))
-        else:
-            raise RobotError(
-                f"robot {robot.name!r} has no contact point {contact!r}; it has "
-                f"{', '.join(robot.contact_names) or 'none'}"
-            )
-    return tuple(dict.fromkeys(found))
-
-
-def evaluated(robot: Robot, q: ArrayLike, v: ArrayLike | None = None) -> Workspace:
-    """Workspace with kinematics (and velocities, if `v` is given) of a state."""
-    work = workspace(robot.nv)
-    kernels.forward_kinematics(robot.model, joint_vector(robot, "q", q), work)
-    velocity = np.zeros(robot.nv) if v is None else joint_vector(robot, "v", v)
-    kernels.link_velocities(robot.model, velocity, work)
-    return work
+    given: Any = (contacts,) if isinstance(contacts, str | int | np.integer) else contacts
+    names = robot.contact_names
+    return tuple(dict.fromkeys(index_of(robot, "contact point", names, one) for one in given))

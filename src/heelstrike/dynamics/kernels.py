@@ -21,15 +21,34 @@ from __future__ import annotations
 from math import cos, sin
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.spatial import momentum_of, plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 
 
 @kernel
+def integrate(model: Model, q: Floats, v: Floats, time: float, result: Floats) -> None:
+    """Move positions with a constant velocity for a time; `result` (nq,) may be `q` itself.
+
+    This and :func:`difference` alone know that the coordinates of a planar tree are plain numbers
+    whose rates are its velocities.
+    """
+    for i in range(model.nq):
+        result[i] = q[i] + time * v[i]
+
+
+@kernel
+def difference(model: Model, start: Floats, end: Floats, velocity: Floats) -> None:
+    """Find the velocity that takes one position to another in a unit of time."""
+    for i in range(model.nv):
+        velocity[i] = end[i] - start[i]
+
+
+@kernel
 def forward_kinematics(model: Model, q: Floats, work: Workspace) -> None:
     """Poses of all links, their joint motions and inertias about the pivot (paper eq. 6)."""
-    count = model.parent.shape[0]
-    for i in range(count):
+    for i in range(model.nl):
         parent = model.parent[i]
         displacement = q[i] - model.reference[i]
         x = model.offset[i, 0] + model.axis[i, 1] * displacement
@@ -56,7 +75,7 @@ def forward_kinematics(model: Model, q: Floats, work: Workspace) -> None:
             work.sine[i] = sin(work.angle[i])
     work.pivot[0] = work.origin[model.pivot, 0]
     work.pivot[1] = work.origin[model.pivot, 1]
-    for i in range(count):
+    for i in range(model.nl):
         x = work.origin[i, 0] - work.pivot[0]
         z = work.origin[i, 1] - work.pivot[1]
         work.motion[i, 0] = model.axis[i, 0]
@@ -80,32 +99,17 @@ def link_velocities(model: Model, v: Floats, work: Workspace) -> None:
     A joint's motion is carried along by its parent, so that it changes at the rate
     ``velocity x motion``; the sum of these along the chain is J̇v.
     """
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nl):
         parent = model.parent[i]
-        m0 = work.motion[i, 0]
-        m1 = work.motion[i, 1]
-        m2 = work.motion[i, 2]
-        if parent < 0:
-            work.velocity[i, 0] = m0 * v[i]
-            work.velocity[i, 1] = m1 * v[i]
-            work.velocity[i, 2] = m2 * v[i]
-            work.bias_acceleration[i, 0] = 0.0
-            work.bias_acceleration[i, 1] = 0.0
-            work.bias_acceleration[i, 2] = 0.0
-        else:
-            w = work.velocity[parent, 0]
-            vx = work.velocity[parent, 1]
-            vz = work.velocity[parent, 2]
-            work.velocity[i, 0] = w + m0 * v[i]
-            work.velocity[i, 1] = vx + m1 * v[i]
-            work.velocity[i, 2] = vz + m2 * v[i]
-            work.bias_acceleration[i, 0] = work.bias_acceleration[parent, 0]
-            work.bias_acceleration[i, 1] = (
-                work.bias_acceleration[parent, 1] + (w * m2 - m0 * vz) * v[i]
-            )
-            work.bias_acceleration[i, 2] = (
-                work.bias_acceleration[parent, 2] + (m0 * vx - w * m1) * v[i]
-            )
+        m0, m1, m2 = spatial(work.motion, i)
+        w, vx, vz, bx, bz = 0.0, 0.0, 0.0, 0.0, 0.0
+        if parent >= 0:
+            w, vx, vz = spatial(work.velocity, parent)
+            _, bx, bz = spatial(work.bias_acceleration, parent)
+        write(work.velocity, i, (w + m0 * v[i], vx + m1 * v[i], vz + m2 * v[i]))
+        bx = bx + (w * m2 - m0 * vz) * v[i]
+        bz = bz + (m0 * vx - w * m1) * v[i]
+        write(work.bias_acceleration, i, (0.0, bx, bz))
 
 
 @kernel
@@ -115,50 +119,24 @@ def inverse_dynamics(model: Model, acceleration: Floats, work: Workspace, force:
     Gravity enters as an upward acceleration of the world. Passive joint forces (damping, springs)
     are not part of H; see :func:`passive_force`.
     """
-    count = model.parent.shape[0]
-    for i in range(count):
-        parent = model.parent[i]
-        if parent < 0:
-            a0 = 0.0
-            a1 = -model.gravity[0]
-            a2 = -model.gravity[1]
-        else:
-            a0 = work.acceleration[parent, 0]
-            a1 = work.acceleration[parent, 1]
-            a2 = work.acceleration[parent, 2]
-        a0 = a0 + work.motion[i, 0] * acceleration[i]
-        a1 = a1 + work.motion[i, 1] * acceleration[i]
-        a2 = a2 + work.motion[i, 2] * acceleration[i]
-        work.acceleration[i, 0] = a0
-        work.acceleration[i, 1] = a1
-        work.acceleration[i, 2] = a2
+    for i in range(model.nl):
+        a = 0.0, -model.gravity[0], -model.gravity[1]
+        if model.parent[i] >= 0:
+            a = spatial(work.acceleration, model.parent[i])
+        a = plus(a, scaled(spatial(work.motion, i), acceleration[i]))
+        write(work.acceleration, i, a)
         # The recursion above carries the part of the joints; the velocity part is ready.
-        a0 = a0 + work.bias_acceleration[i, 0]
-        a1 = a1 + work.bias_acceleration[i, 1]
-        a2 = a2 + work.bias_acceleration[i, 2]
-        mass = work.inertia[i, 0]
-        hx = work.inertia[i, 1]
-        hz = work.inertia[i, 2]
-        w = work.velocity[i, 0]
-        vx = work.velocity[i, 1]
-        vz = work.velocity[i, 2]
-        px = mass * vx + w * hz
-        pz = mass * vz - w * hx
-        work.force[i, 0] = work.inertia[i, 3] * a0 + hz * a1 - hx * a2 + vz * px - vx * pz
-        work.force[i, 1] = mass * a1 + a0 * hz + w * pz
-        work.force[i, 2] = mass * a2 - a0 * hx - w * px
-    for i in range(count - 1, -1, -1):
-        force[i] = (
-            work.motion[i, 0] * work.force[i, 0]
-            + work.motion[i, 1] * work.force[i, 1]
-            + work.motion[i, 2] * work.force[i, 2]
-            + model.armature[i] * acceleration[i]
-        )
+        a = plus(a, spatial(work.bias_acceleration, i))
+        w, vx, vz = spatial(work.velocity, i)
+        _, px, pz = momentum_of(work.inertia, i, (w, vx, vz))
+        moment, fx, fz = momentum_of(work.inertia, i, a)
+        write(work.force, i, (moment + vz * px - vx * pz, fx + w * pz, fz - w * px))
+    for i in range(model.nl - 1, -1, -1):
+        f = spatial(work.force, i)
+        force[i] = power(spatial(work.motion, i), f) + model.armature[i] * acceleration[i]
         parent = model.parent[i]
         if parent >= 0:
-            work.force[parent, 0] += work.force[i, 0]
-            work.force[parent, 1] += work.force[i, 1]
-            work.force[parent, 2] += work.force[i, 2]
+            write(work.force, parent, plus(spatial(work.force, parent), f))
 
 
 @kernel
@@ -170,37 +148,29 @@ def bias_force(model: Model, work: Workspace, force: Floats) -> None:
 @kernel
 def passive_force(model: Model, q: Floats, v: Floats, force: Floats) -> None:
     """Generalised force of joint dampers and springs on the robot."""
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nv):
         force[i] = -model.damping[i] * v[i] - model.stiffness[i] * (q[i] - model.rest[i])
 
 
 @kernel
 def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
     """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
-    count = model.parent.shape[0]
-    for i in range(count):
+    for i in range(model.nl):
         for k in range(4):
             work.composite[i, k] = work.inertia[i, k]
-        for j in range(count):
+        for j in range(model.nv):
             matrix[i, j] = 0.0
-    for i in range(count - 1, -1, -1):
-        mass = work.composite[i, 0]
-        hx = work.composite[i, 1]
-        hz = work.composite[i, 2]
-        m0 = work.motion[i, 0]
-        m1 = work.motion[i, 1]
-        m2 = work.motion[i, 2]
-        moment = work.composite[i, 3] * m0 + hz * m1 - hx * m2
-        px = mass * m1 + m0 * hz
-        pz = mass * m2 - m0 * hx
-        matrix[i, i] = m0 * moment + m1 * px + m2 * pz + model.armature[i]
+    for i in range(model.nl - 1, -1, -1):
+        motion = spatial(work.motion, i)
+        p = momentum_of(work.composite, i, motion)
+        matrix[i, i] = power(motion, p) + model.armature[i]
         parent = model.parent[i]
         if parent >= 0:
             for k in range(4):
                 work.composite[parent, k] += work.composite[i, k]
         j = parent
         while j >= 0:
-            entry = work.motion[j, 0] * moment + work.motion[j, 1] * px + work.motion[j, 2] * pz
+            entry = power(spatial(work.motion, j), p)
             matrix[i, j] = entry
             matrix[j, i] = entry
             j = model.parent[j]
@@ -213,14 +183,13 @@ def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
     `factor` receives D⁻¹ on its diagonal and the strictly lower part of the unit matrix L, nonzero
     only where the column is an ancestor of the row.
     """
-    count = model.parent.shape[0]
-    for i in range(count):
+    for i in range(model.nv):
         factor[i, i] = matrix[i, i]
         j = model.parent[i]
         while j >= 0:
             factor[i, j] = matrix[i, j]
             j = model.parent[j]
-    for k in range(count - 1, -1, -1):
+    for k in range(model.nv - 1, -1, -1):
         inverse = 1.0 / factor[k, k]
         factor[k, k] = inverse
         i = model.parent[k]
@@ -237,7 +206,7 @@ def factorize(model: Model, matrix: Floats, factor: Floats) -> None:
 @kernel
 def solve_upper(model: Model, factor: Floats, x: Floats) -> None:
     """Replace x by L⁻ᵀ x."""
-    for i in range(model.parent.shape[0] - 1, -1, -1):
+    for i in range(model.nv - 1, -1, -1):
         j = model.parent[i]
         while j >= 0:
             x[j] -= factor[i, j] * x[i]
@@ -247,7 +216,7 @@ def solve_upper(model: Model, factor: Floats, x: Floats) -> None:
 @kernel
 def solve_lower(model: Model, factor: Floats, x: Floats) -> None:
     """Replace x by L⁻¹ x."""
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nv):
         j = model.parent[i]
         while j >= 0:
             x[i] -= factor[i, j] * x[j]
@@ -258,7 +227,7 @@ def solve_lower(model: Model, factor: Floats, x: Floats) -> None:
 def solve_factorized(model: Model, factor: Floats, x: Floats) -> None:
     """Replace x by A⁻¹ x."""
     solve_upper(model, factor, x)
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nv):
         x[i] *= factor[i, i]
     solve_lower(model, factor, x)
 
@@ -287,18 +256,22 @@ def point_jacobian(
     jacobian : (3, nv) float
         Receives the rows (x, z, rotation about +y): the paper's J_r, J_l (eq. 4, 5).
     """
-    x = position[0] - work.pivot[0]
-    z = position[1] - work.pivot[1]
-    for j in range(model.parent.shape[0]):
-        jacobian[0, j] = 0.0
-        jacobian[1, j] = 0.0
-        jacobian[2, j] = 0.0
+    for j in range(model.nv):
+        for k in range(3):
+            jacobian[k, j] = 0.0
+    place = place_of(work, position)
     j = link
     while j >= 0:
-        jacobian[0, j] = work.motion[j, 1] + work.motion[j, 0] * z
-        jacobian[1, j] = work.motion[j, 2] - work.motion[j, 0] * x
+        jacobian[0, j], jacobian[1, j] = velocity_at(work.motion, j, place)
         jacobian[2, j] = work.motion[j, 0]
         j = model.parent[j]
+
+
+@kernel
+def point_velocity(work: Workspace, link: int, position: Floats, velocity: Floats) -> None:
+    """Velocity (x, z) of a point of a link and angular velocity of the link, into (3,)."""
+    velocity[0], velocity[1] = velocity_at(work.velocity, link, place_of(work, position))
+    velocity[2] = work.velocity[link, 0]
 
 
 @kernel
@@ -306,15 +279,13 @@ def point_bias_acceleration(
     work: Workspace, link: int, position: Floats, acceleration: Floats
 ) -> None:
     """J̇ v of :func:`point_jacobian`: acceleration of the point and link at zero v̇."""
-    x = position[0] - work.pivot[0]
-    z = position[1] - work.pivot[1]
+    place = place_of(work, position)
     w = work.velocity[link, 0]
-    vx = work.velocity[link, 1] + w * z
-    vz = work.velocity[link, 2] - w * x
-    rotation = work.bias_acceleration[link, 0]
-    acceleration[0] = work.bias_acceleration[link, 1] + rotation * z + w * vz
-    acceleration[1] = work.bias_acceleration[link, 2] - rotation * x - w * vx
-    acceleration[2] = rotation
+    vx, vz = velocity_at(work.velocity, link, place)
+    ax, az = velocity_at(work.bias_acceleration, link, place)
+    acceleration[0] = ax + w * vz
+    acceleration[1] = az - w * vx
+    acceleration[2] = work.bias_acceleration[link, 0]
 
 
 @kernel
@@ -328,7 +299,7 @@ def forward_dynamics(
     mass_matrix(model, work, matrix)
     factorize(model, matrix, factor)
     bias_force(model, work, v_dot)
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nv):
         v_dot[i] = force[i] - v_dot[i]
     solve_factorized(model, factor, v_dot)
 
@@ -337,10 +308,8 @@ def forward_dynamics(
 def kinetic_energy(model: Model, v: Floats, work: Workspace, energy: Floats) -> None:
     """Kinetic energy of the links and of the rotors (armature), summed link by link."""
     energy[0] = 0.0
-    for i in range(model.parent.shape[0]):
-        w = work.velocity[i, 0]
-        vx = work.velocity[i, 1]
-        vz = work.velocity[i, 2]
+    for i in range(model.nl):
+        w, vx, vz = spatial(work.velocity, i)
         energy[0] += 0.5 * (
             work.inertia[i, 3] * w * w
             + work.inertia[i, 0] * (vx * vx + vz * vz)
@@ -353,7 +322,7 @@ def kinetic_energy(model: Model, v: Floats, work: Workspace, energy: Floats) -> 
 def potential_energy(model: Model, q: Floats, work: Workspace, energy: Floats) -> None:
     """Energy of the links in the gravity field and of the joint springs; zero at the origin."""
     energy[0] = 0.0
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nl):
         mass = work.inertia[i, 0]
         stretch = q[i] - model.rest[i]
         energy[0] += (
@@ -364,40 +333,34 @@ def potential_energy(model: Model, q: Floats, work: Workspace, energy: Floats) -
 
 
 @kernel
+def first_moments(model: Model, work: Workspace) -> tuple[float, float, float]:
+    """Mass of the robot and its first moments (x, z) about the pivot."""
+    mass = 0.0
+    hx = 0.0
+    hz = 0.0
+    for i in range(model.nl):
+        mass = mass + work.inertia[i, 0]
+        hx = hx + work.inertia[i, 1]
+        hz = hz + work.inertia[i, 2]
+    return mass, hx, hz
+
+
+@kernel
 def center_of_mass(model: Model, work: Workspace, position: Floats) -> None:
     """World position of the robot's centre of mass."""
-    mass = 0.0
-    x = 0.0
-    z = 0.0
-    for i in range(model.parent.shape[0]):
-        mass = mass + work.inertia[i, 0]
-        x = x + work.inertia[i, 1]
-        z = z + work.inertia[i, 2]
-    position[0] = work.pivot[0] + x / mass
-    position[1] = work.pivot[1] + z / mass
+    mass, hx, hz = first_moments(model, work)
+    position[0] = work.pivot[0] + hx / mass
+    position[1] = work.pivot[1] + hz / mass
 
 
 @kernel
 def momentum(model: Model, work: Workspace, result: Floats) -> None:
     """Linear momentum (x, z) and moment of momentum about the robot's centre of mass (+y)."""
-    mass = 0.0
-    hx = 0.0
-    hz = 0.0
-    px = 0.0
-    pz = 0.0
-    moment = 0.0
-    for i in range(model.parent.shape[0]):
-        w = work.velocity[i, 0]
-        vx = work.velocity[i, 1]
-        vz = work.velocity[i, 2]
-        mass = mass + work.inertia[i, 0]
-        hx = hx + work.inertia[i, 1]
-        hz = hz + work.inertia[i, 2]
-        px = px + work.inertia[i, 0] * vx + w * work.inertia[i, 2]
-        pz = pz + work.inertia[i, 0] * vz - w * work.inertia[i, 1]
-        moment = moment + (
-            work.inertia[i, 3] * w + work.inertia[i, 2] * vx - work.inertia[i, 1] * vz
-        )
+    mass, hx, hz = first_moments(model, work)
+    total = 0.0, 0.0, 0.0
+    for i in range(model.nl):
+        total = plus(total, momentum_of(work.inertia, i, spatial(work.velocity, i)))
+    moment, px, pz = total
     result[0] = px
     result[1] = pz
     result[2] = moment - (hz * px - hx * pz) / mass
@@ -410,23 +373,12 @@ def momentum_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
     A joint moves its subtree as one rigid body. Rows x and z over the mass of the robot are the
     Jacobian of the centre of mass.
     """
-    count = model.parent.shape[0]
-    mass = 0.0
-    hx = 0.0
-    hz = 0.0
-    for i in range(count):
-        mass = mass + work.inertia[i, 0]
-        hx = hx + work.inertia[i, 1]
-        hz = hz + work.inertia[i, 2]
+    mass, hx, hz = first_moments(model, work)
+    for i in range(model.nl):
         for k in range(4):
             work.composite[i, k] = work.inertia[i, k]
-    for i in range(count - 1, -1, -1):
-        m0 = work.motion[i, 0]
-        m1 = work.motion[i, 1]
-        m2 = work.motion[i, 2]
-        px = work.composite[i, 0] * m1 + m0 * work.composite[i, 2]
-        pz = work.composite[i, 0] * m2 - m0 * work.composite[i, 1]
-        moment = work.composite[i, 3] * m0 + work.composite[i, 2] * m1 - work.composite[i, 1] * m2
+    for i in range(model.nl - 1, -1, -1):
+        moment, px, pz = momentum_of(work.composite, i, spatial(work.motion, i))
         matrix[0, i] = px
         matrix[1, i] = pz
         matrix[2, i] = moment - (hz * px - hx * pz) / mass

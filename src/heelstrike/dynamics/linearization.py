@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.evaluation import Floats, contact_indices, joint_vector, torque_vector
+from heelstrike.dynamics.evaluation import contact_indices, joint_vector, torque_vector
+from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
 if TYPE_CHECKING:

@@ -2,59 +2,58 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike
-
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.equations_of_motion import weightless
-from heelstrike.dynamics.evaluation import Floats, evaluated
-from heelstrike.robot.robot import Robot
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.robot.model import Floats
 
 
-def center_of_mass(robot: Robot, q: ArrayLike) -> Floats:
-    """World position (x, z) of the robot's centre of mass, (2,), in metres."""
-    position = np.zeros(2)
-    kernels.center_of_mass(robot.model, evaluated(robot, q), position)
-    return position
+@of_position("(2,) float: World position (x, z), in m.")
+def center_of_mass(at: Evaluation) -> Floats:
+    """Where the robot's centre of mass is."""
+    return at.filled((at.model.axes,), kernels.center_of_mass, at.model, at.work)
 
 
-def center_of_mass_jacobian(robot: Robot, q: ArrayLike) -> Floats:
-    """Jacobian (x, z) of the robot's centre of mass, (2, nv)."""
-    return momentum_matrix(robot, q)[:2] / robot.total_mass
+@of_position("(2, nv) float: Rows x and z, in m and 1.")
+def center_of_mass_jacobian(at: Evaluation) -> Floats:
+    """Jacobian of the robot's centre of mass: times v it gives the velocity."""
+    return momentum_matrix.at(at)[:-1] / at.robot.total_mass
 
 
-def center_of_mass_velocity(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Velocity (x, z) of the robot's centre of mass, (2,), in m/s."""
-    return momentum(robot, q, v)[:2] / robot.total_mass
+@of_state("(2,) float: Along x and z, in m/s.")
+def center_of_mass_velocity(at: Evaluation) -> Floats:
+    """Velocity of the robot's centre of mass."""
+    return momentum.at(at)[:-1] / at.robot.total_mass
 
 
-def center_of_mass_bias_acceleration(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """J̇v of :func:`center_of_mass_jacobian`, (2,), in m/s²."""
-    model = weightless(robot.model)
-    work = evaluated(robot, q, v)
-    kernels.inverse_dynamics(model, np.zeros(robot.nv), work, np.zeros(robot.nv))
+@of_state("(2,) float: Along x and z, in m/s².")
+def center_of_mass_bias_acceleration(at: Evaluation) -> Floats:
+    """J̇v of :func:`center_of_mass_jacobian`."""
+    model, work = weightless(at.model), at.work
+    at.filled(at.v.shape, kernels.bias_force, model, work)
     # The recursion leaves in every link the resultant of its subtree: d'Alembert's forces.
-    rate: Floats = work.force[model.parent < 0, 1:].sum(axis=0) / robot.total_mass
+    rate: Floats = work.force[model.parent < 0, 1:].sum(axis=0) / at.robot.total_mass
     return rate
 
 
-def momentum(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """Momentum along x and z (N s) and moment of momentum about the centre of mass (N m s)."""
-    result = np.zeros(3)
-    kernels.momentum(robot.model, evaluated(robot, q, v), result)
-    return result
+@of_state("(3,) float: Along x and z in N s, and about +y in N m s.")
+def momentum(at: Evaluation) -> Floats:
+    """Momentum, and moment of momentum about the centre of mass."""
+    return at.filled((3,), kernels.momentum, at.model, at.work)
 
 
-def angular_momentum(robot: Robot, q: ArrayLike, v: ArrayLike) -> float:
-    """Moment of momentum about the centre of mass and about +y, in N m s.
+@of_state("float: About +y, in N m s.")
+def angular_momentum(at: Evaluation) -> float:
+    """Moment of momentum about the centre of mass.
 
     Rotors (armature) turn with the motors, not with the links, and are not counted.
     """
-    return float(momentum(robot, q, v)[2])
+    moment: float = momentum.at(at).tolist()[-1]  # a symbol, too
+    return moment
 
 
-def momentum_matrix(robot: Robot, q: ArrayLike) -> Floats:
-    """Centroidal momentum matrix, (3, nv): times v it gives :func:`momentum`."""
-    matrix = np.zeros((3, robot.nv))
-    kernels.momentum_matrix(robot.model, evaluated(robot, q), matrix)
-    return matrix
+@of_position("(3, nv) float: Rows x, z and moment about +y, in kg and kg m².")
+def momentum_matrix(at: Evaluation) -> Floats:
+    """Centroidal momentum matrix: times v it gives :func:`momentum`."""
+    return at.filled((3, at.model.nv), kernels.momentum_matrix, at.model, at.work)

@@ -6,105 +6,79 @@ of that link, in metres. Results are in world axes: x forward, z up, rotations a
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import (
-    Floats,
-    evaluated,
-    joint_vector,
-    link_index,
-    plane_vector,
-)
-from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.robot import Robot
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.places import write_point_rows
+from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.robot.model import Floats
+
+UP = np.array([0.0, 1.0])
+"""Normal of level ground."""
 
 
-def point_position(robot: Robot, q: ArrayLike, link: int | str, local: ArrayLike) -> Floats:
-    """World position (x, z) of a point of a link, (2,), in metres."""
-    return _position(evaluated(robot, q), link_index(robot, link), plane_vector("local", local))
+@of_position("(2,) float: World position (x, z), in m.")
+def point_position(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
+    """Where a point of a link is."""
+    return at.point(link, local)[1]
 
 
-def point_velocity(
-    robot: Robot, q: ArrayLike, v: ArrayLike, link: int | str, local: ArrayLike
-) -> Floats:
-    """Velocity (x, z) of a point and angular velocity of its link, (3,), in m/s and rad/s."""
-    velocity: Floats = point_jacobian(robot, q, link, local) @ joint_vector(robot, "v", v)
-    return velocity
+@of_state("(3,) float: Along x and z in m/s, and about +y in rad/s.")
+def point_velocity(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
+    """Velocity of a point and angular velocity of its link."""
+    return at.filled((3,), kernels.point_velocity, at.work, *at.point(link, local))
 
 
-def point_jacobian(robot: Robot, q: ArrayLike, link: int | str, local: ArrayLike) -> Floats:
-    """Rows (x, z, rotation) of the Jacobian of a point of a link, (3, nv).
+@of_position("(3, nv) float: Rows x, z and rotation about +y, in m and 1.")
+def point_jacobian(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
+    """Jacobian of a point of a link and of the link's rotation.
 
-    Times v they give the velocity of the point and of its link's rotation; its transpose takes a
-    force at the point and a moment about +y, (f_x, f_z, m), to the generalised force.
+    Times v its rows give the velocity of the point and of its link's rotation; its transpose takes
+    a force at the point and a moment about +y, (f_x, f_z, m), to the generalised force.
     """
-    work = evaluated(robot, q)
-    place = link_index(robot, link)
-    jacobian = np.zeros((3, robot.nv))
-    position = _position(work, place, plane_vector("local", local))
-    kernels.point_jacobian(robot.model, work, place, position, jacobian)
-    return jacobian
+    return at.jacobian(*at.point(link, local))
 
 
-def point_bias_acceleration(
-    robot: Robot, q: ArrayLike, v: ArrayLike, link: int | str, local: ArrayLike
-) -> Floats:
-    """J̇v of :func:`point_jacobian`, (3,), in m/s² and rad/s²: the acceleration at v̇ = 0."""
-    work = evaluated(robot, q, v)
-    place = link_index(robot, link)
-    acceleration = np.zeros(3)
-    position = _position(work, place, plane_vector("local", local))
-    kernels.point_bias_acceleration(work, place, position, acceleration)
-    return acceleration
+@of_state("(3,) float: Along x and z in m/s², and about +y in rad/s².")
+def point_bias_acceleration(at: Evaluation, link: int | str, local: ArrayLike) -> Floats:
+    """J̇v of :func:`point_jacobian`: the acceleration at v̇ = 0."""
+    return at.bias_acceleration(*at.point(link, local))
 
 
-def contact_positions(robot: Robot, q: ArrayLike) -> Floats:
-    """World positions (x, z) of the centres of the contact discs, (nc, 2), in metres."""
-    work = evaluated(robot, q)
-    positions = np.zeros((robot.nc, 2))
-    for i in range(robot.nc):
-        link, local = int(robot.model.contact_link[i]), robot.model.contact_position[i]
-        kernels.point_position(work, link, local, positions[i])
-    return positions
+@of_position("(k, 2) float: World positions (x, z), in m.")
+def contact_positions(at: Evaluation, contacts: Iterable[int | str] | None = None) -> Floats:
+    """Where the centres of the contact discs are."""
+    centers = [center for _, _, center in at.contact_centers(contacts)]
+    return np.array(centers).reshape(-1, at.model.axes)
 
 
-def contact_jacobian(robot: Robot, q: ArrayLike) -> Floats:
-    """Rows (normal, tangent) of the contact points on level ground, (nc, 2, nv).
-
-    They are those of the lowest point of each contact disc: normal is up, tangent forward.
-    """
-    work = evaluated(robot, q)
-    result = np.zeros((robot.nc, 2, robot.nv))
-    jacobian = np.zeros((3, robot.nv))
-    lowest = contact_positions(robot, q) - np.outer(robot.model.contact_radius, (0.0, 1.0))
-    for i in range(robot.nc):
-        link = int(robot.model.contact_link[i])
-        kernels.point_jacobian(robot.model, work, link, lowest[i], jacobian)
-        result[i] = jacobian[[1, 0]]
+@of_position("(k, 2, nv) float: Rows normal (up) and tangent (forward), in m and 1.")
+def contact_jacobian(at: Evaluation, contacts: Iterable[int | str] | None = None) -> Floats:
+    """Jacobian of the contact points on level ground: of the lowest point of each contact disc."""
+    found = at.contact_centers(contacts)
+    result = at.zeros(len(found), at.model.axes, at.model.nv)
+    for rows, (i, link, lowest) in zip(result, found, strict=True):
+        lowest[-1] -= at.model.contact_radius[i]
+        at.run(write_point_rows, at.model, at.work, link, lowest, UP, rows, 0)
     return result
 
 
-def contact_bias_acceleration(robot: Robot, q: ArrayLike, v: ArrayLike) -> Floats:
-    """J̇v of :func:`contact_jacobian`, (normal, tangent), (nc, 2), in m/s².
+@of_state("(k, 2) float: Normal (up) and tangential (forward), in m/s².")
+def contact_bias_acceleration(
+    at: Evaluation, contacts: Iterable[int | str] | None = None
+) -> Floats:
+    """J̇v of :func:`contact_jacobian`.
 
     It belongs to the gap and to the sliding velocity of each disc: a disc that rolls on the ground
     has neither, although the material point that touches is drawn towards the disc's centre.
     """
-    work = evaluated(robot, q, v)
-    result = np.zeros((robot.nc, 2))
-    acceleration = np.zeros(3)
-    for i, center in enumerate(contact_positions(robot, q)):
-        kernels.point_bias_acceleration(
-            work, int(robot.model.contact_link[i]), center, acceleration
-        )
-        result[i] = acceleration[[1, 0]]
-        result[i, 1] -= robot.model.contact_radius[i] * acceleration[2]
+    found = at.contact_centers(contacts)
+    result = at.zeros(len(found), at.model.axes)
+    for row, (i, link, center) in zip(result, found, strict=True):
+        x, z, turn = at.bias_acceleration(link, center)
+        row[:] = z, x - at.model.contact_radius[i] * turn
     return result
-
-
-def _position(work: Workspace, link: int, local: Floats) -> Floats:
-    position = np.zeros(2)
-    kernels.point_position(work, link, local, position)
-    return position

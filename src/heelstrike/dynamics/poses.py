@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.evaluation import Floats, evaluated
-from heelstrike.robot.robot import Robot
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.robot.model import Floats
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,11 @@ class LinkPoses:
 
     Attributes
     ----------
-    origin : (nv, 2) float
+    origin : (nl, 2) float
         Position (x, z) of each link frame, in metres.
-    angle : (nv,) float
+    angle : (nl,) float
         Rotation of each link about +y from the reference configuration, in rad.
-    center_of_mass : (nv, 2) float
+    center_of_mass : (nl, 2) float
         Position (x, z) of each link's centre of mass, in metres.
     """
 
@@ -30,11 +30,12 @@ class LinkPoses:
     center_of_mass: Floats
 
 
-def link_poses(robot: Robot, q: ArrayLike) -> LinkPoses:
+@of_position("LinkPoses: In m and rad.")
+def link_poses(at: Evaluation) -> LinkPoses:
     """Poses of all links in the world."""
-    work = evaluated(robot, q)
+    work = at.work
     c, s = work.cosine, work.sine
-    x, z = robot.model.center_of_mass.T
+    x, z = at.model.center_of_mass.T
     center = work.origin + np.column_stack((c * x + s * z, c * z - s * x))
     return LinkPoses(work.origin, work.angle, center)
 
@@ -45,11 +46,11 @@ class LinkVelocities:
 
     Attributes
     ----------
-    origin : (nv, 2) float
+    origin : (nl, 2) float
         Velocity (x, z) of each link frame's origin, in m/s.
-    angular : (nv,) float
+    angular : (nl,) float
         Angular velocity of each link about +y, in rad/s.
-    center_of_mass : (nv, 2) float
+    center_of_mass : (nl, 2) float
         Velocity (x, z) of each link's centre of mass, in m/s.
     """
 
@@ -58,15 +59,15 @@ class LinkVelocities:
     center_of_mass: Floats
 
 
-def link_velocities(robot: Robot, q: ArrayLike, v: ArrayLike) -> LinkVelocities:
+@of_state("LinkVelocities: In m/s and rad/s.")
+def link_velocities(at: Evaluation) -> LinkVelocities:
     """Velocities of all links in the world."""
-    work = evaluated(robot, q, v)
-    poses = link_poses(robot, q)
-    angular = work.velocity[:, 0].copy()
+    poses = link_poses.at(at)
+    angular = at.work.velocity[:, 0].copy()
 
-    def at(points: Floats) -> Floats:
-        x, z = (points - work.pivot).T
-        velocity: Floats = work.velocity[:, 1:] + np.column_stack((angular * z, -angular * x))
+    def of(points: Floats) -> Floats:
+        x, z = (points - at.work.pivot).T
+        velocity: Floats = at.work.velocity[:, 1:] + np.column_stack((angular * z, -angular * x))
         return velocity
 
-    return LinkVelocities(at(poses.origin), angular, at(poses.center_of_mass))
+    return LinkVelocities(of(poses.origin), angular, of(poses.center_of_mass))

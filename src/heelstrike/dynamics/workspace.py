@@ -21,23 +21,23 @@ class Workspace(Bundle):
 
     Attributes
     ----------
-    angle, cosine, sine : (nv,) float
+    angle, cosine, sine : (nl,) float
         Orientation of every link.
-    origin : (nv, 2) float
+    origin : (nl, axes) float
         World position of every link frame.
-    pivot : (2,) float
+    pivot : (axes,) float
         World position of the reference point of spatial vectors.
     motion : (nv, 3) float
-        Motion of the link per unit velocity of its joint.
-    velocity : (nv, 3) float
+        Motion of the joint's link per unit of every velocity.
+    velocity : (nl, 3) float
         Spatial velocity of every link.
-    bias_acceleration : (nv, 3) float
+    bias_acceleration : (nl, 3) float
         Spatial acceleration of every link when all joint accelerations are zero, no gravity.
-    acceleration, force : (nv, 3) float
+    acceleration, force : (nl, 3) float
         Scratch of the recursions.
-    inertia : (nv, 4) float
+    inertia : (nl, 4) float
         Mass, first moments (x, z) and second moment of every link about the pivot.
-    composite : (nv, 4) float
+    composite : (nl, 4) float
         The same for the subtree of every link.
     zero : (nv,) float
         Zeros, never written.
@@ -48,7 +48,7 @@ class Workspace(Bundle):
     sine: Floats = array("nl")
     origin: Floats = array("nl", "axes")
     pivot: Floats = array("axes")
-    motion: Floats = array("nl", 3)
+    motion: Floats = array("nv", 3)
     velocity: Floats = array("nl", 3)
     bias_acceleration: Floats = array("nl", 3)
     acceleration: Floats = array("nl", 3)

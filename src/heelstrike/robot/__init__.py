@@ -1,12 +1,13 @@
 """What a robot is, the readers of robot files, and the built-in robots."""
 
-from heelstrike.robot.builder import JointProperties, RobotBuilder
+from heelstrike.robot.builder import RobotBuilder
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.human import BodyTable, human
 from heelstrike.robot.inspection import Finding, FindingKind, Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
-from heelstrike.robot.model import Model
-from heelstrike.robot.robot import Foot, Mirror, Robot
+from heelstrike.robot.mirror import Mirror
+from heelstrike.robot.model import JointProperties, Model
+from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import RobotWarning
 

@@ -9,10 +9,10 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.contact_points import ContactPoint
 from heelstrike.robot.feet import find_feet, name_contacts
-from heelstrike.robot.mirror import find_mirror
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import NUMBERS, Floats, Model, label
 from heelstrike.robot.plausibility import unlikely_numbers
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.symmetry import find_mirror
 from heelstrike.robot.warning import warn
 
 LARGEST_NUMBER = 1e10
@@ -20,8 +20,6 @@ LARGEST_NUMBER = 1e10
 
 UNLIKELY = "numbers that are unlikely"
 SHOWN = 6  # how many of them a message lists before it counts the rest
-
-_MAY_BE_INFINITE = {"lower", "upper", "torque_lower", "torque_upper", "speed_limit"}
 
 
 def assembled(
@@ -95,10 +93,11 @@ def link_origins(model: Model) -> Floats:
 def _refuse_impossible_numbers(model: Model, source: str) -> None:
     """Refuse NaN, and what is infinite or huge where only a limit may be."""
     for field, values in model.members().items():
-        bad = np.isnan(values) if field in _MAY_BE_INFINITE else ~(np.abs(values) <= LARGEST_NUMBER)
+        infinite = NUMBERS[field].infinite
+        bad = np.isnan(values) if infinite else ~(np.abs(values) <= LARGEST_NUMBER)
         if np.any(bad):
             raise RobotError(
-                f"{source}: the {field.replace('_', ' ')} of the robot is not a number below "
+                f"{source}: the {label(field)} of the robot is not a number below "
                 f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
             )
 

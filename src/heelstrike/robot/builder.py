@@ -5,66 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypedDict, Unpack
+from typing import Any, Unpack
 
 import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import assembled
-from heelstrike.robot.contact_points import ContactPoint, in_order
-from heelstrike.robot.model import Model
+from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
+from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Model, Pair
 from heelstrike.robot.robot import Robot
 
-Pair = Sequence[float]
-Limits = float | Sequence[float]
-
-
-class JointProperties(TypedDict, total=False):
-    """What a link and the joint that moves it may have; nothing is required.
-
-    Attributes
-    ----------
-    mass, inertia : float
-        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²), zero by
-        default.
-    center_of_mass : (2,) float
-        Centre of mass (x, z) in the link frame (m).
-    reference : float
-        Coordinate at which the robot stands as it is described, zero by default.
-    limits : (2,) float
-        Range of the coordinate (rad, m); unlimited by default.
-    damping : float
-        Viscous damping (N m s/rad, N s/m).
-    stiffness, rest : float
-        Spring (N m/rad, N/m) and the coordinate at which it is slack.
-    dry_friction : float
-        Coulomb friction (N m, N).
-    armature : float
-        Rotor inertia as the joint feels it (kg m², kg).
-    torque : float or (2,) float
-        Greatest torque of the motor at the joint (N m, N) either way, or its two limits; infinity
-        for a motor without limits. A joint without it has no motor.
-    speed : float
-        Greatest speed that the drive stands (rad/s, m/s).
-    gear, motor_inertia : float
-        Ratio of the gear, and the inertia of the motor before it: they add
-        ``gear**2 * motor_inertia`` to the armature. Torque and speed are those at the joint.
-    """
-
-    mass: float
-    inertia: float
-    center_of_mass: Pair
-    reference: float
-    limits: Pair
-    damping: float
-    stiffness: float
-    rest: float
-    dry_friction: float
-    armature: float
-    torque: Limits
-    speed: float
-    gear: float
-    motor_inertia: float
+UNLIMITED = (-math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -76,18 +27,8 @@ class _Link:
     parent: int
     axis: tuple[float, float, float]
     at: tuple[float, float]
-    mass: float = 0.0
-    inertia: float = 0.0
-    center_of_mass: tuple[float, float] = (0.0, 0.0)
-    reference: float = 0.0
-    limits: tuple[float, float] = (-math.inf, math.inf)
-    damping: float = 0.0
-    stiffness: float = 0.0
-    rest: float = 0.0
-    dry_friction: float = 0.0
-    armature: float = 0.0
-    torque: tuple[float, float] | None = None
-    speed: float = math.inf
+    numbers: dict[str, Any]
+    torque: tuple[float, float] | None
 
 
 class RobotBuilder:
@@ -208,9 +149,32 @@ class RobotBuilder:
         link: str = "",
         **properties: Unpack[JointProperties],
     ) -> str:
-        """Add a link that slides on another along `direction` (x, z), of any length.
+        """Add a link that slides on another.
 
-        The other parameters are those of :meth:`hinge`.
+        Parameters
+        ----------
+        name : str
+            Name of the joint.
+        parent : str or None
+            Link that carries it; None for the world.
+        direction : (2,) float
+            Way of a positive coordinate in the frame of that link, of any length.
+        at : (2,) float
+            Place of the joint in the frame of that link (m).
+        link : str, optional
+            Name of the new link, by default that of the joint.
+        **properties : JointProperties
+            Everything that link and joint have.
+
+        Returns
+        -------
+        str
+            Name of the new link.
+
+        Raises
+        ------
+        RobotError
+            If a name is taken or unknown, or a number is impossible.
         """
         x, z = _pair("direction", direction)
         length = math.hypot(x, z)
@@ -240,7 +204,17 @@ class RobotBuilder:
         self._points.append(ContactPoint(self._index(link), x, z, size, roughness))
 
     def sole(self, link: str, *, heel: Pair, toe: Pair, friction: float = 1.0) -> None:
-        """Add the two ends of a flat sole; see :meth:`contact`."""
+        """Add the two ends of a flat sole; see :meth:`contact`.
+
+        Parameters
+        ----------
+        link : str
+            Link that carries it.
+        heel, toe : (2,) float
+            Its ends in the frame of that link (m).
+        friction : float
+            Friction of its surface.
+        """
         self.contact(link, heel, friction=friction)
         self.contact(link, toe, friction=friction)
 
@@ -260,43 +234,20 @@ class RobotBuilder:
         links = self._links
         if not links:
             raise self._error("the robot has no links.")
-        count = len(links)
         points = in_order(self._points)
         driven = [i for i, link in enumerate(links) if link.torque is not None]
-        torque = [link.torque for link in links if link.torque is not None]
-
-        def column(field: str) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-            return np.array([getattr(link, field) for link in links], dtype=np.float64)
-
-        def pairs(
-            values: list[tuple[float, float]],
-        ) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-            return np.array(values, dtype=np.float64).reshape(-1, 2)
-
-        limits, torques = pairs([link.limits for link in links]), pairs(torque)
-        model = Model(
-            parent=np.array([link.parent for link in links], dtype=np.int64),
-            axis=np.array([link.axis for link in links], dtype=np.float64).reshape(count, 3),
-            offset=pairs([link.at for link in links]),
-            reference=column("reference"),
-            mass=column("mass"),
-            center_of_mass=pairs([link.center_of_mass for link in links]),
-            inertia=column("inertia"),
-            armature=column("armature"),
-            damping=column("damping"),
-            stiffness=column("stiffness"),
-            rest=column("rest"),
-            dry_friction=column("dry_friction"),
-            lower=limits[:, 0].copy(),
-            upper=limits[:, 1].copy(),
-            speed_limit=column("speed"),
-            gravity=np.array([0.0, -self._gravity]),
-            contact_link=np.array([p.link for p in points], dtype=np.int64),
-            contact_position=pairs([(p.x, p.z) for p in points]),
-            contact_radius=np.array([p.radius for p in points], dtype=np.float64),
-            actuator_joint=np.array(driven, dtype=np.int64),
-            torque_lower=torques[:, 0].copy(),
-            torque_upper=torques[:, 1].copy(),
+        torques = np.reshape([links[i].torque for i in driven], (-1, 2)).T
+        numbers = {name: [link.numbers[name] for link in links] for name in links[0].numbers}
+        model = Model.made(
+            **numbers,
+            parent=[link.parent for link in links],
+            axis=[link.axis for link in links],
+            offset=[link.at for link in links],
+            gravity=(0.0, -self._gravity),
+            **of_model(points),
+            actuator_joint=driven,
+            torque_lower=torques[0],
+            torque_upper=torques[1],
             pivot=next((i for i, link in enumerate(links) if link.axis[0]), 0),
         )
         return assembled(
@@ -359,33 +310,24 @@ def _checked(
     at: tuple[float, float],
     given: JointProperties,
 ) -> _Link:
-    numbers: Any = given  # a key out of a list is not a literal to type checkers
-    positive = {
-        key: _positive(key, numbers.get(key, 0.0))
-        for key in ("mass", "inertia", "damping", "stiffness", "dry_friction", "motor_inertia")
-    }
+    numbers = {name: _value(name, given) for name in PROPERTIES}
+    numbers["lower"], numbers["upper"] = _ordered("limits", given.get("limits", UNLIMITED))
     gear = _number("gear", given.get("gear", 1.0))
-    armature = _positive("armature", given.get("armature", 0.0))
+    numbers["armature"] += gear**2 * _positive("motor_inertia", given.get("motor_inertia", 0.0))
     torque = given.get("torque")
-    return _Link(
-        joint,
-        name,
-        parent,
-        axis,
-        at,
-        mass=positive["mass"],
-        inertia=positive["inertia"],
-        center_of_mass=_pair("center_of_mass", given.get("center_of_mass", (0.0, 0.0))),
-        reference=_number("reference", given.get("reference", 0.0)),
-        limits=_ordered("limits", given.get("limits", (-math.inf, math.inf))),
-        damping=positive["damping"],
-        stiffness=positive["stiffness"],
-        rest=_number("rest", given.get("rest", 0.0)),
-        dry_friction=positive["dry_friction"],
-        armature=armature + gear**2 * positive["motor_inertia"],
-        torque=None if torque is None else _torque(torque),
-        speed=_positive("speed", given.get("speed", math.inf), infinite=True),
-    )
+    limits = None if torque is None else _torque(torque)
+    return _Link(joint, name, parent, axis, at, numbers, limits)
+
+
+def _value(name: str, given: JointProperties) -> Any:
+    """Check what is given of a number, or return what a joint has of which nobody said it."""
+    values: Any = given  # a key out of a list is not a literal to type checkers
+    number = PROPERTIES[name]
+    key = number.called or name
+    if "axes" in number.shape:
+        return _pair(key, values.get(key, (number.default,) * AXES))
+    check = _positive if number.least == 0.0 else _number
+    return check(key, values.get(key, number.default), infinite=number.infinite)
 
 
 def _torque(given: Limits) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,15 @@ class ContactPoint:
     z: float
     radius: float
     friction: float
+
+
+def of_model(points: list[ContactPoint]) -> dict[str, Any]:
+    """Return contact points as a model has them."""
+    return {
+        "contact_link": [point.link for point in points],
+        "contact_position": [(point.x, point.z) for point in points],
+        "contact_radius": [point.radius for point in points],
+    }
 
 
 def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:

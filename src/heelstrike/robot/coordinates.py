@@ -1,10 +1,10 @@
-"""Joints by their names: states made, read, mirrored and perturbed without counting indices."""
+"""Joints by their names, and numbers of a state that fit them."""
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,28 +39,11 @@ def index_of(robot: Robot, what: str, names: tuple[str, ...], given: str | int) 
         return int(given) % len(names)
     near = difflib.get_close_matches(str(given), names, n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
+    known = ", ".join(dict.fromkeys(names)) or "none"
     raise RobotError(
-        f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {', '.join(names) or 'none'}"
+        f"robot {robot.name!r} has no {what} {given!r}.{guess} It has {known}"
         + (f" (0 to {len(names) - 1})." if names else ".")
     )
-
-
-def state_by_name(
-    robot: Robot,
-    position: Mapping[str | int, float],
-    velocity: Mapping[str | int, float],
-    start: State | None,
-) -> State:
-    """Make a state; see :meth:`Robot.state`."""
-    state = checked(robot, start or robot.reference_state())
-    for vector, values, what in (
-        (state.q, position, "position"),
-        (state.v, velocity, "velocity"),
-    ):
-        for joint, value in values.items():
-            index = index_of(robot, "joint", robot.joint_names, joint)
-            vector[index] = _finite(robot, what, robot.joint_names[index], value)
-    return state
 
 
 def checked(robot: Robot, state: State) -> State:
@@ -80,61 +63,20 @@ def checked(robot: Robot, state: State) -> State:
     return State(state.q, state.v)
 
 
-def by_name(robot: Robot, vector: Floats) -> dict[str, float]:
-    """Return a vector over the coordinates as numbers with names."""
-    return dict(zip(robot.joint_names, vector.tolist(), strict=True))
-
-
-def mirrored(robot: Robot, state: State) -> State:
-    """Exchange left and right; see :meth:`Robot.mirrored`."""
-    state = checked(robot, state)
-    if robot.mirror is None:
-        raise RobotError(
-            f"robot {robot.name!r} has no mirror image: its left and right differ, or its names do "
-            "not tell them apart. heelstrike inspect says which."
-        )
-    return State(
-        robot.mirror.position(state.q, robot.model.reference), robot.mirror.velocity(state.v)
-    )
-
-
-def perturbed(
-    robot: Robot,
-    state: State,
-    *,
-    seed: int,
-    position: Spread,
-    velocity: Spread,
-    joints: Iterable[str | int] | None,
-) -> State:
-    """Add random numbers to a state; see :meth:`Robot.perturbed`."""
-    state = checked(robot, state)
-    chosen = np.ones(robot.nv, dtype=bool)
-    if joints is not None:
-        chosen[:] = False
-        given = (joints,) if isinstance(joints, str | int) else joints
-        chosen[[index_of(robot, "joint", robot.joint_names, joint) for joint in given]] = True
-    # All coordinates draw, so that the number of one does not depend on which others are chosen.
-    draw = np.random.default_rng(seed).standard_normal((2, robot.nv))
-    q = state.q + np.where(chosen, draw[0] * _spread(robot, "position", position), 0.0)
-    v = state.v + np.where(chosen, draw[1] * _spread(robot, "velocity", velocity), 0.0)
-    low = np.minimum(robot.model.lower, state.q)
-    high = np.maximum(robot.model.upper, state.q)
-    return State(np.clip(q, low, high), v)
-
-
-def _spread(robot: Robot, what: str, spread: Spread) -> Floats:
+def spread_of(robot: Robot, what: str, spread: Spread) -> Floats:
+    """Return the standard deviation of every coordinate."""
     values = spread if isinstance(spread, Mapping) else dict.fromkeys(range(robot.nv), spread)
     result = np.zeros(robot.nv)
     for joint, value in values.items():
         index = index_of(robot, "joint", robot.joint_names, joint)
-        result[index] = _finite(robot, f"spread of the {what}", robot.joint_names[index], value)
+        result[index] = finite(robot, f"spread of the {what}", robot.joint_names[index], value)
     if np.any(result < 0.0):
         raise RobotError(f"the spread of a {what} is a standard deviation: it is not negative.")
     return result
 
 
-def _finite(robot: Robot, what: str, joint: str, value: float) -> float:
+def finite(robot: Robot, what: str, joint: str, value: float) -> float:
+    """Return a number of a joint, or raise a `RobotError` that names both."""
     try:
         number = float(value)
     except (TypeError, ValueError):

@@ -19,10 +19,10 @@ from heelstrike.robot.files.saving import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.files.urdf import MASSLESS
 from heelstrike.robot.library import builtin_robots, load_robot
-from heelstrike.robot.mirror import find_mirror
-from heelstrike.robot.model import Floats
+from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.symmetry import find_mirror
 from heelstrike.robot.warning import RobotWarning
 
 SAME_HEIGHT = 1e-4
@@ -124,6 +124,11 @@ def inspect_robot(
         than a robot: a planar robot has forgotten its moments of inertia in space.
     floating, projected : bool
         As for :func:`load_robot`.
+
+    Returns
+    -------
+    Inspection
+        What was found, in words and as data.
 
     Raises
     ------
@@ -380,6 +385,10 @@ def _tree(robot: Robot) -> Iterator[tuple[int, str]]:
                 )
 
 
+_MORE = {"stiffness": "spring", "speed_limit": "speed"}
+"""Short words for numbers of joints that are shown where there are any."""
+
+
 def _row(robot: Robot, joint: int, indent: str) -> tuple[str, ...]:
     model = robot.model
     turn = model.axis[joint, 0]
@@ -390,17 +399,11 @@ def _row(robot: Robot, joint: int, indent: str) -> tuple[str, ...]:
     )
     mass = model.mass[joint]
     driven = np.flatnonzero(model.actuator_joint == joint)
-    extra: list[str] = []
-    for label, values in (
-        ("damping", model.damping),
-        ("armature", model.armature),
-        ("spring", model.stiffness),
-        ("dry friction", model.dry_friction),
-    ):
-        if values[joint]:
-            extra.append(f"{label} {values[joint]:.4g}")
-    if np.isfinite(model.speed_limit[joint]):
-        extra.append(f"speed {model.speed_limit[joint]:.4g}")
+    extra = [
+        f"{_MORE.get(name, label(name))} {getattr(model, name)[joint]:.4g}"
+        for name, number in PROPERTIES.items()
+        if number.shape == ("nv",) and getattr(model, name)[joint] != number.default
+    ]
     center = model.center_of_mass[joint] + 0.0
     return (
         indent + robot.joint_names[joint],
@@ -441,27 +444,27 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         plain = np.where(np.isfinite(values), values, np.nan).tolist()
         return [None if value != value else value for value in plain]
 
-    return result | {
-        "name": robot.name,
-        "mass_kg": robot.total_mass,
-        "floating": robot.floating,
-        "symmetric": robot.mirror is not None,
-        "coordinates": list(robot.joint_names),
-        "links": list(robot.link_names),
-        "parent": model.parent.tolist(),
-        "link_mass_kg": model.mass.tolist(),
-        "link_inertia_kg_m2": model.inertia.tolist(),
-        "link_center_of_mass_m": model.center_of_mass.tolist(),
-        "lower": numbers(model.lower),
-        "upper": numbers(model.upper),
-        "speed_limit": numbers(model.speed_limit),
-        "damping": model.damping.tolist(),
-        "armature": model.armature.tolist(),
-        "dry_friction": model.dry_friction.tolist(),
-        "stiffness": model.stiffness.tolist(),
-        "actuators": list(robot.actuator_names),
-        "torque_lower": numbers(model.torque_lower),
-        "torque_upper": numbers(model.torque_upper),
-        "contact_points": list(robot.contact_names),
-        "feet": [foot.name for foot in robot.feet],
+    of_joints = {
+        name: numbers(getattr(model, name))
+        for name, number in NUMBERS.items()
+        if number.shape in (("nq",), ("nv",), ("nu",)) and number.kind is float
     }
+    return (
+        result
+        | {
+            "name": robot.name,
+            "mass_kg": robot.total_mass,
+            "floating": robot.floating,
+            "symmetric": robot.mirror is not None,
+            "coordinates": list(robot.joint_names),
+            "links": list(robot.link_names),
+            "parent": model.parent.tolist(),
+            "link_mass_kg": model.mass.tolist(),
+            "link_inertia_kg_m2": model.inertia.tolist(),
+            "link_center_of_mass_m": model.center_of_mass.tolist(),
+            "actuators": list(robot.actuator_names),
+            "contact_points": list(robot.contact_names),
+            "feet": [foot.name for foot in robot.feet],
+        }
+        | of_joints
+    )

@@ -1,14 +1,78 @@
-"""The robot as the kernels see it: a planar tree of links, as plain arrays."""
+"""The robot as the kernels see it: a planar tree of links, as plain arrays.
+
+Every number of a robot is declared here, once: whose it is, its unit, its bounds, what a robot has
+of which nobody said it, and whether left and right share it. Builder, files, the mirror image,
+inspection and documentation follow. One that a joint or link has is also a key of
+:class:`JointProperties`, for type checkers.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.bundle import Bundle, Member, extent
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Pair = Sequence[float]
+Limits = float | Sequence[float]
+
+AXES = 2
+"""Dimension of space."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number(Member):
+    """What is known of a number of the robot.
+
+    Attributes
+    ----------
+    unit : str
+        Unit of a hinge, and of a slide if that is another.
+    default : float, optional
+        What a robot has of which nobody said it.
+    least : float
+        The least that it may be.
+    infinite : bool
+        Whether it may be infinite, which stands for none.
+    alike : bool
+        Whether left and right share it as it is, whatever the senses of their joints.
+    given : bool
+        Whether it is one of :class:`JointProperties`, by itself.
+    later : bool
+        Whether there are run files that are older than it, and mean the default.
+    called, label : str
+        What the builder and messages call it, if not by its name.
+    points : str
+        The extent that an index counts.
+    """
+
+    unit: str = ""
+    default: float | None = None
+    least: float = -math.inf
+    infinite: bool = False
+    alike: bool = False
+    given: bool = False
+    later: bool = False
+    called: str = ""
+    label: str = ""
+    points: str = ""
+
+
+def of(*shape: str | int, kind: type = float, **about: Any) -> Any:
+    """Declare a number of the robot; see :class:`Number`."""
+    return Number(role="array" if shape else "number", kind=kind, shape=shape, **about)
+
+
+_POSE: dict[str, Any] = {"default": 0.0, "given": True}
+_PART: dict[str, Any] = {"default": 0.0, "given": True, "least": 0.0, "alike": True}
+_LIMIT: dict[str, Any] = {"infinite": True}
 
 
 class Model(Bundle):
@@ -21,34 +85,43 @@ class Model(Bundle):
 
     Attributes
     ----------
-    parent : (nv,) int
+    nl, nj, nq, nv : int
+        Number of links, of joints (one a link), of positions and of velocities. In the plane they
+        are equal; each counts what it says.
+    nc, nu : int
+        Number of contact points and of actuators.
+    axes : int
+        Dimension of space.
+    parent : (nl,) int
         Index of the parent link, smaller than the link's own; -1 for the world.
-    axis : (nv, 3) float
+    axis : (nj, 3) float
         Motion of the joint per unit of its coordinate, in the parent's axes: rotation about +y
         (rad), translation along x and z (m). ``(±1, 0, 0)`` is a hinge, ``(0, x, z)`` a slide.
-    offset : (nv, 2) float
+    offset : (nj, axes) float
         Origin of the link frame in the parent's frame when ``q`` equals `reference`.
     reference : (nq,) float
         Coordinates at which all link frames are parallel to the world frame.
-    mass, inertia : (nv,) float
+    mass, inertia : (nl,) float
         Mass (kg) and moment of inertia about the link's own centre of mass (kg m²).
-    center_of_mass : (nv, 2) float
+    center_of_mass : (nl, axes) float
         Centre of mass in the link frame.
-    armature, damping, stiffness, rest : (nv,) float
-        Rotor inertia (kg m²), viscous damping (N m s), spring (N m) and its rest coordinate.
+    armature, damping, stiffness : (nv,) float
+        Rotor inertia (kg m²), viscous damping (N m s) and spring (N m).
+    rest : (nq,) float
+        Coordinate at which the spring is slack.
     dry_friction : (nv,) float
         Coulomb friction of the joint (N m; N of a slide): what it takes to move it at all, and what
         opposes it as it moves.
-    lower, upper : (nv,) float
+    lower, upper : (nq,) float
         Range of the coordinate; infinite where there is no stop.
     speed_limit : (nv,) float
         Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
         infinite where there is none.
-    gravity : (2,) float
-        Acceleration of free fall, (0, -9.81) on earth.
+    gravity : (axes,) float
+        Acceleration of free fall (m/s²), (0, -9.81) on earth.
     contact_link : (nc,) int
         Link that carries each contact point.
-    contact_position : (nc, 2) float
+    contact_position : (nc, axes) float
         Centre of each contact disc in the link frame.
     contact_radius : (nc,) float
         Radius of each contact disc; zero for a point.
@@ -61,26 +134,124 @@ class Model(Bundle):
         from the world origin loses no digits.
     """
 
-    parent: Integers = array("nl", of=int)
-    axis: Floats = array("nl", 3)
-    offset: Floats = array("nl", "axes")
-    reference: Floats = array("nq")
-    mass: Floats = array("nl")
-    center_of_mass: Floats = array("nl", "axes")
-    inertia: Floats = array("nl")
-    armature: Floats = array("nv")
-    damping: Floats = array("nv")
-    stiffness: Floats = array("nv")
-    rest: Floats = array("nq")
-    dry_friction: Floats = array("nv")
-    lower: Floats = array("nq")
-    upper: Floats = array("nq")
-    speed_limit: Floats = array("nv")
-    gravity: Floats = array("axes")
-    contact_link: Integers = array("nc", of=int)
-    contact_position: Floats = array("nc", "axes")
-    contact_radius: Floats = array("nc")
-    actuator_joint: Integers = array("nu", of=int)
-    torque_lower: Floats = array("nu")
-    torque_upper: Floats = array("nu")
-    pivot: int = number(int)
+    nl: int = extent()
+    nj: int = extent()
+    nq: int = extent()
+    nv: int = extent()
+    nc: int = extent()
+    nu: int = extent()
+    axes: int = extent()
+
+    parent: Integers = of("nl", kind=int, points="nl", least=-1)
+    axis: Floats = of("nj", 3, unit="rad, m")
+    offset: Floats = of("nj", "axes", unit="m", alike=True, label="place")
+    reference: Floats = of("nq", unit="rad, m", **_POSE)
+    mass: Floats = of("nl", unit="kg", **_PART)
+    center_of_mass: Floats = of("nl", "axes", unit="m", alike=True, label="centre of mass", **_POSE)
+    inertia: Floats = of("nl", unit="kg m²", **_PART)
+    armature: Floats = of("nv", unit="kg m², kg", **_PART)
+    damping: Floats = of("nv", unit="N m s/rad, N s/m", **_PART)
+    stiffness: Floats = of("nv", unit="N m/rad, N/m", **_PART)
+    rest: Floats = of("nq", unit="rad, m", **_POSE)
+    dry_friction: Floats = of("nv", unit="N m, N", later=True, **_PART)
+    lower: Floats = of("nq", unit="rad, m", **_LIMIT)
+    upper: Floats = of("nq", unit="rad, m", **_LIMIT)
+    speed_limit: Floats = of(
+        "nv",
+        unit="rad/s, m/s",
+        later=True,
+        called="speed",
+        **_LIMIT | _PART | {"default": math.inf},
+    )
+    gravity: Floats = of("axes", unit="m/s²")
+    contact_link: Integers = of("nc", kind=int, points="nl", least=0)
+    contact_position: Floats = of("nc", "axes", unit="m")
+    contact_radius: Floats = of("nc", unit="m", least=0.0)
+    actuator_joint: Integers = of("nu", kind=int, points="nv", least=0)
+    torque_lower: Floats = of("nu", unit="N m, N", **_LIMIT)
+    torque_upper: Floats = of("nu", unit="N m, N", **_LIMIT)
+    pivot: int = of(kind=int, points="nl", least=0)
+
+    @classmethod
+    def made(cls, **members: Any) -> Model:
+        """Make a model of anything array-like; lists may be empty.
+
+        Parameters
+        ----------
+        **members : array
+            Every member by its name.
+
+        Returns
+        -------
+        Model
+            The model.
+        """
+        made = dict(members)
+        for name, number in NUMBERS.items():
+            if number.shape:
+                rest = [AXES if size == "axes" else size for size in number.shape[1:]]
+                values = np.array(members[name], dtype=number.dtype, order="C")
+                made[name] = values.reshape(-1, *rest)
+        return cls(**made)
+
+
+class JointProperties(TypedDict, total=False):
+    """What a link and the joint that moves it may have; nothing is required.
+
+    Attributes
+    ----------
+    mass, inertia : float
+        Mass (kg) and moment of inertia about the link's own centre of mass (kg m²), zero by
+        default.
+    center_of_mass : (2,) float
+        Centre of mass (x, z) in the link frame (m).
+    reference : float
+        Coordinate at which the robot stands as it is described, zero by default.
+    limits : (2,) float
+        Range of the coordinate (rad, m); unlimited by default.
+    damping : float
+        Viscous damping (N m s/rad, N s/m).
+    stiffness, rest : float
+        Spring (N m/rad, N/m) and the coordinate at which it is slack.
+    dry_friction : float
+        Coulomb friction (N m, N).
+    armature : float
+        Rotor inertia as the joint feels it (kg m², kg).
+    torque : float or (2,) float
+        Greatest torque of the motor at the joint (N m, N) either way, or its two limits; infinity
+        for a motor without limits. A joint without it has no motor.
+    speed : float
+        Greatest speed that the drive stands (rad/s, m/s).
+    gear, motor_inertia : float
+        Ratio of the gear, and the inertia of the motor before it: they add
+        ``gear**2 * motor_inertia`` to the armature. Torque and speed are those at the joint.
+    """
+
+    mass: float
+    inertia: float
+    center_of_mass: Pair
+    reference: float
+    limits: Pair
+    damping: float
+    stiffness: float
+    rest: float
+    dry_friction: float
+    armature: float
+    torque: Limits
+    speed: float
+    gear: float
+    motor_inertia: float
+
+
+NUMBERS: dict[str, Number] = {
+    name: member for name, member in Model.declared.items() if isinstance(member, Number)
+}
+"""All that a model consists of."""
+
+PROPERTIES = {name: number for name, number in NUMBERS.items() if number.given}
+"""Numbers of a link and its joint that a user gives, each by itself."""
+
+
+def label(name: str) -> str:
+    """Return what messages call a number."""
+    return NUMBERS[name].label or name.replace("_", " ")

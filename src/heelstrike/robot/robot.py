@@ -4,21 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from heelstrike.robot.coordinates import (
-    Spread,
-    by_name,
-    checked,
-    index_of,
-    mirrored,
-    perturbed,
-    state_by_name,
-)
+from heelstrike.errors import RobotError
+from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
+from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import Model
 from heelstrike.robot.state import State
 
@@ -40,51 +33,6 @@ class Foot:
     name: str
     link: int
     contacts: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Mirror:
-    """Exchange of left and right.
-
-    Mirrored joint positions are ``sign * (q[joint] - reference[joint]) + reference``, mirrored
-    velocities ``sign * v[joint]``; contact point ``i`` becomes ``contact[i]``, foot likewise.
-
-    Attributes
-    ----------
-    joint : (nv,) int
-        Counterpart of every coordinate (itself for trunk coordinates).
-    sign : (nv,) float
-        +1, or -1 where the two joints turn in opposite senses.
-    contact : (nc,) int
-        Counterpart of every contact point.
-    foot : (nf,) int
-        Counterpart of every foot.
-    """
-
-    joint: NDArray[np.int64]
-    sign: NDArray[np.float64]
-    contact: NDArray[np.int64]
-    foot: NDArray[np.int64]
-
-    def position(
-        self, q: NDArray[np.float64], reference: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
-        """Return positions with left and right exchanged.
-
-        Parameters
-        ----------
-        q : (..., nq) float
-            Positions.
-        reference : (nq,) float
-            The robot's `Model.reference`.
-        """
-        mirrored: NDArray[np.float64] = self.sign * (q - reference)[..., self.joint] + reference
-        return mirrored
-
-    def velocity(self, v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return velocities or accelerations, of shape (..., nv), left and right exchanged."""
-        mirrored: NDArray[np.float64] = self.sign * v[..., self.joint]
-        return mirrored
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,25 +77,40 @@ class Robot:
     contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
 
+    def __post_init__(self) -> None:
+        if self.mirror is not None:
+            mirror = replace(self.mirror, reference=self.model.reference)
+            object.__setattr__(self, "mirror", mirror)
+
+    @property
+    def nl(self) -> int:
+        """Number of links."""
+        return self.model.nl
+
+    @property
+    def nj(self) -> int:
+        """Number of joints, one a link."""
+        return self.model.nj
+
     @property
     def nq(self) -> int:
         """Number of positions."""
-        return len(self.model.reference)
+        return self.model.nq
 
     @property
     def nv(self) -> int:
         """Number of velocities."""
-        return len(self.model.parent)
+        return self.model.nv
 
     @property
     def nu(self) -> int:
         """Number of joint torques."""
-        return len(self.model.actuator_joint)
+        return self.model.nu
 
     @property
     def nc(self) -> int:
         """Number of contact points."""
-        return len(self.model.contact_link)
+        return self.model.nc
 
     @property
     def total_mass(self) -> float:
@@ -166,6 +129,16 @@ class Robot:
     def joint_index(self, joint: str | int) -> int:
         """Index of a coordinate, given by the name of its joint (or by an index, which is checked).
 
+        Parameters
+        ----------
+        joint : str or int
+            Name of the joint, or an index.
+
+        Returns
+        -------
+        int
+            Its place in q and v.
+
         Raises
         ------
         RobotError
@@ -174,7 +147,18 @@ class Robot:
         return index_of(self, "joint", self.joint_names, joint)
 
     def actuator_index(self, actuator: str | int) -> int:
-        """Index of an actuator, given by its name or index; see `joint_index`."""
+        """Index of an actuator, given by its name or index; see `joint_index`.
+
+        Parameters
+        ----------
+        actuator : str or int
+            Name of the actuator, or an index.
+
+        Returns
+        -------
+        int
+            Its place among the torques.
+        """
         return index_of(self, "actuator", self.actuator_names, actuator)
 
     def state(
@@ -196,6 +180,11 @@ class Robot:
             Where all others are, by default at rest in the reference configuration. It is left as
             it is.
 
+        Returns
+        -------
+        State
+            The state.
+
         Raises
         ------
         RobotError
@@ -209,25 +198,71 @@ class Robot:
         >>> robot.positions(state)["left_knee"], robot.velocities(state)["root_x"]
         (0.4, 0.8)
         """
-        return state_by_name(self, position or {}, velocity or {}, start)
+        state = checked(self, start or self.reference_state())
+        for vector, values, what in (
+            (state.q, position or {}, "position"),
+            (state.v, velocity or {}, "velocity"),
+        ):
+            for joint, value in values.items():
+                index = self.joint_index(joint)
+                vector[index] = finite(self, what, self.joint_names[index], value)
+        return state
 
     def positions(self, state: State) -> dict[str, float]:
-        """Positions of a state by the names of the joints, in rad and m."""
-        return by_name(self, checked(self, state).q)
+        """Positions of a state by the names of the joints, in rad and m.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Position by name of the joint.
+        """
+        return dict(zip(self.joint_names, checked(self, state).q.tolist(), strict=True))
 
     def velocities(self, state: State) -> dict[str, float]:
-        """Velocities of a state by the names of the joints, in rad/s and m/s."""
-        return by_name(self, checked(self, state).v)
+        """Velocities of a state by the names of the joints, in rad/s and m/s.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Velocity by name of the joint.
+        """
+        return dict(zip(self.joint_names, checked(self, state).v.tolist(), strict=True))
 
     def mirrored(self, state: State) -> State:
         """Return a state with left and right exchanged.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        State
+            Its mirror image.
 
         Raises
         ------
         RobotError
             If the robot has no mirror image.
         """
-        return mirrored(self, state)
+        state = checked(self, state)
+        if self.mirror is None:
+            raise RobotError(
+                f"robot {self.name!r} has no mirror image: its left and right differ, or its names "
+                "do not tell them apart. heelstrike inspect says which."
+            )
+        return self.mirror.state(state)
 
     def perturbed(
         self,
@@ -263,12 +298,34 @@ class Robot:
         RobotError
             If a joint is unknown, or a standard deviation negative or not finite.
         """
-        return perturbed(
-            self, state, seed=seed, position=position, velocity=velocity, joints=joints
-        )
+        state = checked(self, state)
+        chosen = np.ones(self.nv, dtype=bool)
+        if joints is not None:
+            chosen[:] = False
+            given = (joints,) if isinstance(joints, str | int) else joints
+            chosen[[self.joint_index(joint) for joint in given]] = True
+        # All coordinates draw: the number of one does not depend on which others are chosen.
+        draw = np.random.default_rng(seed).standard_normal((2, self.nv))
+        q = state.q + np.where(chosen, draw[0] * spread_of(self, "position", position), 0.0)
+        v = state.v + np.where(chosen, draw[1] * spread_of(self, "velocity", velocity), 0.0)
+        low = np.minimum(self.model.lower, state.q)
+        high = np.maximum(self.model.upper, state.q)
+        return State(np.clip(q, low, high), v)
 
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
@@ -283,6 +340,16 @@ class Robot:
         """Read a state from a file of :meth:`save_state`, bit by bit the one that was saved.
 
         Joints are matched by name, so that their order in the robot may have changed since.
+
+        Parameters
+        ----------
+        path : str or path
+            File to read.
+
+        Returns
+        -------
+        State
+            The state, in the order of this robot's joints.
 
         Raises
         ------

@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from heelstrike.contact.ground import Ground, ground_contact
 from heelstrike.contact.workspace import Floats
-from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import evaluated, joint_vector
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.frames import into_frame
+from heelstrike.dynamics.places import write_point_rows
 from heelstrike.robot.robot import Robot
 
 
@@ -52,27 +53,38 @@ def contact_kinematics(
 ) -> ContactKinematics:
     """Evaluate all contact points of a robot; level ground with its default friction if not given.
 
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, v : (nq,) and (nv,) array
+        State.
+    ground : Ground, optional
+        Level ground with its default friction if not given.
+
+    Returns
+    -------
+    ContactKinematics
+        Gaps, velocities, normals and Jacobians of the points.
+
     Raises
     ------
     RobotError
         If `q` or `v` has the wrong length.
     """
     model, terrain = robot.model, (Ground() if ground is None else ground)._model
-    work = evaluated(robot, q, v)
-    velocity = joint_vector(robot, "v", v)
-    position, normal = np.zeros((robot.nc, 2)), np.zeros((robot.nc, 2))
+    at = Evaluation(robot, q, v)
+    points, axes = (robot.nc, model.axes), model.axes
+    position, normal, bias = np.zeros(points), np.zeros(points), np.zeros(points)
     gap, friction = np.zeros(robot.nc), np.zeros(robot.nc)
-    jacobian, bias = np.zeros((robot.nc, 2, robot.nv)), np.zeros((robot.nc, 2))
-    rows, acceleration = np.zeros((3, robot.nv)), np.zeros(3)
-    for i in range(robot.nc):
-        link, radius = int(model.contact_link[i]), float(model.contact_radius[i])
-        center = position[i]
-        kernels.point_position(work, link, model.contact_position[i], center)
+    jacobian = np.zeros((*points, robot.nv))
+    for i, link, center in at.contact_centers(None):
+        radius = float(model.contact_radius[i])
         gap[i], friction[i], _ = ground_contact(terrain, center[0], center[1], radius, normal[i])
-        kernels.point_bias_acceleration(work, link, center, acceleration)
-        center -= radius * normal[i]
-        kernels.point_jacobian(model, work, link, center, rows)
-        axes = np.array([[normal[i, 0], normal[i, 1]], [normal[i, 1], -normal[i, 0]]])
-        jacobian[i] = axes @ rows[:2]
-        bias[i] = axes @ acceleration[:2] - [0.0, radius * acceleration[2]]
-    return ContactKinematics(position, normal, gap, friction, jacobian, jacobian @ velocity, bias)
+        acceleration = at.bias_acceleration(link, center)
+        bias[i] = into_frame(normal[i], tuple(acceleration[:axes]))
+        bias[i, 1] -= radius * acceleration[axes]
+        position[i] = center - radius * normal[i]
+        write_point_rows(model, at.work, link, position[i], normal[i], jacobian[i], 0)
+    velocity = jacobian @ at.v
+    return ContactKinematics(position, normal, gap, friction, jacobian, velocity, bias)

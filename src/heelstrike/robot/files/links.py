@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,11 +22,13 @@ SHOWN = 4  # how many culprits a message lists before it counts the rest
 
 @dataclass(frozen=True)
 class Links:
-    """The kinematic tree and inertia of a robot, with the fields of `Model`.
+    """The kinematic tree and inertia of a robot.
 
     Attributes
     ----------
-    origin : (nv, 2) float
+    numbers : dict of str to array
+        Numbers of `Model`: the tree and the inertia of its links.
+    origin : (nl, 2) float
         World position of the link frames in the reference configuration.
     of_body : (nbody,) int
         Link that each body of the file belongs to; -1 for what is fixed to the world.
@@ -33,15 +36,16 @@ class Links:
         Body that each link moves.
     """
 
-    parent: Integers
-    axis: Floats
+    numbers: dict[str, Any]
     origin: Floats
-    offset: Floats
-    mass: Floats
-    center_of_mass: Floats
-    inertia: Floats
     of_body: Integers
     names: tuple[str, ...]
+
+    @property
+    def axis(self) -> Floats:
+        """Motion of every joint per unit of its coordinate."""
+        axis: Floats = self.numbers["axis"]
+        return axis
 
 
 def read_links(file: MujocoFile) -> Links:
@@ -81,10 +85,9 @@ def read_links(file: MujocoFile) -> Links:
 
     origin = np.ascontiguousarray(pose.xanchor[:, ::2])
     offset = origin - np.where((parent >= 0)[:, None], origin[parent], 0.0)
-    mass, center_of_mass, inertia = _inertia(file, of_body, origin)
+    tree = {"parent": parent, "axis": _axes(file), "offset": offset}
     names = tuple(file.name("body", body) for body in joint_body)
-    axis = _axes(file)
-    return Links(parent, axis, origin, offset, mass, center_of_mass, inertia, of_body, names)
+    return Links(tree | _inertia(file, of_body, origin), origin, of_body, names)
 
 
 def _refuse_spatial_joints(file: MujocoFile) -> None:
@@ -142,7 +145,7 @@ def _axes(file: MujocoFile) -> Floats:
     return np.where(hinge, turn, slide)
 
 
-def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> tuple[Floats, Floats, Floats]:
+def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> dict[str, Floats]:
     """Mass, centre of mass (link frame) and inertia of every link, its welded bodies combined."""
     model, pose = file.model, file.pose
     moving = of_body >= 0
@@ -163,4 +166,4 @@ def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> tuple[Float
     center = np.divide(moment, mass[:, None], out=np.zeros_like(moment), where=mass[:, None] > 0)
     distance = ((position - center[link]) ** 2).sum(axis=1)
     inertia = total(about_y + body_mass * distance)
-    return mass, center, inertia
+    return {"mass": mass, "center_of_mass": center, "inertia": inertia}

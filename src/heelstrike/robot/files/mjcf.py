@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
-from heelstrike.robot.contact_points import read_contact_points
+from heelstrike.robot.contact_points import of_model, read_contact_points
 from heelstrike.robot.files.actuators import read_actuators
+from heelstrike.robot.files.joint_numbers import read_joint_numbers
 from heelstrike.robot.files.links import IN_PLANE, read_links
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
-from heelstrike.robot.files.speed_limits import read_speed_limits
 from heelstrike.robot.files.unmodelled import warn_of_unmodelled
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
@@ -46,6 +46,11 @@ def read_mjcf(
     lenient : bool
         Let impossible masses and inertias pass, to look at the robot; see `inspect_robot`.
 
+    Returns
+    -------
+    Robot
+        The robot.
+
     Raises
     ------
     RobotError
@@ -68,30 +73,18 @@ def _robot(file: MujocoFile, name: str) -> Robot:
     points = read_contact_points(file, links)
     actuators = read_actuators(file)
     limited = model.jnt_limited.astype(bool) & (not file.disabled("limit"))
-    spring = 0.0 if file.disabled("spring") else 1.0
-    damper = 0.0 if file.disabled("damper") else 1.0
-    dry = 0.0 if file.disabled("frictionloss") else 1.0
     hinges = np.flatnonzero(links.axis[:, 0])
-    arrays = Model(
-        parent=links.parent,
-        axis=links.axis,
-        offset=links.offset,
-        reference=_floats(model.qpos0),
-        mass=links.mass,
-        center_of_mass=links.center_of_mass,
-        inertia=links.inertia,
-        armature=_floats(model.dof_armature + actuators.armature),
-        damping=_floats(damper * (model.dof_damping + actuators.damping)),
-        stiffness=_floats(spring * model.jnt_stiffness),
-        rest=_floats(model.qpos_spring),
-        dry_friction=_floats(dry * model.dof_frictionloss),
+    numbers = read_joint_numbers(file)
+    numbers["armature"] += actuators.armature
+    if not file.disabled("damper"):
+        numbers["damping"] += actuators.damping
+    arrays = Model.made(
+        **numbers,
+        **links.numbers,
         lower=_limits(np.where(limited, model.jnt_range[:, 0], -np.inf)),
         upper=_limits(np.where(limited, model.jnt_range[:, 1], np.inf)),
-        speed_limit=read_speed_limits(file),
         gravity=_gravity(file),
-        contact_link=np.array([p.link for p in points], dtype=np.int64),
-        contact_position=np.array([(p.x, p.z) for p in points], dtype=np.float64).reshape(-1, 2),
-        contact_radius=np.array([p.radius for p in points], dtype=np.float64),
+        **of_model(points),
         actuator_joint=actuators.joint,
         torque_lower=_limits(actuators.lower),
         torque_upper=_limits(actuators.upper),
@@ -108,13 +101,9 @@ def _robot(file: MujocoFile, name: str) -> Robot:
     )
 
 
-def _floats(values: Floats) -> Floats:
-    return np.array(values, dtype=np.float64, order="C")
-
-
 def _limits(values: Floats) -> Floats:
     """Limits, of which a huge one is none: formats want numbers for both sides of a range."""
-    return _floats(np.where(np.abs(values) >= LARGEST_NUMBER, np.copysign(np.inf, values), values))
+    return np.where(np.abs(values) >= LARGEST_NUMBER, np.copysign(np.inf, values), values)
 
 
 def _gravity(file: MujocoFile) -> Floats:
@@ -126,7 +115,7 @@ def _gravity(file: MujocoFile) -> Floats:
             "gravity is ({:g}, {:g}, {:g}), out of the x–z plane in which the robot moves. "
             'Set it in the file: <option gravity="0 0 -9.81"/>.'.format(*gravity)
         )
-    return _floats(gravity[::2])
+    return gravity[::2]
 
 
 def _joint_names(file: MujocoFile) -> tuple[str, ...]:

@@ -12,8 +12,8 @@ import numpy as np
 
 from heelstrike.errors import RobotError, WriteError
 from heelstrike.robot.assembly import LARGEST_NUMBER, link_origins
-from heelstrike.robot.files.speed_limits import SPEED_LIMIT
-from heelstrike.robot.model import Floats
+from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
+from heelstrike.robot.model import PROPERTIES, Floats, Integers, label
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
 from heelstrike.whole_file import write_whole
@@ -59,12 +59,11 @@ def mjcf(robot: Robot) -> Element:
     root = Element("mujoco", model=robot.name)
     SubElement(root, "compiler", angle="radian", autolimits="true")
     SubElement(root, "option", gravity=_numbers((model.gravity[0], 0.0, model.gravity[1])))
-    limited = np.flatnonzero(np.isfinite(model.speed_limit))
-    if len(limited):
-        custom = SubElement(root, "custom")
-        for joint in limited:
-            name = SPEED_LIMIT + robot.joint_names[joint]
-            SubElement(custom, "numeric", name=name, data=_number(model.speed_limit[joint]))
+    custom = [(name, joint) for name in CUSTOM for joint in _given(robot, name)]
+    holder = SubElement(root, "custom") if custom else root
+    for name, joint in custom:
+        data = _number(getattr(model, name)[joint])
+        SubElement(holder, "numeric", name=f"{name}:{robot.joint_names[joint]}", data=data)
     default = SubElement(root, "default")
     SubElement(default, "geom", contype="0", conaffinity="0", rgba="0.55 0.60 0.68 1")
     world = SubElement(root, "worldbody")
@@ -124,16 +123,12 @@ def _write_joint(robot: Robot, joint: int, place: Floats, body: Element) -> None
         "type": "hinge" if turn else "slide",
         "axis": _numbers((0.0, turn, 0.0)) if turn else _place((x, z)),
     }
-    optional = {
-        "pos": _place(place) if np.any(place) else "",
-        "ref": _number(model.reference[joint], blank=0.0),
-        "damping": _number(model.damping[joint], blank=0.0),
-        "armature": _number(model.armature[joint], blank=0.0),
-        "frictionloss": _number(model.dry_friction[joint], blank=0.0),
-        "stiffness": _number(model.stiffness[joint], blank=0.0),
-        "springref": _number(model.rest[joint], blank=0.0),
-    }
-    given |= {key: text for key, text in optional.items() if text}
+    if np.any(place):
+        given["pos"] = _place(place)
+    for name, (attribute, _, _) in ATTRIBUTES.items():
+        value = getattr(model, name)[joint]
+        if value != PROPERTIES[name].default:
+            given[attribute] = _number(value)
     SubElement(
         body, "joint", given | _range("range", float(model.lower[joint]), float(model.upper[joint]))
     )
@@ -257,12 +252,22 @@ def _write_urdf_joint(robot: Robot, joint: int, parent: str, child: str, root: E
     )
 
 
+_URDF = (
+    "mass", "center_of_mass", "inertia", "reference", "damping", "dry_friction", "speed_limit",
+    "rest",  # of a spring, which is named
+)  # fmt: skip
+"""Numbers that URDF has."""
+_WITHOUT = {"stiffness": "springs", "armature": "armature (motor inertia)"}
+
+
 def _warn_of_what_urdf_cannot_hold(robot: Robot) -> None:
     model = robot.model
     one_sided = np.flatnonzero(model.torque_lower != -model.torque_upper)
     lost = {
-        "springs": np.flatnonzero(model.stiffness),
-        "armature (motor inertia)": np.flatnonzero(model.armature),
+        _WITHOUT.get(name, label(name)): _given(robot, name)
+        for name in PROPERTIES
+        if name not in _URDF
+    } | {
         "different torque limits of the two senses (the larger stays)": model.actuator_joint[
             one_sided
         ],
@@ -300,10 +305,14 @@ def _range(name: str, low: float, high: float) -> dict[str, str]:
     return {name: _numbers((max(low, -LARGEST_NUMBER), min(high, LARGEST_NUMBER)))}
 
 
-def _number(value: float, *, blank: float | None = None) -> str:
-    """All digits of a number; nothing where it is `blank`."""
-    number = float(value) + 0.0  # without the sign of zero
-    return "" if number == blank else repr(number)
+def _number(value: float) -> str:
+    """All digits of a number."""
+    return repr(float(value) + 0.0)  # without the sign of zero
+
+
+def _given(robot: Robot, name: str) -> Integers:
+    """Return the joints that have a number which is not the default."""
+    return np.flatnonzero(getattr(robot.model, name) != PROPERTIES[name].default)
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -9,41 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.model import Model
-from heelstrike.robot.robot import Foot, Mirror, Robot
+from heelstrike.robot.mirror import Mirror
+from heelstrike.robot.model import NUMBERS, Model
+from heelstrike.robot.robot import Foot, Robot
 
 if TYPE_CHECKING:
     import xarray
 
-# Field of Model -> dimensions. `pivot`, a number, is kept among the attributes.
-_MODEL = {
-    "parent": ("coordinate",),
-    "axis": ("coordinate", "motion"),
-    "offset": ("coordinate", "xz"),
-    "reference": ("coordinate",),
-    "mass": ("coordinate",),
-    "center_of_mass": ("coordinate", "xz"),
-    "inertia": ("coordinate",),
-    "armature": ("coordinate",),
-    "damping": ("coordinate",),
-    "stiffness": ("coordinate",),
-    "rest": ("coordinate",),
-    "dry_friction": ("coordinate",),
-    "lower": ("coordinate",),
-    "upper": ("coordinate",),
-    "speed_limit": ("coordinate",),
-    "gravity": ("xz",),
-    "contact_link": ("contact",),
-    "contact_position": ("contact", "xz"),
-    "contact_radius": ("contact",),
-    "actuator_joint": ("actuator",),
-    "torque_lower": ("actuator",),
-    "torque_upper": ("actuator",),
-}
-_INDICES = ("parent", "contact_link", "actuator_joint")
-_ONCE_UNKNOWN = {"dry_friction": 0.0, "speed_limit": math.inf}
-"""What files do not have that are older than these numbers of a robot, and what it was then."""
-_MAY_BE_INFINITE = ("lower", "upper", "speed_limit", "torque_lower", "torque_upper")
+_DIMS: dict[str | int, str] = {
+    "nl": "coordinate", "nj": "coordinate", "nq": "coordinate", "nv": "coordinate",
+    "nc": "contact", "nu": "actuator", "axes": "xz", 3: "motion",
+}  # fmt: skip
+"""Dimensions of the file. In the plane links, joints and coordinates share one."""
+_ARRAYS = {name: number for name, number in NUMBERS.items() if number.shape}
+_DIMS_OF = {name: tuple(_DIMS[size] for size in one.shape) for name, one in _ARRAYS.items()}
 _NAMES = {
     "joint_names": "coordinate",
     "link_names": "coordinate",
@@ -58,7 +37,8 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     import xarray
 
     variables: dict[str, Any] = {
-        name: (dims, getattr(robot.model, name)) for name, dims in _MODEL.items()
+        name: (_DIMS_OF[name], getattr(robot.model, name), {"units": one.unit} if one.unit else {})
+        for name, one in _ARRAYS.items()
     }
     for name, dim in _NAMES.items():
         variables[name] = ((dim,), np.array(getattr(robot, name), dtype=object))
@@ -120,8 +100,8 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
 
     def numbers(name: str, dims: tuple[str, ...], kind: type) -> Any:
         shape = tuple(sizes[dim] for dim in dims)
-        if name in _ONCE_UNKNOWN and name not in contents:
-            return np.full(shape, _ONCE_UNKNOWN[name])
+        if name in _ARRAYS and _ARRAYS[name].later and name not in contents:
+            return np.full(shape, _ARRAYS[name].default)
         values = found(name)
         if values.shape != shape or values.dtype.kind not in "fi":
             raise ValueError(f"{name} is not an array of numbers of shape {shape}")
@@ -144,10 +124,7 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
         return value.item()
 
     model = Model(
-        **{
-            name: numbers(name, dims, np.int64 if name in _INDICES else np.float64)
-            for name, dims in _MODEL.items()
-        },
+        **{name: numbers(name, _DIMS_OF[name], one.dtype.type) for name, one in _ARRAYS.items()},
         pivot=attribute("pivot", "i"),
     )
     foot_link = numbers("foot_link", ("foot",), np.int64)
@@ -189,20 +166,22 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
 def _check(robot: Robot) -> None:
     """Refuse numbers that would send the compiled kernels outside their arrays, or astray."""
     model = robot.model
-    count = robot.nv
-    for name, values, low, high in (
-        ("parent", model.parent - np.arange(count), -count - 1, 0),
-        ("parent", model.parent, -1, count),
-        ("contact_link", model.contact_link, 0, count),
-        ("actuator_joint", model.actuator_joint, 0, count),
-        ("foot_link", np.array([foot.link for foot in robot.feet]), 0, count),
-        ("pivot", np.array([model.pivot]), 0, count),
-    ):
-        if np.any(values < low) or np.any(values >= high):
+    feet = np.array([foot.link for foot in robot.feet])
+    astray: dict[str, Any] = {
+        "parent": np.any(model.parent >= np.arange(robot.nl)),
+        "foot_link": np.any((feet < 0) | (feet >= robot.nl)),
+    }
+    for name, number in NUMBERS.items():
+        values = np.asarray(getattr(model, name))
+        if number.points:
+            high = model.extents[number.points]
+            astray[name] = astray.get(name) or np.any((values < number.least) | (values >= high))
+    for name, whether in astray.items():
+        if whether:
             raise ValueError(f"{name} points outside the robot")
-    for name in _MODEL:
+    for name, number in _ARRAYS.items():
         values = getattr(model, name)
-        bad = np.isnan(values) if name in _MAY_BE_INFINITE else ~np.isfinite(values)
+        bad = np.isnan(values) if number.infinite else ~np.isfinite(values)
         if np.any(bad):
             raise ValueError(f"{name} is not finite")
     if not all(0.0 <= friction < math.inf for friction in robot.contact_friction):
@@ -212,7 +191,7 @@ def _check(robot: Robot) -> None:
     if not math.isfinite(robot.total_mass) or np.any(model.mass < 0.0):
         raise ValueError("masses must be finite and not negative")
     if robot.mirror is not None:
-        for name, size in (("joint", count), ("contact", robot.nc), ("foot", len(robot.feet))):
+        for name, size in (("joint", robot.nj), ("contact", robot.nc), ("foot", len(robot.feet))):
             if sorted(getattr(robot.mirror, name)) != list(range(size)):
                 raise ValueError(f"mirror_{name} is not an exchange of left and right")
         if np.any(np.abs(robot.mirror.sign) != 1.0):

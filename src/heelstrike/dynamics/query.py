@@ -1,0 +1,124 @@
+"""Queries: what can be asked of a robot in a state, each written once for numbers and symbols.
+
+A query is a function of an :class:`~heelstrike.dynamics.evaluation.Evaluation`. The decorators
+here make the function of (robot, q, …) of it that people call, with its documentation; its ``at``
+is the query itself, which :mod:`heelstrike.dynamics.symbolic` and
+:mod:`heelstrike.dynamics.casadi_functions` ask over symbols.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from functools import update_wrapper
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
+
+from numpy.typing import ArrayLike
+
+from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.robot.robot import Robot
+
+P = ParamSpec("P")
+Result = TypeVar("Result", covariant=True)
+
+VECTORS = {
+    "q": "nq", "v": "nv", "end": "nq", "acceleration": "nv", "force": "nv", "torque": "nu",
+}  # fmt: skip
+"""Arguments that are vectors, and how long they are."""
+
+_ARGUMENTS = {
+    "robot": ("Robot", "The robot."),
+    "q": ("(nq,) array", "Position, in m and rad, in the order of ``robot.joint_names``."),
+    "v": ("(nv,) array", "Velocity, in m/s and rad/s."),
+    "time": ("float", "How long, in s."),
+    "end": ("(nq,) array", "Another position."),
+    "acceleration": ("(nv,) array", "Rate of the velocity, in m/s² and rad/s²."),
+    "force": ("(nv,) array", "Generalised force, in N and N m."),
+    "torque": ("(nu,) array", "Torques or forces of the motors, as ``robot.actuator_names``."),
+    "link": ("int or str", "Link, by its index or the name of its body."),
+    "local": ("(2,) array", "Place (x, z) of the point in the axes of its link, in m."),
+    "contacts": ("iterable of int or str, optional", "Contact points, all k = nc by default."),
+}
+_RAISES = "If the robot has no such link or contact point, or a vector has the wrong length."
+
+
+class Query(Protocol[P, Result]):
+    """What can be asked of a robot in a state."""
+
+    @property
+    def at(self) -> Callable[Concatenate[Evaluation, P], Result]:
+        """The question, asked of an evaluation."""
+
+    @property
+    def returns(self) -> str:
+        """Shape, unit and frame of the answer."""
+
+
+class OfPosition(Query[P, Result], Protocol[P, Result]):
+    """A query of a position."""
+
+    def __call__(self, robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
+        """Answer it."""
+
+
+class OfState(Query[P, Result], Protocol[P, Result]):
+    """A query of a position and a velocity."""
+
+    def __call__(
+        self, robot: Robot, q: ArrayLike, v: ArrayLike, *others: P.args, **named: P.kwargs
+    ) -> Result:
+        """Answer it."""
+
+
+def of_position(
+    returns: str,
+) -> Callable[[Callable[Concatenate[Evaluation, P], Result]], OfPosition[P, Result]]:
+    """Make a query of a position (and more); `returns` says in what shape, unit and frame."""
+
+    def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfPosition[P, Result]:
+        def answer(robot: Robot, q: ArrayLike, *others: P.args, **named: P.kwargs) -> Result:
+            return body(Evaluation(robot, q), *others, **named)
+
+        return _described(answer, body, returns)
+
+    return query
+
+
+def of_state(
+    returns: str,
+) -> Callable[[Callable[Concatenate[Evaluation, P], Result]], OfState[P, Result]]:
+    """Make a query of a position and a velocity; see :func:`of_position`."""
+
+    def query(body: Callable[Concatenate[Evaluation, P], Result]) -> OfState[P, Result]:
+        def answer(
+            robot: Robot, q: ArrayLike, v: ArrayLike, *others: P.args, **named: P.kwargs
+        ) -> Result:
+            return body(Evaluation(robot, q, v), *others, **named)
+
+        return _described(answer, body, returns)
+
+    return query
+
+
+def _described(answer: Any, body: Callable[..., Any], returns: str) -> Any:
+    """Give an answer the name, signature and documentation of its question."""
+    first, own = inspect.signature(answer), inspect.signature(body)
+    names = [one for one in first.parameters.values() if one.kind == one.POSITIONAL_OR_KEYWORD]
+    signature = own.replace(parameters=[*names, *list(own.parameters.values())[1:]])
+    update_wrapper(answer, body)
+    answer.__signature__, answer.at, answer.returns = signature, body, returns
+    shape, _, meaning = returns.partition(": ")
+    answer.__doc__ = docstring(inspect.getdoc(body) or "", signature.parameters, shape, meaning)
+    return answer
+
+
+def docstring(summary: str, names: Iterable[str], returned: str, meaning: str) -> str:
+    """Return the documentation of a function that takes arguments of queries."""
+    text = [summary, "", "Parameters", "----------"] if names else [summary]
+    for name in names:
+        kind, words = _ARGUMENTS[name]
+        text += [f"{name} : {kind}", f"    {words}"]
+    text += ["", "Returns", "-------", returned, f"    {meaning}"]
+    if names:
+        text += ["", "Raises", "------", "RobotError", f"    {_RAISES}"]
+    return "\n".join(text)

@@ -1,0 +1,50 @@
+"""Algebra of the plane: motions, forces and inertias at the pivot (:mod:`.kernels`).
+
+A motion or force is (about +y, along x, along z), in an array a row for every link. Kernels that
+speak in these words do not know how many numbers there are.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.robot.model import Floats
+
+Spatial = tuple[float, float, float]
+
+
+@kernel
+def spatial(rows: Floats, i: int) -> Spatial:
+    """Return a motion or force of an array."""
+    return rows[i, 0], rows[i, 1], rows[i, 2]
+
+
+@kernel
+def write(rows: Floats, i: int, value: Spatial) -> None:
+    """Write a motion or force into an array."""
+    rows[i, 0], rows[i, 1], rows[i, 2] = value
+
+
+@kernel
+def plus(one: Spatial, other: Spatial) -> Spatial:
+    """Add two motions or forces."""
+    return one[0] + other[0], one[1] + other[1], one[2] + other[2]
+
+
+@kernel
+def scaled(value: Spatial, factor: float) -> Spatial:
+    """Multiply a motion or force by a number."""
+    return value[0] * factor, value[1] * factor, value[2] * factor
+
+
+@kernel
+def power(motion: Spatial, force: Spatial) -> float:
+    """Power of a force on a motion."""
+    return motion[0] * force[0] + motion[1] * force[1] + motion[2] * force[2]
+
+
+@kernel
+def momentum_of(inertia: Floats, i: int, motion: Spatial) -> Spatial:
+    """Momentum of the rigid body `i` of (…, 4) that has a motion."""
+    mass, hx, hz = inertia[i, 0], inertia[i, 1], inertia[i, 2]
+    w, vx, vz = motion
+    return inertia[i, 3] * w + hz * vx - hx * vz, mass * vx + w * hz, mass * vz - w * hx

@@ -1,0 +1,93 @@
+"""Numbers of joints in MJCF: as attributes, or, where MJCF has no word for them, as custom data.
+
+``<custom><numeric name="speed_limit:JOINT" data="…"/></custom>`` holds the speed limit of a joint,
+and likewise every number of :class:`~heelstrike.robot.model.Model` without an attribute.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.model import PROPERTIES, Floats
+from heelstrike.robot.warning import warn
+
+ATTRIBUTES = {
+    "reference": ("ref", "qpos0", ""),
+    "armature": ("armature", "dof_armature", ""),
+    "damping": ("damping", "dof_damping", "damper"),
+    "stiffness": ("stiffness", "jnt_stiffness", "spring"),
+    "rest": ("springref", "qpos_spring", ""),
+    "dry_friction": ("frictionloss", "dof_frictionloss", "frictionloss"),
+}
+"""Attribute of ``<joint>``, array of MuJoCo's model, and the flag that switches it off."""
+
+CUSTOM = [
+    name
+    for name, number in PROPERTIES.items()
+    if number.shape in (("nq",), ("nv",)) and name not in ATTRIBUTES
+]
+"""Numbers of joints that MJCF has no word for."""
+
+LARGEST_NUMBER = 1e10
+"""Files that must give a number but mean none give one like this."""
+
+
+def read_joint_numbers(file: MujocoFile) -> dict[str, Floats]:
+    """Return the numbers of all joints that a file gives by attributes or custom data.
+
+    URDF gives the speed limit as ``<limit velocity="…">``.
+
+    Raises
+    ------
+    RobotError
+        If custom data are no number, or one too small.
+    """
+    switched = {name: float(not file.disabled(flag)) for name, (_, _, flag) in ATTRIBUTES.items()}
+    numbers = {
+        name: switched[name] * np.asarray(getattr(file.model, field), dtype=np.float64)
+        for name, (_, field, _) in ATTRIBUTES.items()
+    }
+    return numbers | {name: _custom(file, name) for name in CUSTOM}
+
+
+def _custom(file: MujocoFile, name: str) -> Floats:
+    names = [file.given_name("joint", joint) for joint in range(file.model.njnt)]
+    index = {joint: place for place, joint in reversed(list(enumerate(names)))}
+    number = PROPERTIES[name]
+    values = np.full(len(names), number.default, dtype=np.float64)
+    for joint, value in _written(file, name):
+        if joint not in index:
+            if not file.is_urdf:  # whose fixed joints may have limits too
+                warn(f"{file.source}: {name}:{joint}: there is no joint of that name.")
+            continue
+        if not value >= number.least:
+            words = name.replace("_", " ")
+            raise file.error(
+                f"the {words} of joint {joint!r} is {value}, not a number >= {number.least:g}."
+            )
+        # Exporters write 0 for the limit that nobody told them.
+        none = number.infinite and not 0.0 < value < LARGEST_NUMBER
+        values[index[joint]] = math.inf if none else value
+    return values
+
+
+def _written(file: MujocoFile, name: str) -> Iterator[tuple[str, float]]:
+    if file.is_urdf and name == "speed_limit":
+        for joint in file.xml.iterfind("joint"):
+            for limit in joint.iterfind("limit"):
+                yield joint.get("name", ""), _number(limit.get("velocity", "0"))
+    for numeric in range(file.model.nnumeric):
+        held, _, joint_name = file.given_name("numeric", numeric).partition(":")
+        if held == name and joint_name:
+            yield joint_name, float(file.model.numeric_data[file.model.numeric_adr[numeric]])
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan

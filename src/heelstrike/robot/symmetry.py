@@ -1,0 +1,248 @@
+"""Left and right: found by name, believed only when the numbers agree."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.robot.mirror import Mirror
+from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
+from heelstrike.robot.robot import Foot
+from heelstrike.robot.warning import warn
+
+TOLERANCE = 1e-6
+"""Relative difference up to which numbers of left and right are the same (files round)."""
+
+SHOWN = 6  # how many differences a message lists before it counts the rest
+
+_WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+_SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
+_OTHER = {"l": "r", "r": "l"}
+
+
+def find_mirror(
+    model: Model,
+    joint_names: tuple[str, ...],
+    link_names: tuple[str, ...],
+    feet: tuple[Foot, ...],
+    friction: Sequence[float],
+    source: str,
+) -> Mirror | None:
+    """Find the exchange of left and right, and check it on every number of the robot.
+
+    Sides are recognised by the words left, right, l, r in the names of joints (or else of links),
+    in any case and position: ``left_hip``, ``HipRight``, ``l_knee``. One side may go without:
+    ``foot`` is the counterpart of ``foot_left``.
+
+    Parameters
+    ----------
+    model : Model
+        The robot's arrays.
+    joint_names, link_names : tuple of str
+        Names of its coordinates and links.
+    feet : tuple of Foot
+        Its feet.
+    friction : sequence of nc float
+        Friction of every contact point according to the robot's file.
+    source : str
+        What to call the robot in messages.
+
+    Returns
+    -------
+    Mirror or None
+        None if no names pair up, which is silent, or if a pair differs, which earns a
+        `RobotWarning` with the numbers in which it does.
+    """
+    joint = _pairs(joint_names)
+    if joint is None:
+        joint = _pairs(_numbered(link_names))
+    if joint is None:
+        return None
+    sign = _signs(model, joint)
+    contact = _contact_pairs(model, joint)
+    findings = [
+        *_unpaired(joint_names, joint),
+        *_differing_joints(model, joint, sign, joint_names),
+        *_differing_actuators(model, joint, sign, joint_names),
+        *_differing_contacts(model, joint, contact, friction, link_names),
+    ]
+    differences = list(dict.fromkeys(findings))  # two points of a foot may say the same
+    if differences:
+        shown, more = "; ".join(differences[:SHOWN]), len(differences) - SHOWN
+        tail = f"; and {more} more" if more > 0 else ""
+        warn(
+            f"{source}: left and right differ, so the robot has no mirror image: {shown}{tail}. "
+            "Gaits whose steps mirror each other need two equal legs."
+        )
+        return None
+    by_link = {foot.link: i for i, foot in enumerate(feet)}
+    foot = np.array([by_link[int(joint[foot.link])] for foot in feet], dtype=np.int64)
+    return Mirror(joint, sign, contact, foot)
+
+
+def _side(name: str, names: Sequence[str]) -> tuple[str, str]:
+    """Split a name into its side ("" if none) and the rest.
+
+    A bare first letter, as in lhip, counts only if `names` has the other side's, rhip.
+    """
+    words = [word.lower() for word in _WORDS.findall(name)]
+    side = ""
+    rest: list[str] = []
+    for word in words:
+        if not side and word in _SIDES:
+            side = _SIDES[word]
+        elif not side and len(word) > 4 and word.startswith("left"):
+            side, rest = "left", [*rest, word[4:]]
+        elif not side and len(word) > 5 and word.startswith("right"):
+            side, rest = "right", [*rest, word[5:]]
+        else:
+            rest.append(word)
+    letter = name[:1].lower()
+    if not side and letter in _OTHER and _swapped(name) in names:
+        return _SIDES[letter], name[1:].lower()
+    return side, " ".join(rest)
+
+
+def _swapped(name: str) -> str:
+    other = _OTHER[name[0].lower()]
+    return (other.upper() if name[0].isupper() else other) + name[1:]
+
+
+def _numbered(names: Sequence[str]) -> tuple[str, ...]:
+    """Tell the links of one body apart by their place in the chain."""
+    return tuple(f"{name} {names[:i].count(name)}" for i, name in enumerate(names))
+
+
+def _pairs(names: Sequence[str]) -> Integers | None:
+    """Index of every name's counterpart, its own if it has none; None if nothing pairs up."""
+    sides: dict[str, dict[str, int]] = {}
+    for i, name in enumerate(names):
+        side, rest = _side(name, names)
+        sides.setdefault(rest, {})[side] = i
+    result = np.arange(len(names))
+    for group in sides.values():
+        pair = [group[side] for side in ("left", "right") if side in group]
+        if len(pair) == 1 and "" in group:
+            pair.append(group[""])
+        if len(pair) == 2:
+            result[pair] = pair[::-1]
+    return result if np.any(result != np.arange(len(names))) else None
+
+
+def _signs(model: Model, joint: Integers) -> Floats:
+    """-1 where the axes of a pair are opposite, +1 elsewhere (also where they do not match)."""
+    opposite = np.all(np.abs(model.axis[joint] + model.axis) < TOLERANCE, axis=1)
+    return np.where(opposite, -1.0, 1.0)
+
+
+def _contact_pairs(model: Model, joint: Integers) -> Integers:
+    """Nearest contact point on the counterpart of the link of every contact point."""
+    result = np.arange(len(model.contact_link))
+    for i, link in enumerate(model.contact_link):
+        there = np.flatnonzero(model.contact_link == joint[link])
+        if len(there) and joint[link] != link:
+            apart = model.contact_position[there] - model.contact_position[i]
+            change = np.abs(model.contact_radius[there] - model.contact_radius[i])
+            result[i] = there[np.argmin(np.hypot(*apart.T) + change)]
+    return result
+
+
+def _unpaired(names: Sequence[str], joint: Integers) -> Iterator[str]:
+    for i, name in enumerate(names):
+        side, _ = _side(name, names)
+        if side and joint[i] == i:
+            yield f"{name} has no counterpart"
+
+
+def _differing_joints(
+    model: Model, joint: Integers, sign: Floats, names: Sequence[str]
+) -> Iterator[str]:
+    parent = model.parent
+    for i, j in enumerate(joint):
+        expected = joint[parent[i]] if parent[i] >= 0 else -1
+        if parent[j] != expected:
+            yield f"{names[i]} and {names[j]} hang on links that are not counterparts"
+    for i, j in enumerate(joint):
+        if j <= i:
+            continue
+        pair = f"of {names[i]} and {names[j]}"
+        if not _same(model.axis[i], sign[i] * model.axis[j]):
+            yield f"axis {pair} (not parallel)"
+        for name in (name for name, number in NUMBERS.items() if number.alike):
+            a, b = getattr(model, name)[i], getattr(model, name)[j]
+            if not _same(a, b):
+                yield f"{label(name)} {pair} ({_text(a)}, {_text(b)})"
+        turned = slice(None) if sign[i] > 0 else slice(None, None, -1)
+        range_i = np.array([model.lower[i], model.upper[i]]) - model.reference[i]
+        range_j = sign[i] * (np.array([model.lower[j], model.upper[j]]) - model.reference[j])
+        if not _same(range_i, range_j[turned]):
+            yield f"range {pair} ({_text(range_i)}, {_text(range_j[turned])})"
+        if model.stiffness[i] or model.stiffness[j]:
+            rest_i = model.rest[i] - model.reference[i]
+            rest_j = sign[i] * (model.rest[j] - model.reference[j])
+            if not _same(rest_i, rest_j):
+                yield f"rest of the spring {pair} ({_text(rest_i)}, {_text(rest_j)})"
+
+
+def _differing_actuators(
+    model: Model, joint: Integers, sign: Floats, names: Sequence[str]
+) -> Iterator[str]:
+    limits = {
+        int(k): np.array([low, high])
+        for k, low, high in zip(
+            model.actuator_joint, model.torque_lower, model.torque_upper, strict=True
+        )
+    }
+    for i, j in enumerate(joint.tolist()):
+        if (i in limits) and (j not in limits):
+            yield f"{names[i]} has an actuator, {names[j]} has none"
+        elif j > i and i in limits:
+            there = sign[i] * limits[j]
+            there = there if sign[i] > 0 else there[::-1]
+            if not _same(limits[i], there):
+                yield (
+                    f"torque limits of {names[i]} and {names[j]} "
+                    f"({_text(limits[i])}, {_text(there)})"
+                )
+
+
+def _differing_contacts(
+    model: Model,
+    joint: Integers,
+    contact: Integers,
+    friction: Sequence[float],
+    names: Sequence[str],
+) -> Iterator[str]:
+    for i, j in enumerate(joint):
+        here, there = (int(np.sum(model.contact_link == k)) for k in (i, j))
+        if i < j and here != there:
+            yield f"number of contact points on {names[i]} and {names[j]} ({here}, {there})"
+    for i, j in enumerate(contact.tolist()):
+        link, other = model.contact_link[i], joint[model.contact_link[i]]
+        if model.contact_link[j] != other or link > other:
+            continue  # no counterpart at all (told above), or told from the other side
+        pair = f"of {names[link]} and {names[other]}"
+        for what, values, paired in (
+            ("contact points", model.contact_position, contact[j] == i),
+            ("radius of the contact points", model.contact_radius, True),
+            ("friction of the contact points", friction, True),
+        ):
+            a, b = values[i], values[j]
+            if not (paired and _same(a, b)):
+                yield f"{what} {pair} ({_text(a)}, {_text(b)})"
+
+
+def _same(a: ArrayLike, b: ArrayLike) -> bool:
+    """Whether numbers are equal but for rounding; what is infinite equals only itself."""
+    a, b = np.asarray(a), np.asarray(b)
+    with np.errstate(invalid="ignore"):
+        near = np.abs(a - b) <= TOLERANCE * np.maximum(np.abs(a), np.abs(b)) + 1e-9
+    return bool(np.all(near & np.isfinite(a) & np.isfinite(b) | (a == b)))
+
+
+def _text(value: ArrayLike) -> str:
+    numbers = [f"{number:.9g}" for number in np.atleast_1d(np.asarray(value, dtype=np.float64))]
+    return numbers[0] if len(numbers) == 1 else f"[{', '.join(numbers)}]"
