@@ -53,8 +53,8 @@ def projected(
 @kernel
 def contains(problem: ContactProblem, group: int, normal: float, tangent: float) -> bool:
     """Whether an impulse is in its set."""
-    if normal < 0.0 and problem.set[group] == LINE:
-        return tangent == 0.0
+    if normal < 0.0:
+        return problem.set[group] == LINE and tangent == 0.0
     return abs(tangent) <= problem.friction[group] * normal
 
 
