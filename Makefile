@@ -14,13 +14,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
+OLDEST_NUMBA := $(shell sed -n 's/.*"numba>=\([0-9.]*\)".*/\1/p' pyproject.toml)
+NUMBA_SAMPLE := tests/compiler tests/dynamics/test_c_code.py tests/contact/solvers tests/sim/test_walking.py
+
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile
 BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
 SAMPLE := tests/compiler/test_plain_code.py tests/compiler/test_straight_line.py tests/contact \
 	tests/sim/test_contact_geometry.py tests/experiments/test_paper.py
 
 .DEFAULT_GOAL := help
-.PHONY: help walk test test-plain test-blas test-perturbed test-sample bench check check-all docs clean
+.PHONY: help walk test test-plain test-blas test-perturbed test-sample test-numba test-documented bench check check-all docs clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -50,8 +53,16 @@ test-sample: export HEELSTRIKE_PLAIN_CODE = 1
 test-sample: $(VENV)/installed-dev
 	$(PYTEST) --perturb-gaits 1e-12 $(SAMPLE)
 
+# The same with the oldest Numba that is allowed, and with what Numba documents only.
+test-numba: $(VENV)-numba/installed-$(OLDEST_NUMBA)
+	$(VENV)-numba/bin/python -m pytest -n $(WORKERS) --dist loadfile $(NUMBA_SAMPLE)
+
+test-documented: export HEELSTRIKE_DOCUMENTED_NUMBA = 1
+test-documented: $(VENV)/installed-dev
+	$(PYTEST)
+
 bench: $(VENV)/installed
-	$(BIN)/heelstrike bench --out bench
+	$(BIN)/python benchmarks/speed run --out bench
 
 check: $(VENV)/installed-dev
 	$(BIN)/ruff format --check .
@@ -65,7 +76,7 @@ docs: $(VENV)/installed-docs
 	$(BIN)/mkdocs build --strict
 
 clean:
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	rm -rf $(VENV) $(VENV)-numba .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	rm -rf build dist site walk paper bench
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -89,3 +100,9 @@ $(VENV)/installed-docs: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing heelstrike and its documentation tools into $(VENV)"
 	$(INSTALL) -e '.[docs]'
 	@touch $(VENV)/installed $@
+
+# Without constraints.txt, whose NumPy an old Numba refuses.
+$(VENV)-numba/installed-$(OLDEST_NUMBA): pyproject.toml
+	$(PYTHON) -m venv $(VENV)-numba
+	$(VENV)-numba/bin/python -m pip install --quiet --disable-pip-version-check 'numba==$(OLDEST_NUMBA)' -e '.[dev]'
+	@touch $@

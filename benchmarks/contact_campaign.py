@@ -30,6 +30,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from table import Table
 
 from heelstrike.contact import ContactSolution, SolveStatus, solve_contact
 
@@ -166,10 +168,11 @@ def main() -> None:
         return
     print(f"{2 * table['number']} problems, seed {table['seed']}, in {table['seconds']:.0f} s")
     statuses = [status.name for status in SolveStatus]
-    print(f"{'':28s}" + "".join(f"{name.lower():>16s}" for name in statuses))
-    for name in sorted(table["ended"]):
-        counts = table["ended"][name]
-        print(f"{name:28s}" + "".join(f"{counts[status]:16d}" for status in statuses))
+    rows = [
+        [name, *(str(counts[status]) for status in statuses)]
+        for name, counts in sorted(table["ended"].items())
+    ]
+    Console().print(Table("", ["problems", *(name.lower() for name in statuses)], rows))
     print(f"worst certified residual: {table['worst_certified_residual']:.1e}")
     unsolved = len(table["planted_unsolved"])
     share = 100.0 * (1.0 - unsolved / max(1, table["planted_to_be_solved"]))

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import argparse
 import json
-import time
 from typing import Any
 
 import numpy as np
+from rich.console import Console
+from speed.stopwatch import best_of, timed
+from table import Table
 
 from heelstrike import load_robot
 from heelstrike.compiler.compilation import kernel
@@ -107,13 +109,13 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
             if solve_many(1, *arguments, *rest) != 0:
                 raise RuntimeError(f"{name} failed on a standing problem: {residual}")
             work.counters[SHORTCUTS] = 0
-            spent = []
-            for _ in range(BATCHES):  # the fastest is the one that others disturb least
-                begin = time.perf_counter()
-                solve_many(repeats, *arguments, *rest)
-                spent.append((time.perf_counter() - begin) / repeats * 1e6)
-            times.append(min(spent))
-            shortcuts += int(work.counters[SHORTCUTS]) // BATCHES
+            solve_many(repeats, *arguments, *rest)
+            shortcuts += int(work.counters[SHORTCUTS])
+
+            def batch(arguments: Any = arguments, rest: Any = rest) -> float:
+                return timed(solve_many, repeats, *arguments, *rest)[1]
+
+            times.append(best_of({"": batch}, seconds=0.0, least=BATCHES)[""] / repeats * 1e6)
         figures[name] = {
             "median_us": float(np.median(times)),
             "p99_us": float(np.percentile(times, 99)),
@@ -130,9 +132,11 @@ def main() -> None:
     if parser.parse_args().json:
         print(json.dumps(figures, indent=2))
         return
-    print("both feet flat, 4 vertices, µs per solve")
-    for name, row in figures.items():
-        print(f"{name:20s} median {row['median_us']:7.2f}   99 % {row['p99_us']:7.2f}")
+    body = [
+        [name, f"{row['median_us']:.2f}", f"{row['p99_us']:.2f}"] for name, row in figures.items()
+    ]
+    head = ["solver", "median", "99 %"]
+    Console().print(Table("both feet flat, 4 vertices, µs per solve", head, body))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,7 @@
-"""Every Python block of the README and of the documentation runs, in order, page by page."""
+"""Every Python block of the README and of the documentation runs, in order, page by page.
+
+The reference describes every public name once, and its first page leads there.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import re
 from pathlib import Path
 
 import pytest
+from public_names import public_names
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -21,3 +25,23 @@ def test_code_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
         # Blank lines in front make a traceback name the line of the page.
         code = "\n" * text.count("\n", 0, block.start(1)) + block[1]
         exec(compile(code, str(page), "exec"), names)
+
+
+def test_the_reference_is_that_of_the_public_names() -> None:
+    described = {
+        f"reference/{page.name}#{name}"
+        for page in (ROOT / "docs" / "reference").glob("*.md")
+        for name in re.findall(r"^::: (\S+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    assert sorted(each.partition("#")[2] for each in described) == sorted(public_names())
+    index = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"\((reference/\S+#\S+)\)", index)) == sorted(described)
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    docs = ROOT / "docs"
+    pages = {str(page.relative_to(docs).as_posix()) for page in docs.rglob("*.md")}
+    navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^ +- (?:\w+: )?(\S+\.md)$", navigation, re.MULTILINE)) == sorted(
+        pages
+    )

@@ -3,7 +3,7 @@
 A row gives a figure and a test. The test must be there, and the figure must be one that it asks
 for: in an assertion, or as a constant of the file or a parameter of the test. So neither can change
 without the other. Figures of speed are not asked of any machine; they are those of
-docs/performance.md, which `heelstrike bench` writes.
+docs/performance.md, which `make bench` measures.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ import numpy as np
 import pytest
 import robot_cases
 
-from heelstrike.cli.bench import Part
 from heelstrike.cli.main import app
 from heelstrike.cli.walk import walk
-from heelstrike.compiler.straight_line import Recording
-from heelstrike.compiler.tape import ADD, COSINE, DIVIDE, MULTIPLY, NEGATE, READ, SINE, SUBTRACT
+from heelstrike.compiler.recording import Program, Recording
+from heelstrike.compiler.tape import Entry, Operation, Result
 from heelstrike.dynamics.kernels import state_equations
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot import builtin_robots, load_robot
@@ -103,13 +102,10 @@ def test_counts_are_those_of_the_tests() -> None:
 def test_commands_do_what_is_said_of_them() -> None:
     commands = {command.name or command.callback.__name__ for command in app.registered_commands}
     named = {word for word in re.findall(r"`heelstrike (\w+)", README) if word.islower()}
-    assert {"walk", "inspect", "paper", "compare", "bench", "robots"} <= named <= commands
+    assert {"walk", "inspect", "paper", "compare", "robots"} <= named <= commands
     steps = inspect.signature(walk).parameters["steps"].default
     assert f"walks {steps} steps" in README
-    parts = re.findall(r"--part (\w+)", README)
-    assert parts
-    assert set(parts) <= {part.value for part in Part}
-    assert all("heelstrike bench" in place for _, place in MEASURED.values())
+    assert all("`make bench`" in place for _, place in MEASURED.values())
 
 
 def test_fifteen_lines_are_fifteen() -> None:
@@ -172,30 +168,34 @@ def test_growth_is_that_of_the_page() -> None:
 
 def test_instructions_are_those_that_are_kept() -> None:
     kept = json.loads((ROOT / "benchmarks" / "instructions.json").read_text(encoding="utf-8"))
-    told = {name: float(count) for name, count in rows(PERFORMANCE, "benchmark: instructions")}
+    table = rows(PERFORMANCE, "benchmark: instructions")
+    told = {name: float(count) for name, count, *_ in table}
     assert told == {name: round(n) for name, n in kept["instructions_a_step"].items()}
+    beside = {name: float(times) for name, _, times in table if times}
+    assert beside == kept["times_sticking"]
 
 
 def test_operations_are_those_that_are_recorded() -> None:
     """What straight-line code of bravo7's equations of motion computes, and reads to do so."""
     robot = load_robot("bravo7")
     matrix, vector = np.zeros((robot.nv, robot.nv)), np.zeros(robot.nv)
-    recording = Recording(
+    equations = Program(
         state_equations,
         {
             "model": robot.model, "q": vector, "v": vector, "tree": workspace(robot.nv),
             "matrix": matrix, "factor": matrix, "bias": vector,
         },
-        known={"tree.zero": np.zeros(robot.nv, object)},
     )  # fmt: skip
-    tape = recording.tape.operations
-    operations = [entry for entry in tape if entry[0] != READ]
-    count = Counter(entry[0] for entry in operations)
-    assert count[SINE] == count[COSINE]
-    operands = {place for _, *places in operations for place in places if isinstance(place, int)}
-    read = sum(tape[place][0] == READ for place in operands)
+    recording = Recording(equations, known={"tree.zero": np.zeros(robot.nv)})
+    results = [value for value in recording.tape.values if isinstance(value, Result)]
+    count = Counter(value.operation for value in results)
+    sines = count[Operation.SINE]
+    assert sines == count[Operation.COSINE]
+    operands = {operand for value in results for operand in value.operands}
+    read = sum(isinstance(operand, Entry) for operand in operands)
     assert (
-        f"{len(operations) + read} operations for bravo7: {count[MULTIPLY]} products, "
-        f"{count[ADD] + count[SUBTRACT]} sums and differences, {count[NEGATE]} negations, "
-        f"{count[DIVIDE]} divisions, {count[SINE]} sines and cosines, {read} numbers read"
+        f"{len(results) + read} operations for bravo7: {count[Operation.MULTIPLY]} products, "
+        f"{count[Operation.ADD] + count[Operation.SUBTRACT]} sums and differences, "
+        f"{count[Operation.NEGATE]} negations, {count[Operation.DIVIDE]} divisions, "
+        f"{sines} sines and cosines, {read} numbers read"
     ) in " ".join(PERFORMANCE.split())

@@ -230,7 +230,6 @@ WRITERS = """
 import json, os, resource, signal, sys
 from pathlib import Path
 import heelstrike as hs
-from heelstrike.experiments.benchmark.suite import Benchmark
 from heelstrike.experiments.results import Results
 
 folder, saved = Path(sys.argv[1]), Path(sys.argv[2])
@@ -240,7 +239,6 @@ robot = hs.load_robot("bravo7")
 run = hs.load_run(sys.argv[4])
 gait = hs.load_gait(saved / "gait.json")
 before = {name: array.tobytes() for name, array in vars(run).items() if hasattr(array, "tobytes")}
-bench = Benchmark(quick=True, date="", machine={"text": "x" * 20000}, peers={}, parts={})
 results = Results(folder)
 WRITERS = {
     "run.nc": run.save,
@@ -253,7 +251,6 @@ WRITERS = {
     "zmp.pdf": lambda path: run.plot("torque", path=path),
     "film.gif": lambda path: run.animate(path, size=(64, 64), speed=0.1),
     "film.mp4": lambda path: run.animate(path, size=(64, 64), speed=0.1),
-    "benchmark.json": lambda path: bench.save(path.parent),
 }
 # All once without a limit, which compiles what it needs.
 run.animate(folder / "film.gif", size=(64, 64), speed=0.1)
@@ -287,7 +284,6 @@ ERRORS = {
     "zmp.pdf": "ViewError",
     "film.gif": "ViewError",
     "film.mp4": "ViewError",
-    "benchmark.json": "WriteError",
 }
 
 

@@ -43,8 +43,8 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
      "memory.slip[contact] = -row_product("),
     ("control/computed_torque.py", "        force[j] -= passive[j]\n", "        pass\n"),
     ("control/point_feet.py", "        force[j] -= passive[j]\n", "        pass\n"),
-    ("gait/transcription.py", "            - model.contact_radius[i]\n", ""),
-    ("gait/point_support.py", "np.array([0.0, model.contact_radius[contact]])", "np.zeros(2)"),
+    ("gait/support.py", " - self.robot.model.contact_radius[contact]", ""),
+    ("gait/support.py", "center - np.array([0.0, sole.radius])", "center"),
 )  # fmt: skip
 
 

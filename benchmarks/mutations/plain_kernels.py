@@ -51,10 +51,9 @@ def _compiled_for(signature: Any, function: Any, **options: Any) -> Any:
 
 compilation.compiled_for = _compiled_for
 compilation.loop_for = _compiled_for  # type: ignore[assignment]
-compilation.is_kept = lambda *_, **__: True
 compilation.Kernel.__call__ = lambda self, *arguments: _twin(self)(*arguments)  # type: ignore
 
-from heelstrike import separate_kernel  # noqa: E402
+from heelstrike.compiler import separate_kernel  # noqa: E402
 
 
 def _finish(self: Any) -> Any:
@@ -70,24 +69,30 @@ from heelstrike.compiler import straight_line  # noqa: E402
 
 straight_line.play = _call
 
-from heelstrike.contact.solvers import elimination  # noqa: E402
+
+def _recorded(program: Any) -> int:
+    """Straight-line code knows the sizes of its arrays, the kernel takes them as they are."""
+    kernel = _twin(program.kernel)
+    sizes = [
+        len(given) if isinstance(given, np.ndarray) and given.ndim == 1 else None
+        for given in program.arguments.values()
+    ]
+
+    def run(*arguments: Any) -> None:
+        pairs = zip(arguments, sizes, strict=True)
+        kernel(*(given if size is None else given[:size] for given, size in pairs))
+
+    _by_number.append(run)
+    return len(_by_number) - 1
 
 
-def _eliminations() -> tuple[int, ...]:
-    """Its programs know their size, the kernel takes it from its arguments."""
-    kernel = _twin(elimination.eliminate)
-
-    def of_size(n: int) -> Callable[..., None]:
-        return lambda matrix, x, pivot: kernel(matrix[: n * (n + 1) // 2], x[:n], pivot[:n])
-
-    first = len(_by_number)
-    _by_number.extend(of_size(n) for n in range(1, elimination.LARGEST + 1))
-    return tuple(range(first, len(_by_number)))
+def _straight_line_code(programs: Sequence[Any], known: Any = None) -> tuple[int, ...]:
+    del known
+    return tuple(map(_recorded, programs))
 
 
-elimination._programs = _eliminations
+straight_line.straight_line_code = _straight_line_code
 
-from heelstrike.sim import programs  # noqa: E402
 from heelstrike.sim.controller import guard  # noqa: E402
 
 
@@ -96,14 +101,3 @@ def _word_at(array: np.ndarray, place: int) -> int:
 
 
 guard.word_at = _word_at
-
-
-def _programs(model: Any, points: Sequence[int]) -> np.ndarray:
-    found = np.zeros(len(programs.KERNELS), dtype=np.int64)
-    if 0 < len(model.parent) <= programs.MOST_COORDINATES:
-        count = len(programs.KERNELS) if len(points) > 0 else programs.DELASSUS
-        found[:count] = [_number(kernel) for kernel in programs.KERNELS[:count]]
-    return found
-
-
-programs._programs = _programs

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
+from table import markdown
 
 from scenes.methods import METHODS
 
@@ -85,11 +86,6 @@ def seed_words(seeds: Iterable[int]) -> str:
     return ", ".join(words)
 
 
-def _rows(head: Sequence[str], body: Iterable[Sequence[str]]) -> list[str]:
-    lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
-    return lines + ["| " + " | ".join(row) + " |" for row in body]
-
-
 def _endings(methods: Sequence[str], by_method: dict[str, list[Result]]) -> list[str]:
     body = []
     for name in methods:
@@ -102,7 +98,7 @@ def _endings(methods: Sequence[str], by_method: dict[str, list[Result]]) -> list
             + [str(count) for count in counts]
             + [f"{share:.1f} %", f"{seconds:.0f} s"]
         )
-    return _rows(["method", "scenes", "seeds", *STATUSES, "completed", "time"], body)
+    return markdown(["method", "scenes", "seeds", *STATUSES, "completed", "time"], body)
 
 
 def _objections(one: Result) -> list[dict[str, Any]]:
@@ -161,7 +157,7 @@ def _verdicts(methods: Sequence[str], by_method: dict[str, list[Result]]) -> lis
     head = ["method", "judged", "no objection", *kinds, "other solution"]
     spread = "50 / 99 / 100 %"
     head += [f"penetration (m), {spread}", f"energy drift, {spread}", f"momentum, {spread}"]
-    return _rows(head, body)
+    return markdown(head, body)
 
 
 def _laws(methods: Sequence[str], by_method: dict[str, list[Result]]) -> list[str]:
@@ -181,7 +177,7 @@ def _laws(methods: Sequence[str], by_method: dict[str, list[Result]]) -> list[st
             )  # fmt: skip
     if not body:
         return ["None."]
-    return _rows(["method", "law", "scenes", "gross", "median", "worst", "in seed"], body)
+    return markdown(["method", "law", "scenes", "gross", "median", "worst", "in seed"], body)
 
 
 def reason(one: Result) -> str:

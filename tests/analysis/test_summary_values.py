@@ -11,7 +11,7 @@ from synthetic_runs import liftoff, make_run, touchdown
 
 import heelstrike as hs
 from heelstrike.analysis.summary import GaitFigures, Summary, summarize
-from heelstrike.gait import ClearanceProfile
+from heelstrike.gait import ClearanceProfile, Footing, Phase
 from heelstrike.gait.gait import actuated_joints, fingerprint
 from heelstrike.gait.margins import Margins
 from heelstrike.sim import Certificates, RunStatus, SolverCount, Timing
@@ -22,22 +22,17 @@ MASS, G = 75.0, 9.81
 def standing_still() -> hs.Gait:
     """Return a gait whose joints stay where they are when bravo7 stands straight."""
     robot = hs.load_robot("bravo7")
-    none = np.zeros(6)
+    none, ends = np.zeros(6), np.array([0.0, 0.8])
     margins = Margins(*np.zeros(len(dataclasses.fields(Margins))).tolist())
     return hs.Gait(
         robot=robot.name,
         fingerprint=fingerprint(robot),
         joint_names=actuated_joints(robot),
         step_length=0.25,
-        step_duration=0.8,
-        start_position=none,
-        end_position=none,
-        start_velocity=none,
-        end_velocity=none,
+        phases=(Phase(contacts={0: Footing.FLAT}, breakpoints=ends, pieces=np.zeros((1, 4, 6))),),
         mirror_joint=np.array([3, 4, 5, 0, 1, 2]),
         mirror_sign=np.ones(6),
         mirror_offset=none,
-        stance_foot=0,
         initial_state=robot.reference_state(),
         cost=90.5,
         friction=0.75,

@@ -24,7 +24,6 @@ import heelstrike as hs
 from heelstrike.cli.main import app
 from heelstrike.cli.terminal import Stage
 from heelstrike.experiments import comparison as comparison_module
-from heelstrike.experiments.benchmark import suite
 from heelstrike.sim import RunStatus
 
 
@@ -153,29 +152,6 @@ def test_the_paper_writes_nothing_before_all_is_computed(
     out = tmp_path / "out"
     check(invoke("paper", "--out", out), "while walking", "nothing was written")
     assert names(out) == set()
-
-
-def test_a_benchmark_keeps_the_parts_it_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def interrupt(**_: Any) -> dict[str, Any]:
-        signal.raise_signal(signal.SIGINT)
-        raise AssertionError("nobody noticed")
-
-    footprint = {"import_s": 0.2}
-    parts = {"footprint": ("memory", lambda **_: footprint), "threads": ("threads", interrupt)}
-    monkeypatch.setattr(suite, "PARTS", parts)
-    monkeypatch.setattr(suite, "tables", lambda _: iter(()))
-    out = tmp_path / "out"
-    result = invoke("bench", "--part", "footprint", "--part", "threads", "--out", out)
-    assert result.exit_code == 130
-    said = " ".join(result.stderr.split())
-    assert "interrupted while measuring threads" in said
-    assert str(out / "benchmark.json") in said
-    assert names(out) == {"benchmark.json"}
-    found = json.loads((out / "benchmark.json").read_text())
-    assert found["footprint"] == footprint
-    assert found["interrupted"] == "threads"
 
 
 def test_an_import_that_swallows_it_delays_it_only(

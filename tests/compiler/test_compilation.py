@@ -7,25 +7,26 @@ import os
 import shutil
 import subprocess
 import sys
-import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numba import types
-from numba.core.errors import TypingError
-from numba.core.types.functions import BaseFunction
+from numba import TypingError, types
 
 import heelstrike
-from heelstrike.compiler.compilation import compiled_for, kernel, uncompiled
-from heelstrike.compiler.quick_compiling import quick_compiling
+from heelstrike.compiler.compilation import SWITCH, compiled_for, kernel, uncompiled
 from heelstrike.compiler.separate_kernel import SeparateKernel
 from heelstrike.contact.solvers.search import try_solvers
 from heelstrike.robot import load_robot
 from heelstrike.sim.memory import allocate_memory
 
 SOURCE = Path(heelstrike.__file__).parent
+
+BOTH_WAYS = pytest.mark.parametrize(
+    "documented", ["", "1"], ids=["private names", "documented names"]
+)
+BY_DOCUMENTED_NAMES = os.environ.get(SWITCH, "") not in ("", "0")
 
 PROBE = """
 import numpy as np
@@ -109,6 +110,7 @@ print(compiled(1.5), sum(compiled.stats.cache_hits.values()))
 """
 
 
+@pytest.mark.skipif(BY_DOCUMENTED_NAMES, reason="Numba keeps functions of files only")
 def test_a_function_typed_at_a_prompt_is_kept_for_the_next(tmp_path: Path) -> None:
     def answer(text: str) -> str:
         told = subprocess.run(
@@ -124,21 +126,6 @@ def test_a_function_typed_at_a_prompt_is_kept_for_the_next(tmp_path: Path) -> No
     assert answer(TYPED) == "3.0 0"
     assert answer(TYPED) == "3.0 1"
     assert answer(TYPED.replace("2.0 * x", "3.0 * x")) == "4.5 0"
-
-
-def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:
-    before = BaseFunction.get_call_type
-
-    def enter() -> None:
-        with quick_compiling():
-            pass
-
-    with quick_compiling():
-        other = threading.Thread(target=enter)
-        other.start()
-        other.join(0.1)
-    other.join()
-    assert BaseFunction.get_call_type is before
 
 
 HELPER = """
@@ -165,7 +152,8 @@ print(compiled(1.0), sum(compiled.stats.cache_hits.values()))
 """
 
 
-def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path) -> None:
+@BOTH_WAYS
+def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path, documented: str) -> None:
     def answer(helper: str) -> tuple[float, int]:
         (tmp_path / "helper.py").write_text(helper)
         (tmp_path / "caller.py").write_text(CALLER)
@@ -173,7 +161,11 @@ def test_a_change_in_another_file_of_a_user_is_not_missed(tmp_path: Path) -> Non
         told = subprocess.run(
             [sys.executable, "-B", "caller.py"],
             cwd=tmp_path,
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            env={
+                **os.environ,
+                "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+                SWITCH: documented,
+            },
             capture_output=True,
             text=True,
             check=True,
@@ -205,9 +197,11 @@ print(told, sum(compiled.stats.cache_hits.values()))
 """
 
 
-def test_code_made_with_other_settings_is_not_taken(tmp_path: Path) -> None:
+@BOTH_WAYS
+def test_code_made_with_other_settings_is_not_taken(tmp_path: Path, documented: str) -> None:
     def answer(check: str, address: bool = False) -> str:
         (tmp_path / "checked.py").write_text(CHECKED.replace("ADDRESS", str(address)))
+        os.utime(tmp_path / "checked.py", (address, address))
         told = subprocess.run(
             [sys.executable, "-B", "checked.py"],
             cwd=tmp_path,
@@ -215,6 +209,7 @@ def test_code_made_with_other_settings_is_not_taken(tmp_path: Path) -> None:
                 **os.environ,
                 "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
                 "NUMBA_BOUNDSCHECK": check,
+                SWITCH: documented,
             },
             capture_output=True,
             text=True,
@@ -242,7 +237,8 @@ print([one(1.0) for one in compiled], [sum(one.stats.cache_hits.values()) for on
 """
 
 
-def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path) -> None:
+@BOTH_WAYS
+def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path, documented: str) -> None:
     """Such as controllers that a function makes, with gains that it has been given."""
     (tmp_path / "factory.py").write_text(FACTORY)
 
@@ -250,7 +246,11 @@ def test_functions_of_one_name_are_kept_beside_each_other(tmp_path: Path) -> Non
         told = subprocess.run(
             [sys.executable, "-B", "factory.py"],
             cwd=tmp_path,
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            env={
+                **os.environ,
+                "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+                SWITCH: documented,
+            },
             capture_output=True,
             text=True,
             check=True,
@@ -276,6 +276,7 @@ import sys
 import numpy as np
 from numba import njit
 from apart import doubled
+from heelstrike.compiler.compilation import numba_in_use
 from heelstrike.compiler.separate_kernel import call_at
 
 @njit
@@ -285,15 +286,20 @@ def call(address, x, written):
 sys.executable = sys.argv[1] if len(sys.argv) > 1 else sys.executable
 doubled.begin()
 helped = doubled._helper is not None
+if helped:
+    doubled._helper.wait()
+hits = int(numba_in_use().is_kept(doubled.signature(), doubled._function))
 doubled.finish()
 written = np.zeros(1)
-hits = sum(doubled._compiled.stats.cache_hits.values())
 assert doubled.__wrapper_address__() == doubled.address[0] != 0  # as Numba asks for functions
 print(call(doubled.address, 21, written), written[0], helped, hits)
 """
 
 
-def test_a_separate_kernel_is_compiled_by_another_process_once(tmp_path: Path) -> None:
+@BOTH_WAYS
+def test_a_separate_kernel_is_compiled_by_another_process_once(
+    tmp_path: Path, documented: str
+) -> None:
     """By this one if the other fails, or cannot be started, or is no Python."""
     (tmp_path / "apart.py").write_text(APART)
     (tmp_path / "caller.py").write_text(APART_CALLER)
@@ -302,7 +308,7 @@ def test_a_separate_kernel_is_compiled_by_another_process_once(tmp_path: Path) -
         told = subprocess.run(
             [sys.executable, "-B", "caller.py", *executable],
             cwd=tmp_path,
-            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / cache)},
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / cache), SWITCH: documented},
             capture_output=True,
             text=True,
             check=True,
@@ -366,6 +372,7 @@ def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:
     assert memory.solver.solvers[0] == try_solvers.address[0] != 0
 
 
+@pytest.mark.skipif(BY_DOCUMENTED_NAMES, reason="Numba counts references there")
 def test_a_kernel_that_returns_an_array_is_refused() -> None:
     """Nobody would count its reference, and the caller would free its own array twice."""
 

@@ -33,9 +33,9 @@ np.linalg.solve(np.eye(2), np.ones(2))
 print(json.dumps({
     "numba": kernel.targetctx.codegen().magic_tuple()[1:],
     "assembly": "".join(kernel.inspect_asm().values()),
-    "straight line": machine_code._processor(),
+    "straight line": machine_code.processor(),
     "file": machine_code._name(b"program"),
-    "key": machine_code._key(b"program", machine_code.addresses).hex(),
+    "key": machine_code._key(b"program", "").hex(),
     "numpy": np.show_config(mode="dicts")["SIMD Extensions"].get("found", []),
 }))
 """

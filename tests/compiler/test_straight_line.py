@@ -15,7 +15,8 @@ from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike.compiler import machine_code, trigonometry
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.straight_line import Recording, add_function, play
+from heelstrike.compiler.recording import Program, Recording
+from heelstrike.compiler.straight_line import add_function, play
 from heelstrike.compiler.tape import Tape, Value
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs, usual_points
@@ -105,7 +106,7 @@ def test_sine_and_cosine_to_the_last_digits(fused: bool, monkeypatch: pytest.Mon
     for value, place in zip(values, function.args[1:], strict=True):
         builder.store(value, place, align=8)
     builder.ret_void()
-    (address,) = machine_code.addresses(["both"], b"trigonometry %d" % fused, lambda: module)
+    (address,) = machine_code.addresses(["both"], b"trigonometry %d" % fused, "", lambda: module)
 
     rng = np.random.default_rng(0)
     quarters = np.arange(-400, 400) * (np.pi / 4.0)
@@ -132,10 +133,10 @@ def test_a_tape_folds_zeros_and_ones_and_does_nothing_twice() -> None:
     assert a + 0.0 is a
     assert 1.0 * a is a
     product = a * b
-    count = len(tape.operations)
+    count = len(tape.values)
     assert isinstance(b * a, Value)
     assert (b * a).place == product.place
-    assert len(tape.operations) == count
+    assert len(tape.values) == count
 
 
 def test_a_tape_tells_a_number_from_the_place_of_a_value() -> None:
@@ -156,8 +157,8 @@ def exchange(x: np.ndarray, y: np.ndarray) -> None:
 def test_everything_is_read_before_anything_is_written() -> None:
     x, y = np.array([1.0, 2.0]), np.array([3.0])
     module = ir.Module("exchange")
-    add_function(module, Recording(exchange, {"x": x, "y": y}))
-    (address,) = machine_code.addresses(["exchange"], b"test of exchange", lambda: module)
+    add_function(module, Recording(Program(exchange, {"x": x, "y": y})))
+    (address,) = machine_code.addresses(["exchange"], b"test of exchange", "", lambda: module)
     called(address, x, y)
     assert (x.tolist(), y.tolist()) == ([2.0, 3.0], [1.0])
 
@@ -186,7 +187,7 @@ def test_threads_that_ask_at_once_get_one_engine(
 
     with ThreadPoolExecutor(2) as pool:
         first, second = pool.map(
-            lambda _: machine_code.addresses(["constant"], b"test of threads", write), range(2)
+            lambda _: machine_code.addresses(["constant"], b"test of threads", "", write), range(2)
         )
     assert first == second
     assert len(written) == 1
@@ -197,7 +198,7 @@ def test_code_is_kept_for_the_next_process(monkeypatch: pytest.MonkeyPatch, tmp_
 
     def loaded(described: bytes, number: float) -> float:
         machine_code._loaded.clear()
-        (address,) = machine_code.addresses(["constant"], described, lambda: constant(number))
+        (address,) = machine_code.addresses(["constant"], described, "", lambda: constant(number))
         result = np.zeros(1)
         called(address, result)
         return float(result[0])

@@ -30,7 +30,7 @@ WALLS = np.kron([[1.0, -1.0], [-1.0, 1.0]], np.diag([1.0, 0.0]))
 class Verdict:
     complementarity: float
     cone: float
-    penetration: float
+    non_penetration: float
     worst: float
     rounding: float
     velocity: np.ndarray
@@ -66,20 +66,20 @@ class TestWrongAnswers:
     def test_the_right_answer(self) -> None:
         right = verdict(BLOCK, [-1.0, 0.2], [0.5], [2.0, -0.4])
         assert right.worst == right.rounding < 1e-14
-        assert right.complementarity == right.cone == right.penetration == 0.0
+        assert right.complementarity == right.cone == right.non_penetration == 0.0
 
     def test_nothing_done(self) -> None:
-        assert verdict(BLOCK, [-1.0, 0.0], [0.5], [0.0, 0.0]).penetration == pytest.approx(1.0)
+        assert verdict(BLOCK, [-1.0, 0.0], [0.5], [0.0, 0.0]).non_penetration == pytest.approx(1.0)
 
     def test_pushed_too_little(self) -> None:
         wrong = verdict(BLOCK, [-1.0, 0.0], [0.5], [1.9, 0.0])
-        assert wrong.penetration == pytest.approx(0.05)
+        assert wrong.non_penetration == pytest.approx(0.05)
         assert wrong.complementarity == wrong.cone == 0.0
 
     def test_pushed_away(self) -> None:
         wrong = verdict(BLOCK, [-1.0, 0.0], [0.5], [2.2, 0.0])
         assert wrong.complementarity == pytest.approx(0.1)
-        assert wrong.cone == wrong.penetration == 0.0
+        assert wrong.cone == wrong.non_penetration == 0.0
 
     def test_the_ground_pulls(self) -> None:
         wrong = verdict(BLOCK, [1.0, 0.0], [0.5], [-2.0, 0.0])
@@ -90,7 +90,7 @@ class TestWrongAnswers:
         """0.5 · 2 N s are to be had, 1.2 are taken: an excess of 0.2 N s in units of 2 N s."""
         wrong = verdict(BLOCK, [-1.0, side * 0.6], [0.5], [2.0, -side * 1.2])
         assert wrong.cone == pytest.approx(0.1)
-        assert wrong.complementarity == wrong.penetration == 0.0
+        assert wrong.complementarity == wrong.non_penetration == 0.0
 
     @pytest.mark.parametrize("side", [1.0, -1.0])
     def test_slips_although_the_cone_could_hold_it(self, side: float) -> None:
@@ -122,7 +122,7 @@ class TestWrongAnswers:
         assert not verdict(4.0 * BLOCK, [-1.0, 0.0], [0.5], impulse).worst <= 1e-9
 
     def test_what_cannot_move_must_not_be_asked_to(self) -> None:
-        assert verdict(np.zeros((2, 2)), [-1e-12, 0.0], [0.5], [0.0, 0.0]).penetration == 1.0
+        assert verdict(np.zeros((2, 2)), [-1e-12, 0.0], [0.5], [0.0, 0.0]).non_penetration == 1.0
         assert verdict(np.zeros((2, 2)), [1e-12, 0.0], [0.5], [0.0, 0.0]).worst < 1e-15
         assert verdict(np.zeros((2, 2)), [1.0, 0.0], [0.5], [1e-9, 0.0]).complementarity == 1.0
 
@@ -139,9 +139,9 @@ class TestWrongAnswers:
     def test_floor(self) -> None:
         """With a floor of 1e-3 √kg m/s, rows count in units of √0.5 · 1e-3 m/s."""
         unit = np.sqrt(0.5) * 1e-3
-        assert verdict(BLOCK, [-1e-6, 0.0], [0.5], [0.0, 0.0]).penetration == pytest.approx(1.0)
+        assert verdict(BLOCK, [-1e-6, 0.0], [0.5], [0.0, 0.0]).non_penetration == pytest.approx(1.0)
         wrong = verdict(BLOCK, [-1e-6, 0.0], [0.5], [0.0, 0.0], floor=1e-3)
-        assert wrong.penetration == pytest.approx(1e-6 / unit)
+        assert wrong.non_penetration == pytest.approx(1e-6 / unit)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
@@ -167,9 +167,9 @@ class TestGeneralMatrices:
         """w = (−3, 0), and both rows weigh 4: β = 3/2, so that the first misses by one unit."""
         M = np.kron([[1.0, 4.0], [0.0, 1.0]], np.diag([1.0, 0.0]))
         wrong = verdict(M, [-3.0, 0.0, 0.0, 0.0], [0.0, 0.0], np.zeros(4), skewed=True)
-        assert wrong.penetration == pytest.approx(1.0)
+        assert wrong.non_penetration == pytest.approx(1.0)
         wrong = verdict(M, [-3.0, 0.0, 6.0, 0.0], [0.0, 0.0], np.zeros(4), skewed=True)
-        assert wrong.penetration == pytest.approx(0.5)
+        assert wrong.non_penetration == pytest.approx(0.5)
 
     def test_numbers_whose_products_overflow(self) -> None:
         M = [[1e305, -1e305], [-1e305, 1e305]]
@@ -197,7 +197,7 @@ def test_floor_of_a_solve() -> None:
     assert not solve_contact(WALLS, free, 0.0).certificate.valid
     solution = solve_contact(WALLS, free, 0.0, floor=1e-2)
     assert solution.certificate.valid
-    assert solution.certificate.penetration == pytest.approx(1e-10, rel=1e-6)
+    assert solution.certificate.non_penetration == pytest.approx(1e-10, rel=1e-6)
     assert not solve_contact(WALLS, [-1e-2, 0.0, -1e-2, 0.0], 0.0, floor=1e-2).certificate.valid
 
 
@@ -208,13 +208,13 @@ class TestHugeImpulses:
     def test_do_not_prove_themselves(self, size: float) -> None:
         """One wall still closes in at 0.2 m/s, however hard both push."""
         wrong = verdict(WALLS, [-1.0, 0, -0.2, 0], [0.0, 0.0], [size, 0.0, size, 0.0])
-        assert wrong.penetration == pytest.approx(1.0)
+        assert wrong.non_penetration == pytest.approx(1.0)
 
     @pytest.mark.parametrize("size", [1e9, 1e12, 1e15])
     def test_are_summed_without_rounding(self, size: float) -> None:
         """A velocity of 1 m/s left over from 1e15 is still seen, and known to 1e-12."""
         right = verdict(WALLS, [-1.0, 0, 1.0, 0], [0.0, 0.0], [size + 1.0, 0.0, size, 0.0])
-        assert right.penetration == right.cone == right.complementarity == 0.0
+        assert right.non_penetration == right.cone == right.complementarity == 0.0
         assert right.rounding < 1e-12
         assert right.velocity.tolist() == [0.0, 0.0, 0.0, 0.0]
 
@@ -279,7 +279,7 @@ def test_rescaled_rows_are_the_same_problem(seed: int, stretch: int) -> None:
     two = verdict(
         scale[:, None] * problem.delassus * scale, scale * problem.free, friction, impulse / scale
     )
-    for name in ("complementarity", "cone", "penetration"):
+    for name in ("complementarity", "cone", "non_penetration"):
         assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-9, abs=1e-13)
 
 

@@ -23,7 +23,7 @@ from heelstrike.sim import Contacts
 
 def nothing_touches() -> Contacts:
     return Contacts.allocate(
-        nc=4, axes=2, rows=2, normal=np.tile([0.0, 1.0], (4, 1)), gap=np.ones(4)
+        nc=4, axes=2, components=2, normal=np.tile([0.0, 1.0], (4, 1)), gap=np.ones(4)
     )
 
 
@@ -340,7 +340,7 @@ def test_a_copy_is_the_same_law(clone: Callable[[Any], Any]) -> None:
     """For another process, or to be changed: with the machine code of where it is."""
     robot, gait = walking.bravo7(), walking.gait()
     law = hs.ComputedTorque(robot, gait)
-    contacts = Contacts.allocate(nc=robot.nc, axes=2, rows=2)
+    contacts = Contacts.allocate(nc=robot.nc, axes=2, components=2)
     state = gait.initial_state
     torque = law.torque(0.0, state, contacts)
     np.testing.assert_array_equal(clone(law).torque(0.0, state, contacts), torque)

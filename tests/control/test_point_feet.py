@@ -23,7 +23,7 @@ def rabbit() -> hs.Robot:
 
 
 @cache
-def gait() -> hs.PiecewiseGait:
+def gait() -> hs.Gait:
     return hs.optimize_gait(
         rabbit(), step_length=0.21, step_duration=0.58, clearance=0.02, friction=0.6, starts=1
     )

@@ -14,7 +14,7 @@ import heelstrike as hs
 from heelstrike.analysis.summary import Summary
 from heelstrike.errors import GaitError
 from heelstrike.experiments.walk import design, typical_step, walk, why_unstable
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 
 FLAT = ("human7", "geyer7", "spring_flamingo", "walker2d")
 POINTS = ("rabbit", "rabbit_optimtraj")

@@ -18,6 +18,7 @@ from stored_files import SAVED
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
+from heelstrike.gait import Footing
 
 
 @pytest.fixture
@@ -34,12 +35,15 @@ def test_round_trip_keeps_every_digit(gait: hs.Gait, bravo7: hs.Robot, saved: Pa
         if isinstance(there, hs.State):
             np.testing.assert_array_equal(there.q, here.q)
             np.testing.assert_array_equal(there.v, here.v)
+        elif field.name == "phases":
+            assert [phase.contacts for phase in there] == [phase.contacts for phase in here]
         elif isinstance(there, np.ndarray):
             assert there.dtype == here.dtype
             np.testing.assert_array_equal(there, here)
         else:
             assert there == here
     np.testing.assert_array_equal(loaded.coefficients, gait.coefficients)
+    np.testing.assert_array_equal(loaded.breakpoints, gait.breakpoints)
 
 
 def test_saving_again_gives_the_same_file(saved: Path, tmp_path: Path) -> None:
@@ -51,10 +55,11 @@ def test_saving_again_gives_the_same_file(saved: Path, tmp_path: Path) -> None:
 def test_the_file_is_for_reading(gait: hs.Gait, saved: Path) -> None:
     data = json.loads(saved.read_text(encoding="utf-8"))
     assert data["format"] == "heelstrike gait"
-    assert data["version"] == 1
+    assert data["version"] == 2
     assert data["step_length_m"] == 0.3
     assert data["joints"] == list(gait.joint_names)
     assert len(data["initial_position"]) == 9
+    assert data["phases"][0]["contacts"] == {"0": "flat"}
     assert saved.stat().st_size < 5000
 
 
@@ -83,6 +88,12 @@ def delete(key: str) -> Callable[[dict[str, Any]], object]:
     return lambda data: data.pop(key)
 
 
+def in_phase(
+    spoil: Callable[[dict[str, Any]], object],
+) -> Callable[[dict[str, Any]], object]:
+    return lambda data: spoil(data["phases"][0])
+
+
 def put(key: str, value: Any) -> Callable[[dict[str, Any]], object]:
     return lambda data: data.update({key: value})
 
@@ -92,25 +103,35 @@ def put(key: str, value: Any) -> Callable[[dict[str, Any]], object]:
     [
         (delete("format"), "not a gait file"),
         (put("format", "heelstrike run"), "not a gait file"),
-        (put("version", 2), "newer heelstrike"),
+        (put("version", 3), "newer heelstrike"),
+        (put("version", [2]), "newer heelstrike"),
         (put("version", True), "newer heelstrike"),
         (delete("cost_N2m2s"), '"cost_N2m2s" is missing'),
-        (delete("start_position_rad"), '"start_position_rad" is missing'),
+        (delete("phases"), '"phases" is missing'),
+        (put("phases", {}), '"phases" must be a list'),
+        (put("phases", []), "one phase or more"),
+        (put("phases", [0.0]), "must stand where 0.0 does"),
+        (in_phase(delete("breakpoints_s")), '"breakpoints_s" is missing'),
+        (in_phase(put("contacts", [0])), '"contacts" must be an object'),
+        (in_phase(put("contacts", {"7": "flat"})), '"contacts" must name feet'),
+        (in_phase(put("contacts", {})), '"contacts" must name feet'),
+        (in_phase(put("contacts", {"0": "toe"})), '"0" must be one of "flat", "point"'),
+        (in_phase(put("breakpoints_s", [0.0, 1e300])), "which no gait has"),
+        (in_phase(put("breakpoints_s", [0.0, 0.0])), "must rise from 0"),
+        (in_phase(put("joint_pieces", [[[0.0] * 5] * 4])), "of 6 joints for every piece"),
+        (in_phase(put("joint_pieces", [[["0"] * 6] * 4])), "must be a number"),
         (delete("margins"), '"margins" is missing'),
         (put("margins", []), '"margins" must be an object'),
         (put("margins", {}), "is missing"),
-        (put("start_position_rad", [0.0] * 5), "a list of 6 numbers"),
-        (put("start_position_rad", [[0.0] * 6]), "a list of 6 numbers"),
-        (put("start_position_rad", ["0"] * 6), "must be a number"),
-        (put("start_position_rad", [True] * 6), "must be a number"),
-        (put("start_position_rad", 0.0), "a list of 6 numbers"),
+        (put("mirror_offset_rad", [0.0] * 5), "a list of 6 numbers"),
+        (put("mirror_offset_rad", [[0.0] * 6]), "must be a list of 6 numbers"),
+        (put("mirror_offset_rad", ["0"] * 6), "must be a number"),
+        (put("mirror_offset_rad", [True] * 6), "must be a number"),
+        (put("mirror_offset_rad", 0.0), "a list of 6 numbers"),
         (put("step_length_m", None), "must be a number"),
         (put("step_length_m", -0.3), "not negative"),
-        (put("step_duration_s", 0), "must be positive"),
-        (put("step_duration_s", 1e300), "which no gait has"),
-        (put("step_duration_s", 10**400), "which no gait has"),
-        (put("stance_foot", 0.5), "whole numbers"),
-        (put("stance_foot", 7), "stance_foot must be 0 or 1"),
+        (put("step_length_m", 1e300), "which no gait has"),
+        (put("step_length_m", 10**400), "which no gait has"),
         (put("joints", []), "different names"),
         (put("joints", ["a", "a"]), "different names"),
         (put("joints", ["a", 1]), "different names"),
@@ -218,18 +239,63 @@ def test_damaged_files_are_refused_in_words_or_still_gaits(
 def test_files_of_version_0_1_still_load(bravo7: hs.Robot, tmp_path: Path) -> None:
     gait = hs.load_gait(SAVED / "gait.json", bravo7)
     assert (gait.step_length, gait.step_duration) == (0.3, 0.7)
+    before = json.loads((SAVED / "gait.json").read_text(encoding="utf-8"))
+    for name, unit in (("position", "rad"), ("velocity", "rad_per_s")):
+        for end in ("start", "end"):
+            found = getattr(gait, f"{end}_{name}")
+            np.testing.assert_allclose(found, before[f"{end}_{name}_{unit}"], atol=1e-14)
+    assert gait.phases[0].contacts == {before["stance_foot"]: Footing.FLAT}
     gait.save(tmp_path / "again.json")
-    again, before = (
-        json.loads(path.read_text(encoding="utf-8"))
-        for path in (tmp_path / "again.json", SAVED / "gait.json")
-    )
-    del again["sha256"]  # which files did not have then
-    assert again == before
+    again = json.loads((tmp_path / "again.json").read_text(encoding="utf-8"))
+    same = before.keys() & again.keys() - {"version"}
+    assert len(same) == 16
+    assert {key: again[key] for key in same} == {key: before[key] for key in same}
+
+
+def test_files_of_version_1_with_pieces_still_load(saved: Path) -> None:
+    """What point feet had: pieces beside the cubics' ends, which say the same once more."""
+    data = json.loads((SAVED / "gait.json").read_text(encoding="utf-8"))
+    draw = np.random.default_rng(2)
+    pieces, pitch = draw.normal(size=(3, 6, 6)), draw.normal(size=(3, 6))
+    data |= {"breakpoints_s": [0.0, 0.2, 0.5, 0.7], "joint_pieces": pieces.tolist()}
+    saved.write_text(json.dumps(data | {"pitch_pieces": pitch.tolist()}), encoding="utf-8")
+    gait = hs.load_gait(saved)
+    assert gait.phases[0].contacts == {0: Footing.POINT}
+    np.testing.assert_array_equal(gait.pieces, pieces)
+    np.testing.assert_array_equal(gait.breakpoints, [0.0, 0.2, 0.5, 0.7])
+    np.testing.assert_array_equal(gait.pitch([0.0, 0.2, 0.5]), pitch[:, 0])
+    saved.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(GaitError, match='"pitch_pieces" is missing'):
+        hs.load_gait(saved)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (delete("start_position_rad"), '"start_position_rad" is missing'),
+        (put("end_velocity_rad_per_s", [0.0] * 5), "a list of 6 numbers"),
+        (put("step_duration_s", 0), "must be positive"),
+        (put("step_duration_s", 1e300), "which no gait has"),
+        (put("stance_foot", 0.5), "whole numbers"),
+        (put("stance_foot", 7), "stance_foot must be 0 or 1"),
+    ],
+)
+def test_spoilt_entries_of_version_1_are_named(
+    tmp_path: Path, spoil: Callable[[dict[str, Any]], object], message: str
+) -> None:
+    data = json.loads((SAVED / "gait.json").read_text(encoding="utf-8"))
+    spoil(data)
+    path = tmp_path / "gait.json"
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(GaitError) as caught:
+        hs.load_gait(path)
+    assert str(path) in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_one_digit_that_is_another(saved: Path) -> None:
     text = saved.read_text(encoding="utf-8")
-    place = text.index("start_velocity_rad_per_s") + 30
+    place = text.index("joint_pieces") + 30
     digit = next(i for i in range(place, len(text)) if text[i] in "12345678")
     saved.write_text(f"{text[:digit]}9{text[digit + 1 :]}", encoding="utf-8")
     with pytest.raises(GaitError, match=r"gait\.json: damaged: .* remove the entry \"sha256\""):

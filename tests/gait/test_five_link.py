@@ -17,8 +17,8 @@ import heelstrike as hs
 
 HUMAN_KNEES = {"right_knee": (0.0, 2.5)}
 
-# Of N²m²s, by `benchmarks/five_link.py`: what 24, 48 and 96 intervals agree on.
-COST = 469.6501
+# Of N²m²s, by `benchmarks/gaits.py meshes`: what 24, 48 and 96 intervals agree on.
+COST = 469.65014
 COST_OF_FREE_KNEES = 469.50198
 
 
@@ -46,6 +46,8 @@ def test_cost_converges_under_refinement() -> None:
     coarse, fine = five_link_gait(6, HUMAN_KNEES), five_link_gait(24, HUMAN_KNEES)
     assert abs(fine.cost - COST) <= 0.1 * abs(coarse.cost - COST)
     assert fine.cost == pytest.approx(COST, rel=1e-6)
+    # A limit is reached, not only approached: the coarse mesh loses nothing at a knee's stop.
+    assert coarse.cost == pytest.approx(COST, rel=2e-6)
     for gait in (coarse, fine):
         assert least_knee(gait) >= 0.0
         # None of the limits that OptimTraj does not know is reached; nor are its other bounds.
@@ -56,6 +58,13 @@ def test_cost_converges_under_refinement() -> None:
         assert gait.margins.impulse_friction_use < 0.5
         assert gait.margins.lift_velocity > 0.0
         assert gait.margins.landing_velocity < 0.0
+
+
+@pytest.mark.slow
+def test_a_fine_mesh_loses_no_digits() -> None:
+    """Pieces of 7 ms: accelerations that were differences of positions would be too rough."""
+    gait = five_link_gait(96, HUMAN_KNEES)
+    assert gait.cost == pytest.approx(COST, rel=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
+from heelstrike.gait import Footing
 from heelstrike.gait.gait import fingerprint
 
 
@@ -80,12 +81,9 @@ def test_fingerprint_tells_robots_apart(bravo7: hs.Robot, spring_flamingo: hs.Ro
     "change",
     [
         {"step_length": 0.0},
-        {"step_duration": -0.7},
         {"friction": np.nan},
         {"cost": np.inf},
-        {"stance_foot": 2},
-        {"start_position": np.zeros(5)},
-        {"end_velocity": np.full(6, np.nan)},
+        {"phases": ()},
         {"mirror_joint": np.zeros(6, dtype=int)},
         {"mirror_sign": np.full(6, 0.5)},
         {"touchdown_impulse": np.zeros(2)},
@@ -96,6 +94,59 @@ def test_fingerprint_tells_robots_apart(bravo7: hs.Robot, spring_flamingo: hs.Ro
 def test_contradictory_numbers_are_refused(gait: hs.Gait, change: dict[str, Any]) -> None:
     with pytest.raises(GaitError, match="gait: "):
         dataclasses.replace(gait, **change)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"contacts": {2: Footing.FLAT}}, "stance_foot must be 0 or 1"),
+        ({"contacts": {}}, "at least one foot"),
+        ({"breakpoints": [0.0]}, "breakpoints need pieces"),
+        ({"breakpoints": [[0.0, 0.7]]}, "breakpoints need pieces"),
+        ({"pieces": np.zeros((1, 0, 6))}, "breakpoints need pieces"),
+        ({"breakpoints": [0.0, -0.7]}, "must rise from 0"),
+        ({"breakpoints": [0.1, 0.7]}, "must rise from 0"),
+        ({"breakpoints": [0.0, 0.3, 0.7]}, "breakpoints need pieces"),
+        ({"pieces": np.zeros((1, 4, 5))}, "pieces of 6 joints"),
+        ({"pieces": np.zeros((4, 6))}, "breakpoints need pieces"),
+        ({"pieces": np.full((1, 4, 6), np.nan)}, "pieces must hold finite numbers"),
+        ({"pitch_pieces": np.zeros((1, 3))}, "pitch_pieces must have shape"),
+    ],
+)
+def test_contradictory_phases_are_refused(gait: hs.Gait, change: dict[str, Any], said: str) -> None:
+    with pytest.raises(GaitError, match=f"gait: .*{said}"):
+        dataclasses.replace(gait, phases=(dataclasses.replace(gait.phases[0], **change),))
+
+
+def test_a_step_of_several_phases(gait: hs.Gait) -> None:
+    """Cut in two where the same joints go on: the same walk, and one with more of it to tell."""
+    (whole,), cut = gait.phases, 0.3
+    later = np.array([[1.0, cut, cut**2, cut**3], [0.0, 1.0, 2.0 * cut, 3.0 * cut**2]])
+    later = np.vstack([later, [[0.0, 0.0, 1.0, 3.0 * cut], [0.0, 0.0, 0.0, 1.0]]])
+    second = np.zeros((1, 6, 6))  # of degree 5, of which it needs three
+    second[0, :4] = later @ whole.pieces[0]
+    parts = (
+        dataclasses.replace(whole, breakpoints=[0.0, cut]),
+        dataclasses.replace(whole, breakpoints=[0.0, 0.7 - cut], pieces=second),
+    )
+    other = dataclasses.replace(gait, phases=parts)
+    assert other.step_duration == pytest.approx(0.7, rel=1e-15)
+    np.testing.assert_allclose(other.breakpoints, [0.0, cut, 0.7], atol=1e-15)
+    times = np.linspace(0.01, 1.39, 47)
+    for name in ("position", "velocity", "acceleration"):
+        expected = getattr(gait, name)(times)
+        np.testing.assert_allclose(getattr(other, name)(times), expected, atol=1e-10)
+    assert not other.point_feet
+    with pytest.raises(GaitError, match="no single set of coefficients"):
+        _ = other.coefficients
+    tiptoe = dataclasses.replace(parts[1], contacts={0: Footing.POINT})
+    assert not dataclasses.replace(gait, phases=(parts[0], tiptoe)).point_feet
+    assert dataclasses.replace(gait, phases=(tiptoe,)).point_feet
+
+
+def test_the_pitch_is_told_where_it_is_free(gait: hs.Gait) -> None:
+    with pytest.raises(GaitError, match="follows from the joints"):
+        gait.pitch(0.1)
 
 
 def test_repr_tells_the_step_and_its_cost(gait: hs.Gait) -> None:

@@ -14,7 +14,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.gait.ipopt import _Watch
+from heelstrike.gait.program import _Watch
 
 REQUESTS: dict[str, dict[str, Any]] = {
     "bravo7": {"step_length": 0.30, "step_duration": 0.70},

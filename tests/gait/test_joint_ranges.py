@@ -10,7 +10,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.errors import GaitError
-from heelstrike.gait.joint_ranges import ranges_kept
+from heelstrike.gait.request import ranges_kept
 
 STEP = {"step_length": 0.3, "step_duration": 0.7, "starts": 1}
 

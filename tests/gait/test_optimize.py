@@ -24,7 +24,6 @@ import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait import ClearanceProfile
-from heelstrike.gait.program import lobatto
 from heelstrike.robot import read_mjcf
 
 # Length (m), duration (s) and cost (N²m²s) of gaits found for bravo7 by others before
@@ -322,16 +321,6 @@ def test_a_profile_that_no_gait_keeps_above_gives_way_to_the_smooth_one() -> Non
     ):
         gait, _ = designed("spring_flamingo", **GAITS[name])
         assert gait.clearance_profile is profile
-
-
-def test_quadrature_is_exact_for_polynomials_of_its_degree() -> None:
-    # Gauss-Lobatto with n + 1 nodes integrates degree 2n - 1 exactly, not degree 2n.
-    nodes, weights = lobatto(6)
-    assert nodes[0] == 0.0
-    assert nodes[-1] == 1.0
-    for degree in range(12):
-        assert weights @ nodes**degree == pytest.approx(1.0 / (degree + 1), rel=1e-13)
-    assert abs(weights @ nodes**12 - 1.0 / 13.0) > 1e-9
 
 
 # One profile alone: trying two takes twice as long to find that there is no gait.

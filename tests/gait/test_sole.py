@@ -61,16 +61,16 @@ def test_points_above_the_sole_do_not_count(bravo7: hs.Robot) -> None:
     assert found.contacts == (0, 1, 2, 3, 4)
 
 
-@pytest.mark.parametrize(
-    ("position", "message"),
-    [
-        ([[0.0, -0.07]], "needs a heel and a toe"),
-        ([[0.0, -0.07], [0.0, -0.07]], "cannot rest flat"),
-    ],
-)
-def test_a_foot_without_extent_is_refused(
-    bravo7: hs.Robot, position: list[list[float]], message: str
-) -> None:
-    robot = with_contacts(bravo7, position, [0.0] * len(position))
-    with pytest.raises(GaitError, match=message):
+def test_a_single_disc_is_a_point_that_bears_no_moment(bravo7: hs.Robot) -> None:
+    found = sole(with_contacts(bravo7, [[0.01, -0.05]], [0.02]), 0)
+    assert (found.flat, found.held, found.half_length) == (False, 2, 0.0)
+    np.testing.assert_array_equal(found.point, [0.01, -0.05])
+    assert found.radius == 0.02
+    flat = sole(bravo7, 0)
+    assert (flat.flat, flat.held, flat.radius) == (True, 3, 0.0)
+
+
+def test_a_foot_without_extent_is_refused(bravo7: hs.Robot) -> None:
+    robot = with_contacts(bravo7, [[0.0, -0.07], [0.0, -0.07]], [0.0, 0.0])
+    with pytest.raises(GaitError, match="cannot rest flat"):
         sole(robot, 0)

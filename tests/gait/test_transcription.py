@@ -11,7 +11,9 @@ import pytest
 from gait_motion import Instant, contact_heights, instant
 
 import heelstrike as hs
-from heelstrike.gait.request import Request, checked_request
+from heelstrike.gait.polynomials import Instants
+from heelstrike.gait.program import Program, first_instants
+from heelstrike.gait.request import Request
 from heelstrike.gait.transcription import Group, Transcription
 
 RADIUS = 0.02
@@ -37,14 +39,18 @@ def robot(request: pytest.FixtureRequest) -> hs.Robot:
 
 @pytest.fixture(scope="module")
 def asked(robot: hs.Robot) -> Request:
-    return checked_request(
-        robot, **STEP, friction=0.6, clearance=0.03, joint_speed_limit=7.0, **UNASKED
+    return Request(
+        robot=robot, **STEP, friction=0.6, clearance=0.03, joint_speed_limit=7.0, **UNASKED
     )
 
 
 @pytest.fixture(scope="module")
-def transcription(asked: Request) -> Transcription:
-    return Transcription(asked)
+def program(asked: Request) -> Program:
+    return Program(Transcription(asked), asked.profiles[0], *first_instants(asked))
+
+
+def at_phase(phase: float) -> Instants:
+    return Instants(1, np.array([0]), np.array([phase]), np.array([1.0]))
 
 
 def a_step(seed: int) -> tuple[np.ndarray, SimpleNamespace]:
@@ -65,7 +71,9 @@ def a_step(seed: int) -> tuple[np.ndarray, SimpleNamespace]:
     gait = SimpleNamespace(
         stance_foot=0, position=motion(0), velocity=motion(1), acceleration=motion(2)
     )
-    return np.concatenate([end, end_velocity, start_velocity, [duration, 0.25]]), gait
+    # The acceleration 2 a2 + 6 a3 t in parts that are 1 and that go from -1 to 1.
+    mean, rise = 2.0 * cubic[2] + 3.0 * duration * cubic[3], 3.0 * duration * cubic[3]
+    return np.concatenate([end, start_velocity, mean, rise, [duration, 0.25]]), gait
 
 
 def path_values(
@@ -97,15 +105,16 @@ def path_values(
 
 @pytest.mark.parametrize("seed", range(3))
 def test_constraints_along_the_path(
-    robot: hs.Robot, asked: Request, transcription: Transcription, seed: int
+    robot: hs.Robot, asked: Request, program: Program, seed: int
 ) -> None:
     unknowns, gait = a_step(seed)
     phase = 0.3 + 0.1 * seed
     now = instant(robot, gait, phase * 0.6)  # type: ignore[arg-type]
-    cost, values = (np.array(part).ravel() for part in transcription.path.value(unknowns, phase))
-    assert cost[0] == pytest.approx(0.6 * now.torque @ now.torque, rel=1e-9)
+    motion = program.motion(unknowns, at_phase(phase))
+    effort, values = (np.array(part).ravel() for part in program.transcription.path(*motion))
+    assert effort[0] == pytest.approx(now.torque @ now.torque, rel=1e-9)
     expected = path_values(robot, asked, now)
-    rows = transcription.path.rows
+    rows = program.transcription.path_rows
     assert {(row.group, row.subject) for row in rows} == expected.keys()
     assert len(rows) == len(expected)
     for row, value in zip(rows, values, strict=True):
@@ -116,21 +125,39 @@ def test_constraints_along_the_path(
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_motion_that_is_reported(robot: hs.Robot, transcription: Transcription, seed: int) -> None:
+def test_motion_that_is_reported(robot: hs.Robot, program: Program, seed: int) -> None:
     unknowns, gait = a_step(seed)
     now = instant(robot, gait, 0.4 * 0.6)  # type: ignore[arg-type]
-    wrench, torque, heights, joints = (
-        np.array(part).ravel() for part in transcription.motion(unknowns, 0.4)
-    )
+    transcription, motion = program.transcription, program.motion(unknowns, at_phase(0.4))
+    wrench, torque, heights = (np.array(part).ravel() for part in transcription.motion(*motion))
     scale = np.abs(now.wrench).max()
     np.testing.assert_allclose(wrench, now.wrench, atol=1e-9 * scale)
     np.testing.assert_allclose(torque, now.torque, atol=1e-9 * scale)
     np.testing.assert_allclose(heights, contact_heights(robot, now.q, 1), atol=1e-12)
-    np.testing.assert_allclose(joints, now.q[3:], atol=1e-12)
+    np.testing.assert_allclose(motion[0].ravel(), now.q[3:], atol=1e-12)
     start = instant(robot, gait, 0.0)  # type: ignore[arg-type]
-    q, v = (np.array(part).ravel() for part in transcription.start(unknowns))
+    end, _, start_velocity, _, _ = program.at_touchdown(unknowns)
+    q, v = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
     np.testing.assert_allclose(q, start.q, atol=1e-12)
     np.testing.assert_allclose(v, start.v, atol=1e-12)
+
+
+def test_the_kind_of_foot_decides_about_the_moment_of_the_ground() -> None:
+    """It keeps inside a sole; on a point there is none, of which one equation is left."""
+    rows = {}
+    for name in ("bravo7", "rabbit"):
+        request = Request(
+            robot=hs.load_robot(name), **STEP, friction=0.6, clearance=0.03,
+            joint_speed_limit=np.inf, **UNASKED
+        )  # fmt: skip
+        transcription = Transcription(request)
+        rows[name] = [*transcription.path_rows, *transcription.touchdown_rows]
+    flat, point = ({row.group for row in rows[name]} for name in ("bravo7", "rabbit"))
+    sole = {Group.ZERO_MOMENT_POINT, Group.IMPULSE_CENTER, Group.TOUCHDOWN_ANGLE}
+    assert flat - point == sole
+    assert point - flat == {Group.ANKLE}
+    (ankle,) = (row for row in rows["rabbit"] if row.group is Group.ANKLE)
+    assert ankle.lower == ankle.upper == 0.0
 
 
 UNITS = {

@@ -6,11 +6,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
+from speed.scenarios import chain
 
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.contact.ground import Ground
-from heelstrike.experiments.benchmark.scenarios import chain
 from heelstrike.robot import Robot, load_robot, read_mjcf
 from heelstrike.sim import Scheme, TimeStepping, programs
 from heelstrike.sim.contact_geometry import (

@@ -18,6 +18,18 @@ def torque_cost(run: Run, *, start: float = -np.inf, end: float = np.inf) -> flo
     """∫ ΓᵀΓ dt over the rows from `start` to `end` (s), in N²m²s (paper eq. 40).
 
     Where torques are held from row to row, the sum is the integral.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    start, end : float
+        Rows from and up to these times (s); all by default.
+
+    Returns
+    -------
+    float
+        Cost in N²m²s.
     """
     held = np.diff(run.time)
     square = mean_over_intervals(run, run.torque**2).sum(axis=1)
@@ -29,6 +41,16 @@ def actuator_power(run: Run) -> Floats:
     """Mean mechanical power τ ω of every actuator from each row to the next, (nt − 1, nu), in W.
 
     The velocity is the mean of the two rows, which makes the work of an impulsive step exact.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    (nt - 1, nu) float
+        Mean power from each row to the next, in W.
     """
     speed = run.velocity[:, run.robot.model.actuator_joint]
     return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
@@ -64,6 +86,11 @@ def cost_of_transport(run: Run, *, motion: Motion | None = None) -> CostOfTransp
         The run.
     motion : Motion, optional
         Its motion, if already at hand.
+
+    Returns
+    -------
+    CostOfTransport
+        Energy a unit of weight and distance.
     """
     distance = distance_travelled(run, motion=motion)
     held = np.diff(run.time)[:, None]
@@ -79,7 +106,20 @@ def cost_of_transport(run: Run, *, motion: Motion | None = None) -> CostOfTransp
 
 
 def distance_travelled(run: Run, *, motion: Motion | None = None) -> float:
-    """How far the centre of mass moved along x over a run, in m; negative backwards."""
+    """How far the centre of mass moved along x over a run, in m; negative backwards.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    motion : Motion, optional
+        Its motion, if already at hand.
+
+    Returns
+    -------
+    float
+        Metres along x.
+    """
     if not len(run.time):
         return 0.0
     center = (run_motion(run) if motion is None else motion).center_of_mass

@@ -75,6 +75,16 @@ def energy_balance(run: Run) -> EnergyBalance:
     impact is exactly the change of kinetic energy. With ``record_every`` above 1 rows stand for
     the steps between them, and the balance is only as good as the sampling; that of an
     event-driven run is of second order in its `output_period`.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    EnergyBalance
+        Energy of each row and the work up to it.
     """
     robot, model = run.robot, run.robot.model
     held = np.diff(run.time)

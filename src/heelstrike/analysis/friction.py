@@ -42,7 +42,18 @@ class FrictionUse:
 
 
 def friction_use(run: Run) -> FrictionUse:
-    """Compute which share of the friction cone a run uses (paper eq. 9)."""
+    """Compute which share of the friction cone a run uses (paper eq. 9).
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    FrictionUse
+        Of each contact point, of each foot and of all, row by row.
+    """
     pressing = run.contact_force[..., 0]
     tangential = run.contact_force[..., 1]
     allowed = friction_coefficient(run) * pressing

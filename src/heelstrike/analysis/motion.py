@@ -125,5 +125,16 @@ def motion(
 
 
 def run_motion(run: Run) -> Motion:
-    """Follow the robot of a run through its rows; see :func:`motion`."""
+    """Follow the robot of a run through its rows; see :func:`motion`.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    Motion
+        Where its links and its centre of mass are in each row.
+    """
     return motion(run.robot, run.position, run.velocity, run.contact_point)

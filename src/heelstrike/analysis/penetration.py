@@ -12,5 +12,15 @@ def penetration(run: Run) -> NDArray[np.float64]:
     """Depth of every contact point below the ground in each row, (nt, nc), in m; zero above.
 
     ``run.certificates.penetration`` is the worst over all steps, recorded or not.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    (nt, nc) float
+        Metres.
     """
     return np.maximum(0.0, -run.gap)

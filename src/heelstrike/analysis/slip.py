@@ -19,6 +19,16 @@ def slip_distance(run: Run) -> Floats:
     steps in which the point pushes; in event-driven runs the mean of the two rows' velocities. It
     never decreases: sliding there and back counts twice. With ``record_every`` above 1, rows stand
     for the steps between them.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    (nt, nc) float
+        Metres.
     """
     speed = np.where(pushing(run), np.abs(run.slip_velocity), 0.0)
     slid = np.zeros_like(speed)
@@ -27,6 +37,17 @@ def slip_distance(run: Run) -> Floats:
 
 
 def max_slip(run: Run) -> float:
-    """Largest distance that any contact point slid over the whole run, in m."""
+    """Largest distance that any contact point slid over the whole run, in m.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    float
+        Metres.
+    """
     slid = slip_distance(run)
     return float(slid[-1].max()) if slid.size else 0.0

@@ -53,5 +53,16 @@ def sole(robot: Robot, foot: Foot) -> Sole:
 
 
 def soles(robot: Robot) -> tuple[Sole, ...]:
-    """Return the sole of every foot of a robot, in the order of ``robot.feet``."""
+    """Return the sole of every foot of a robot, in the order of ``robot.feet``.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    tuple of Sole
+        One a foot.
+    """
     return tuple(sole(robot, foot) for foot in robot.feet)

@@ -126,7 +126,18 @@ class Summary:
         return plain
 
     def to_json(self, *, indent: int | None = 2) -> str:
-        """Return the summary as JSON text."""
+        """Return the summary as JSON text.
+
+        Parameters
+        ----------
+        indent : int or None
+            Spaces of indentation; None for one line.
+
+        Returns
+        -------
+        str
+            What :meth:`to_dict` returns, as JSON.
+        """
         return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
 
     def __str__(self) -> str:
@@ -161,6 +172,11 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         The run.
     gait : Gait, optional
         The gait it followed, for the tracking error.
+
+    Returns
+    -------
+    Summary
+        Figures with units in their names.
 
     Raises
     ------

@@ -36,6 +36,16 @@ def single_support(run: Run) -> NDArray[np.bool_]:
 
     An impact at which the foot behind still pushes is not single support; the impact of a foot
     that takes over at once is.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    (nt,) bool
+        True in rows of single support.
     """
     feet = [list(foot.contacts) for foot in run.robot.feet]
     elsewhere = np.delete(pushing(run), [i for contacts in feet for i in contacts], axis=1)
@@ -66,7 +76,18 @@ class SupportPhase:
 
 
 def support_phases(run: Run) -> tuple[SupportPhase, ...]:
-    """Divide a run into phases between which the set of pushing feet changes."""
+    """Divide a run into phases between which the set of pushing feet changes.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    tuple of SupportPhase
+        In the order of time.
+    """
     feet = pushing_feet(run)
     if not len(feet):
         return ()
@@ -84,7 +105,18 @@ def support_phases(run: Run) -> tuple[SupportPhase, ...]:
 
 
 def double_support_fraction(run: Run) -> float:
-    """Share of the time in which two feet or more push; NaN for a run without duration."""
+    """Share of the time in which two feet or more push; NaN for a run without duration.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    float
+        Share, from 0 to 1.
+    """
     held = np.diff(run.time)
     if not held.sum() > 0.0:
         return float("nan")
@@ -118,6 +150,16 @@ def stances(run: Run) -> tuple[Stance, ...]:
     """List the stays of all feet on the ground in the order of their touchdowns.
 
     A foot that pushes in the first row touches down there, with no impulse.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    tuple of Stance
+        In the order of touchdown.
     """
     foot_of = {i: foot for foot, each in enumerate(run.robot.feet) for i in each.contacts}
     closed: dict[int, set[int]] = {foot: set() for foot in range(len(run.robot.feet))}
@@ -156,6 +198,16 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
 
     The contact the robot starts with is no step, nor is the first landing of a robot dropped from
     the air, nor a foot that lands again without the other one having landed in between.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    tuple of Stance
+        In the order of touchdown.
     """
     taken: list[Stance] = []
     last: set[int] = set()

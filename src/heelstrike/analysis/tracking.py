@@ -56,6 +56,18 @@ class ReferenceMotion:
 def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
     """Reconstruct the reference that a run followed, from its touchdowns (paper eq. 41).
 
+    Parameters
+    ----------
+    run : Run
+        The run.
+    gait : Gait
+        The gait it was to follow.
+
+    Returns
+    -------
+    ReferenceMotion
+        Positions and velocities that the joints were to have in each row.
+
     Raises
     ------
     GaitError
@@ -136,6 +148,18 @@ class TrackingError:
 
 def tracking_error(run: Run, gait: Gait) -> TrackingError:
     """Compare the joints of a run with the gait they were to follow (paper Figure 3).
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    gait : Gait
+        The gait it was to follow.
+
+    Returns
+    -------
+    TrackingError
+        Errors by row and joint, and the reference.
 
     Raises
     ------

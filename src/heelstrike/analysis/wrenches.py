@@ -26,6 +26,11 @@ def foot_wrenches(run: Run, *, motion: Motion | None = None) -> Floats:
         The run.
     motion : Motion, optional
         Its motion, if already at hand.
+
+    Returns
+    -------
+    (nt, nf, 3) float
+        Force along x and z, and moment about +y.
     """
     reference = sole_points(run, motion=motion)
     force = run.world_force

@@ -83,6 +83,11 @@ def zero_moment_point(run: Run, *, motion: Motion | None = None) -> ZeroMomentPo
         The run.
     motion : Motion, optional
         Its motion, if already at hand.
+
+    Returns
+    -------
+    ZeroMomentPoint
+        Of each foot and of the whole robot, row by row.
     """
     robot, rows = run.robot, len(run.time)
     reference = sole_points(run, motion=motion)
@@ -104,6 +109,16 @@ def zero_moment_point_limits(robot: Robot) -> tuple[float, float]:
     """Ends of the sole in the frame of the foot, heel and toe, in m; the tightest of all feet.
 
     For the paper's robot these are ∓ l_f / 2 = ∓0.1 m (eq. 45). NaN for a robot without feet.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    tuple of float
+        Heel and toe (m).
     """
     if not robot.feet:
         return float("nan"), float("nan")

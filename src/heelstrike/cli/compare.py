@@ -22,7 +22,7 @@ from heelstrike.cli.terminal import (
 )
 
 if TYPE_CHECKING:
-    from heelstrike.sim.engine import Method
+    from heelstrike.sim.method import Method
 
 
 class Way(StrEnum):

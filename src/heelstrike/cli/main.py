@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from heelstrike import __version__
-from heelstrike.cli.bench import bench
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
@@ -26,7 +25,6 @@ app.command()(walk)
 app.command()(paper)
 app.command()(compare)
 app.command()(robots)
-app.command()(bench)
 app.command()(inspect)
 
 

@@ -25,7 +25,7 @@ from heelstrike.cli.terminal import (
 if TYPE_CHECKING:
     from heelstrike.gait import Gait
     from heelstrike.robot import Robot
-    from heelstrike.sim.engine import Method as TimeMethod
+    from heelstrike.sim.method import Method as TimeMethod
 
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"

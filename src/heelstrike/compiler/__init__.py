@@ -1,1 +1,12 @@
-"""Kernels, bundles and straight-line code: the only room that knows Numba from inside."""
+"""How kernels become machine code: the only room that knows Numba and LLVM from inside.
+
+Its doors, which other rooms import from:
+
+- ``bundle``: arrays and numbers by name, which kernels receive by address;
+- ``compilation``: ``kernel``, ``dissolved_kernel``, and how they are compiled, or left alone;
+- ``separate_kernel``: kernels compiled apart, called by their address;
+- ``recording`` and ``straight_line``: kernels without loops; ``c_text``: the same in C;
+- ``plain_code``: the switch for instructions that every processor has.
+
+Nothing is imported here: ``plain_code`` comes before NumPy and Numba do.
+"""

@@ -16,7 +16,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, Literal, TypeVar, dataclass_transform
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -89,12 +89,11 @@ def part(kind: type[Bundle]) -> Any:
     return Member("part", kind)
 
 
-def extent(*, init: Literal[False] = False) -> Any:  # noqa: ARG001 - tells type checkers
+def extent() -> Any:
     """Declare an extent of the arrays of a bundle that is read by its name: ``bundle.nv``."""
     return Member("extent", int)
 
 
-@dataclass_transform(eq_default=False, field_specifiers=(array, cell, number, part, extent))
 class Bundle:
     """Base class of bundles; a subclass declares its members.
 

@@ -1,18 +1,21 @@
 """What a kernel is made of, as a fingerprint: machine code is good while that stays the same.
 
-Kernels are followed through what they name: the kernels they call, the constants they read, in
-whatever file those are. Their bytecode counts, their docstrings, comments and line numbers do not.
-Python that shapes machine code without being compiled itself, such as what records straight-line
-code, counts with the whole text of its file and with all that the file names.
+Functions and classes are followed through what they name: the kernels they call, the constants
+they read, in whatever file those are. Their bytecode counts; docstrings, comments, line numbers and
+whatever else stands in their files do not. Of a module, and of an object whose making nobody can
+follow, the syntax of its file counts, without docstrings.
 """
 
 from __future__ import annotations
 
+import ast
 import enum
+import functools
 import hashlib
 import os
 import sys
 import types
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -27,25 +30,16 @@ _BY_VERSION = {"numpy", "numba", "llvmlite"} | sys.stdlib_module_names
 
 _VERSIONS = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
+_METHOD = (types.FunctionType, classmethod, staticmethod)
+_HAS_DOCSTRING = 0x4000000  # since Python 3.13
 
 
 def fingerprint(*parts: Any) -> str:
-    """Return the fingerprint of kernels, constants, modules of Python and files.
-
-    Parameters
-    ----------
-    *parts : kernel, function, constant, module or Path
-        A function counts as a kernel does, a module with its text and all that it names, a file
-        with its text.
-    """
+    """Return the fingerprint of kernels, functions, classes, constants and modules."""
     account = _Account()
     for part in parts:
         if isinstance(part, types.ModuleType):
             account.add_module(part.__name__)
-        elif isinstance(part, Path):
-            account.add(_text(str(part)))
-        elif isinstance(part, types.FunctionType):
-            account.add_function(part)
         else:
             account.add(part)
     return account.digest()
@@ -70,9 +64,9 @@ class _Account:
         """Add a value that is known by a name."""
         if isinstance(value, _PLAIN):
             self._write(type(value).__name__, value)
-        elif isinstance(value, tuple | frozenset):
+        elif isinstance(value, tuple | list | frozenset | set):
             self._write(type(value).__qualname__, len(value))
-            for item in sorted(value, key=repr) if isinstance(value, frozenset) else value:
+            for item in sorted(value, key=repr) if isinstance(value, frozenset | set) else value:
                 self.add(item)
         elif isinstance(value, enum.Enum):
             self._write(type(value).__qualname__, value.name, repr(value.value))
@@ -90,50 +84,63 @@ class _Account:
             self.add_function(value.py_func)
         elif isinstance(value, types.FunctionType):
             self.add_function(value)
-            self.add_module(value.__module__ or "")
-        else:  # a class, an intrinsic, an object: what it does stands in its module
+        elif isinstance(value, type):
+            self.add_class(value)
+        elif (function := _wrapped(value)) is not None:  # a method, a property, an intrinsic
+            self._write(type(value).__qualname__)
+            self.add(function)
+        elif isinstance(value, Mapping) and self._is_new(id(value), value):
+            self._write(type(value).__qualname__, len(value))
+            for key, item in value.items():
+                self.add(key)
+                self.add(item)
+        else:  # an object: what it does stands in its module
             home = getattr(value, "__module__", None) or type(value).__module__
             named = (getattr(value, name, None) for name in ("__qualname__", "__name__"))
             self._write(home, type(value).__qualname__, *map(str, named))
             self.add_module(home)
 
     def add_module(self, name: str) -> None:
-        """Add the text of a module, and what it names if it belongs to this package."""
-        if _root(name) in _BY_VERSION or not self._is_new(name, name):
+        """Add the syntax of a module."""
+        if _root(name) not in _BY_VERSION and self._is_new(name, name):
+            self._write("module", name)
+            self._digest.update(_syntax(getattr(sys.modules.get(name), "__file__", None) or ""))
+
+    def add_class(self, kind: type) -> None:
+        """Add what a class is made of: its bases, and all that it defines."""
+        self._write("class", kind.__module__, kind.__qualname__)
+        if _root(kind.__module__) in _BY_VERSION or not self._is_new(kind, kind):
             return
-        module = sys.modules.get(name)
-        self._write("module", name)
-        self._digest.update(_text(getattr(module, "__file__", None) or ""))
-        if _root(name) == _PACKAGE:
-            for member, value in sorted(vars(module).items()):
-                if member.startswith("__"):
-                    continue
-                self._write(member)
-                if isinstance(value, types.ModuleType):
-                    self.add_module(value.__name__)
-                else:
-                    self.add(value)
+        self.add(kind.__bases__)
+        for name, member in sorted(vars(kind).items()):
+            # Python keeps its own notes in a class, of other kinds and some of them later.
+            if not name.startswith("__") or isinstance(member, _METHOD):
+                self._write(name)
+                self.add(member)
 
     def add_function(self, function: types.FunctionType) -> None:
         """Add what a function computes: its bytecode, and all that it names."""
+        if _root(function.__module__ or "") in _BY_VERSION:
+            self._write(function.__module__, function.__qualname__)
+            return
         if not self._is_new(id(function), function):
             return
-        self._add_code(function.__code__, function.__doc__, function.__globals__)
+        self._add_code(function.__code__, function.__globals__)
         for cell in function.__closure__ or ():
             self.add(cell.cell_contents)
         self.add(function.__defaults__)
         self.add(tuple(sorted((function.__kwdefaults__ or {}).items())))
 
-    def _add_code(self, code: types.CodeType, doc: str | None, scope: dict[str, Any]) -> None:
+    def _add_code(self, code: types.CodeType, scope: dict[str, Any]) -> None:
         self._write(
             code.co_name, code.co_code, code.co_names, code.co_varnames, code.co_freevars,
-            code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags,
-            code.co_exceptiontable,
+            code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount,
+            code.co_flags & ~_HAS_DOCSTRING, code.co_exceptiontable,
         )  # fmt: skip
-        for place, constant in enumerate(code.co_consts):
+        for constant in code.co_consts[_begins_with_docstring(code) :]:
             if isinstance(constant, types.CodeType):
-                self._add_code(constant, None, scope)
-            elif place > 0 or doc is None or constant != doc:
+                self._add_code(constant, scope)
+            else:
                 self.add(constant)
         for name in code.co_names:
             if name in scope:
@@ -161,13 +168,41 @@ class _Account:
         self._digest.update(repr(parts).encode())
 
 
+def _begins_with_docstring(code: types.CodeType) -> bool:
+    """Whether the first constant of a function is its docstring."""
+    if sys.version_info >= (3, 13):
+        return bool(code.co_flags & _HAS_DOCSTRING)
+    # Functions have a docstring there or None, and comprehensions whatever comes first.
+    return code.co_name[0] != "<" and isinstance(next(iter(code.co_consts), None), str)
+
+
+def _wrapped(value: Any) -> Any:
+    """Return the functions that something is a wrapper of, or None."""
+    if isinstance(value, property):
+        return (value.fget, value.fset)
+    if isinstance(value, functools.cached_property):
+        return value.func
+    return getattr(value, "__wrapped__", None)
+
+
 def _root(module: str) -> str:
     return module.split(".")[0]
 
 
 @cache
-def _text(file: str) -> bytes:
+def _syntax(file: str) -> bytes:
+    """Return what a file says to Python, or what is in it if it is in another language."""
     try:
-        return Path(file).read_bytes()
-    except OSError:  # typed at a prompt, or in no language that could be read
+        content = Path(file).read_bytes()
+    except OSError:  # typed at a prompt
         return os.urandom(16)  # good for this process only
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError):
+        return content
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
+            node
+        ):
+            node.body[0] = ast.Pass()
+    return ast.dump(tree).encode()

@@ -95,13 +95,13 @@ def write(places: Sequence[Path], name: str, key: bytes, code: bytes) -> None:
     _anywhere(places, keep)
 
 
-def can_write(places: Sequence[Path]) -> bool:
-    """Whether there is a place that files can be written to; says so if there is none."""
+def first_writable(places: Sequence[Path]) -> Path | None:
+    """Return the first place that files can be written to; say so if there is none."""
     return _anywhere(places, lambda unfinished: unfinished.write_bytes(b"?"))
 
 
-def _anywhere(places: Sequence[Path], use: Callable[[Path], Any]) -> bool:
-    """Use a new file in the first place where that goes, and clear up; whether it went anywhere."""
+def _anywhere(places: Sequence[Path], use: Callable[[Path], Any]) -> Path | None:
+    """Use a new file in the first place where that goes, and clear up; where it went."""
     failures = []
     for place in places:
         unfinished = place / f"{uuid.uuid4().hex}{_UNFINISHED}"
@@ -115,10 +115,10 @@ def _anywhere(places: Sequence[Path], use: Callable[[Path], Any]) -> bool:
         except OSError as error:
             failures.append(f"{place}: {error.strerror or error}")
         else:
-            return True
+            return place
     if failures:
-        _say_nowhere(failures)
-    return False
+        say_nowhere(failures)
+    return None
 
 
 def _clear(place: Path) -> None:
@@ -139,7 +139,8 @@ def _say_damaged(file: Path, reason: str) -> None:
     )
 
 
-def _say_nowhere(failures: Sequence[str]) -> None:
+def say_nowhere(failures: Sequence[str]) -> None:
+    """Warn that machine code was kept nowhere, and why."""
     _say(
         "nowhere",
         f"Compiled code cannot be kept ({'; '.join(failures)}), so it will be compiled anew at the "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 import threading
 from collections.abc import Callable, Sequence
 from functools import lru_cache
@@ -30,12 +29,12 @@ _loading = threading.Lock()
 def can_fuse() -> bool:
     """Whether this processor multiplies and adds in one instruction."""
     return llvm.get_process_triple().startswith(("aarch64", "arm64")) or "+fma" in (
-        _processor()[1].split(",")
+        processor()[1].split(",")
     )
 
 
 @lru_cache(maxsize=1)
-def _processor() -> tuple[str, str]:
+def processor() -> tuple[str, str]:
     """Name and features of the processor to compile for, as Numba has them."""
     settings: Any = config
     name = settings.CPU_NAME or llvm.get_host_cpu_name()
@@ -46,7 +45,7 @@ def _processor() -> tuple[str, str]:
 
 
 def addresses(
-    names: Sequence[str], described: bytes, write: Callable[[], ir.Module]
+    names: Sequence[str], described: bytes, made_of: str, write: Callable[[], ir.Module]
 ) -> tuple[int, ...]:
     """Return the addresses of the functions of a module, which is compiled if it is new.
 
@@ -56,11 +55,12 @@ def addresses(
         Names of the functions.
     described : bytes
         What the module depends on besides what its writer is made of, and the processor.
+    made_of : str
+        Fingerprint of what writes the module.
     write : callable
-        Writes the module. What it is made of is the text of its Python module, and all that this
-        names.
+        Writes the module.
     """
-    key = _key(described, write)
+    key = _key(described, made_of)
     with _loading:
         if key not in _loaded:
             _loaded[key] = _engine(_name(described), key, write)
@@ -70,7 +70,7 @@ def addresses(
 def _engine(name: str, key: bytes, write: Callable[[], ir.Module]) -> Any:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    cpu, features = _processor()
+    cpu, features = processor()
     machine = llvm.Target.from_default_triple().create_target_machine(
         cpu=cpu, features=features, opt=_OPTIMISATION, jit=True
     )
@@ -98,19 +98,14 @@ def _compiled(module: ir.Module, machine: Any) -> bytes:
 
 def _name(described: bytes) -> str:
     """Name of the file, which the next version of the sources takes over."""
-    digest = hashlib.sha256(described + repr(_processor()).encode())
+    digest = hashlib.sha256(described + repr(processor()).encode())
     return f"straight_line.{digest.hexdigest()[:32]}.machine_code"
 
 
-def _key(described: bytes, write: Callable[[], ir.Module]) -> bytes:
+def _key(described: bytes, made_of: str) -> bytes:
     """What the code is for."""
     digest = hashlib.sha256(described)
-    for part in (_made_of(write.__module__), *_processor(), str(llvm.llvm_version_info)):
+    version = str(llvm.llvm_version_info)
+    for part in (made_of, fingerprint(_compiled, _OPTIMISATION), *processor(), version):
         digest.update(b"\0" + part.encode())
     return digest.digest()
-
-
-@lru_cache
-def _made_of(module: str) -> str:
-    """Fingerprint of a module that writes, and of this one that compiles."""
-    return fingerprint(sys.modules[module], sys.modules[__name__])

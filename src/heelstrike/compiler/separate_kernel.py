@@ -23,7 +23,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from heelstrike.compiler.compilation import compiled_for, is_kept
+from heelstrike.compiler.compilation import numba_in_use
 
 LONGEST_WAIT = 300.0
 """How long to wait for another process to compile a kernel, in s."""
@@ -43,7 +43,7 @@ from {module} import {name}
 """
 
 
-class SeparateKernel:
+class SeparateKernel(types.WrapperAddressProtocol):
     """A kernel that is compiled when it is needed, or in another process until then.
 
     Parameters
@@ -80,7 +80,7 @@ class SeparateKernel:
         with self._lock:
             if self._compiled or self._helper or not _can_start_python():
                 return
-            if not is_kept(self._signature(), self._function, address=True):
+            if not numba_in_use().is_kept(self._signature(), self._function):
                 self._helper = self._start_helper()
 
     def finish(self) -> Any:
@@ -92,12 +92,7 @@ class SeparateKernel:
                 # Whether it succeeded shows in what it left on disk.
                 _wait_for(self._helper)
                 self._helper = None
-            signature = self._signature()
-            compiled: Any = compiled_for(signature, self._function, address=True)
-            result = compiled.get_compile_result(signature)
-            self._place[0] = result.library.get_pointer_to_function(
-                result.fndesc.llvm_cfunc_wrapper_name
-            )
+            compiled, self._place[0] = numba_in_use().separate(self._signature(), self._function)
             self._compiled = compiled
             return compiled
 
@@ -105,6 +100,10 @@ class SeparateKernel:
         """Return what Numba asks of a function that is handed to a compiled one."""
         self.finish()
         return int(self.address[0])
+
+    def signature(self) -> Any:
+        """Return its Numba signature, which Numba asks for, too."""
+        return self._signature()
 
     def _start_helper(self) -> subprocess.Popen[bytes] | None:
         module, name = self._function.__module__, self._function.__name__

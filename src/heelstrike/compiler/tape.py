@@ -1,4 +1,4 @@
-"""A tape of the arithmetic that a kernel does: each operation once, in order.
+"""A tape of the arithmetic that a kernel does: a graph of values, each made once, in order.
 
 Run over values of a tape in place of numbers, a kernel leaves there what it computes. Zeros and
 ones are folded away as it goes, and an operation that was done before is not done again.
@@ -7,35 +7,49 @@ ones are folded away as it goes, and an operation that was done before is not do
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
+from enum import Enum
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-ADD, SUBTRACT, MULTIPLY, DIVIDE, NEGATE, SINE, COSINE, READ, INVERT_ABOVE = range(9)
-
 Symbols = NDArray[Any]
 
 
+class Operation(Enum):
+    """What is done to one or two operands."""
+
+    ADD = "+"
+    SUBTRACT = "-"
+    MULTIPLY = "*"
+    DIVIDE = "/"
+    NEGATE = "negate"
+    SINE = "sin"
+    COSINE = "cos"
+    INVERT_ABOVE = "inverse of the first if it is more than the second, or else zero"
+
+
+_COMMUTATIVE = (Operation.ADD, Operation.MULTIPLY)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Value:
-    """A number that is known when the tape is played."""
+    """A number that is known when the tape is played; `place` is where it stands on the tape."""
 
-    __slots__ = ("place", "tape")
-
-    def __init__(self, tape: Tape, place: int) -> None:
-        self.tape = tape
-        self.place = place
+    tape: Tape = field(repr=False)
+    place: int
 
     def __add__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self.tape.record(ADD, self, other)
+        return self if _is(other, 0.0) else self.tape.record(Operation.ADD, self, other)
 
     __radd__ = __add__
 
     def __sub__(self, other: Any) -> Any:
-        return self if _is(other, 0.0) else self.tape.record(SUBTRACT, self, other)
+        return self if _is(other, 0.0) else self.tape.record(Operation.SUBTRACT, self, other)
 
     def __rsub__(self, other: Any) -> Any:
-        return -self if _is(other, 0.0) else self.tape.record(SUBTRACT, other, self)
+        return -self if _is(other, 0.0) else self.tape.record(Operation.SUBTRACT, other, self)
 
     def __mul__(self, other: Any) -> Any:
         if _is(other, 0.0):
@@ -44,72 +58,83 @@ class Value:
             return self
         if _is(other, -1.0):
             return -self
-        return self.tape.record(MULTIPLY, self, other)
+        return self.tape.record(Operation.MULTIPLY, self, other)
 
     __rmul__ = __mul__
 
     def __truediv__(self, other: Any) -> Any:
-        return self.tape.record(DIVIDE, self, other)
+        return self.tape.record(Operation.DIVIDE, self, other)
 
     def __rtruediv__(self, other: Any) -> Any:
-        return self.tape.record(DIVIDE, other, self)
+        return self.tape.record(Operation.DIVIDE, other, self)
 
     def __neg__(self) -> Any:
-        return self.tape.record(NEGATE, self)
+        return self.tape.record(Operation.NEGATE, self)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entry(Value):
+    """What stands in an array when the tape begins; `index` counts its entries through."""
+
+    array: str
+    index: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Result(Value):
+    """What an operation makes of its operands: values, and numbers known already."""
+
+    operation: Operation
+    operands: tuple[Value | float, ...]
 
 
 class Tape:
-    """Operations as ``(operation, operand, operand)``.
-
-    An operand is the place of an earlier operation, or a float. The operands of ``READ`` are the
-    name of an array and the index into it, counted through.
-    """
+    """Values in the order in which they were made; operands stand before their results."""
 
     def __init__(self) -> None:
-        self.operations: list[tuple[Any, ...]] = []
-        self._places: dict[tuple[Any, ...], int] = {}  # by the kinds of operands, too: 1 == 1.0
+        self.values: list[Entry | Result] = []
+        self._known: dict[tuple[Any, ...], Entry | Result] = {}
 
-    def record(self, operation: int, *operands: Any) -> Value:
-        """Return the value of an operation, new or done before."""
-        entry = (operation, *(_operand(operand) for operand in operands))
-        if operation in (ADD, MULTIPLY) and repr(entry[2]) < repr(entry[1]):
-            entry = (operation, entry[2], entry[1])  # the same sum, whichever term comes first
-        return self._value(entry)
-
-    def read(self, name: str, index: int) -> Value:
-        """Return the value of one entry of an array."""
-        return self._value((READ, name, index))
+    def record(self, operation: Operation, *operands: Any) -> Result:
+        """Return the result of an operation, new or done before."""
+        known = [value if isinstance(value, Value) else float(value) for value in operands]
+        if operation in _COMMUTATIVE:  # the same sum, whichever term comes first
+            known.sort(key=_name)
+        return self._only(Result, (operation, *map(_name, known)), operation, tuple(known))
 
     def array(self, name: str, shape: tuple[int, ...]) -> Symbols:
-        """Return the values of an array."""
+        """Return the entries of an array."""
         result = np.empty(shape, dtype=object)
         for index in range(result.size):
-            result.flat[index] = self.read(name, index)
+            result.flat[index] = self._only(Entry, (name, index), name, index)
         return result
 
-    def _value(self, entry: tuple[Any, ...]) -> Value:
-        key = (*entry, *map(type, entry))
-        place = self._places.setdefault(key, len(self.operations))
-        if place == len(self.operations):
-            self.operations.append(entry)
-        return Value(self, place)
+    def _only(self, kind: Any, key: tuple[Any, ...], *content: Any) -> Any:
+        if key not in self._known:
+            self._known[key] = kind(self, len(self.values), *content)
+            self.values.append(self._known[key])
+        return self._known[key]
 
 
 def sine(value: Any) -> Any:
     """Sine of a number or of a value of a tape."""
-    return value.tape.record(SINE, value) if isinstance(value, Value) else math.sin(value)
+    return value.tape.record(Operation.SINE, value) if _waits(value) else math.sin(value)
 
 
 def cosine(value: Any) -> Any:
     """Cosine of a number or of a value of a tape."""
-    return value.tape.record(COSINE, value) if isinstance(value, Value) else math.cos(value)
+    return value.tape.record(Operation.COSINE, value) if _waits(value) else math.cos(value)
 
 
 def inverse_above(value: Any, least: Any) -> Any:
     """Inverse of a number or of a value of a tape if it is more than `least`, or else zero."""
-    if isinstance(value, Value):
-        return value.tape.record(INVERT_ABOVE, value, least)
+    if _waits(value):
+        return value.tape.record(Operation.INVERT_ABOVE, value, least)
     return 1.0 / value if value > least else 0.0
+
+
+def _waits(value: Any) -> bool:
+    return isinstance(value, Value)
 
 
 def _is(value: Any, number: float) -> bool:
@@ -117,5 +142,6 @@ def _is(value: Any, number: float) -> bool:
     return not isinstance(value, Value) and value == number
 
 
-def _operand(value: Any) -> int | float:
-    return value.place if isinstance(value, Value) else float(value)
+def _name(operand: Value | float) -> str:
+    """Its place, or the digits of a number, which has a point or an exponent."""
+    return repr(operand.place if isinstance(operand, Value) else operand)

@@ -70,7 +70,7 @@ class Certificate:
         opposing edge.
     cone : float
         Largest excess of the friction over the cone, or of a normal impulse below zero.
-    penetration : float
+    non_penetration : float
         Largest negative normal velocity.
     rounding : float
         How far the true residuals of the impulse may exceed these.
@@ -88,7 +88,7 @@ class Certificate:
     fallbacks: int
     complementarity: float
     cone: float
-    penetration: float
+    non_penetration: float
     rounding: float
     tolerance: float
     velocity_error: Floats = field(compare=False, repr=False)
@@ -101,14 +101,14 @@ class Certificate:
     @property
     def worst(self) -> float:
         """Return the largest residual, rounding included."""
-        return max(self.complementarity, self.cone, self.penetration) + self.rounding
+        return max(self.complementarity, self.cone, self.non_penetration) + self.rounding
 
     def __str__(self) -> str:
         return (
             f"{self.solver.value}: {self.status.text} (complementarity "
-            f"{self.complementarity:.1e}, cone {self.cone:.1e}, penetration "
-            f"{self.penetration:.1e}, rounding {self.rounding:.1e}, {self.iterations} iterations, "
-            f"{self.fallbacks} fallbacks)"
+            f"{self.complementarity:.1e}, cone {self.cone:.1e}, non-penetration "
+            f"{self.non_penetration:.1e}, rounding {self.rounding:.1e}, "
+            f"{self.iterations} iterations, {self.fallbacks} fallbacks)"
         )
 
 
@@ -125,9 +125,9 @@ def certify(
 ) -> float:
     """Compute the velocity an impulse gives and the residuals; return the largest of them.
 
-    The residuals are complementarity, cone and penetration, scaled as in :class:`Certificate`. What
-    is returned includes rounding. ``SLOPE`` is not zero where a contact is prescribed to slide; its
-    friction then lies on the given edge and its tangential velocity is not constrained.
+    The residuals are complementarity, cone and non-penetration, scaled as in :class:`Certificate`;
+    what is returned includes rounding. ``SLOPE`` is not zero where a contact is prescribed to
+    slide; its friction then lies on the given edge and its tangential velocity is not constrained.
 
     Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` of every row, ``ROUNDING``,
     ``EFFORT``, ``UNIT`` and ``REST``.
@@ -147,7 +147,7 @@ def certify(
 
     complementarity = 0.0
     cone = 0.0
-    penetration = 0.0
+    non_penetration = 0.0
     nothing = 0.0 * unit  # and stays nothing unless a number is infinite or none
     for contact in range(count):
         normal = 2 * contact
@@ -164,7 +164,7 @@ def certify(
             force = normal_impulse * force_scale
         else:  # it moves nothing
             force = 1.0 if normal_impulse > 0.0 else (-1.0 if normal_impulse < 0.0 else 0.0)
-        penetration = max(penetration, -speed)
+        non_penetration = max(non_penetration, -speed)
         cone = max(cone, -force)
         complementarity = max(complementarity, min(speed, force))
 
@@ -186,11 +186,11 @@ def certify(
         complementarity = max(complementarity, min(-speed, upper * force_scale))
     # Impulses without any cause in the data count as much as numbers that are none.
     if nothing != 0.0 or not settings[EFFORT] + rounding < math.inf:
-        penetration = math.inf
+        non_penetration = math.inf
     residual[0] = complementarity
     residual[1] = cone
-    residual[2] = penetration
-    return max(complementarity, max(cone, penetration)) + rounding
+    residual[2] = non_penetration
+    return max(complementarity, max(cone, non_penetration)) + rounding
 
 
 @kernel

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -103,7 +104,29 @@ class Ground:
         friction: ArrayLike = 0.75,
         restitution: ArrayLike = 0.0,
     ) -> Ground:
-        """Flat ground with `count` steps from x = `start` on; a negative `rise` leads down."""
+        """Flat ground with `count` steps from x = `start` on; a negative `rise` leads down.
+
+        Parameters
+        ----------
+        rise, tread : float
+            Height and depth of a step (m); a negative height leads down.
+        count : int
+            Number of steps.
+        start : float
+            Where the first one rises (m).
+        friction, restitution : float or array
+            As for the class.
+
+        Returns
+        -------
+        Ground
+            The stairs.
+
+        Raises
+        ------
+        SimulationError
+            If a number is impossible.
+        """
         if count < 1 or not tread > 0.0 or not np.isfinite(rise):
             raise SimulationError(
                 f"stairs need count ≥ 1, tread > 0 and a finite rise; "
@@ -128,7 +151,33 @@ class Ground:
         friction: ArrayLike = 0.75,
         restitution: ArrayLike = 0.0,
     ) -> Ground:
-        """Flat ground with corners at random heights within ±`amplitude` from `start` on."""
+        """Flat ground with corners at random heights within ±`amplitude` from `start` on.
+
+        Parameters
+        ----------
+        amplitude : float
+            Greatest height or depth of a corner (m).
+        spacing : float
+            Distance between corners (m).
+        length : float
+            How far it is rough (m).
+        seed : int
+            Of the random heights; the same seed gives the same ground.
+        start : float
+            Where it begins to be rough (m).
+        friction, restitution : float or array
+            As for the class.
+
+        Returns
+        -------
+        Ground
+            The rough ground.
+
+        Raises
+        ------
+        SimulationError
+            If a number is impossible.
+        """
         if not (amplitude >= 0.0 and spacing > 0.0 and length > 0.0):
             raise SimulationError("rough ground needs amplitude ≥ 0, spacing > 0 and length > 0")
         x = np.arange(start, start + length, spacing)
@@ -137,12 +186,49 @@ class Ground:
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
 
+    def numbers(self) -> dict[str, Floats]:
+        """Return the ground as arrays that :meth:`of_numbers` makes it of."""
+        return {
+            "corner": self._model.vertices,
+            "friction": self._model.friction,
+            "restitution": self._model.restitution,
+            "slope": np.array(self.slope),
+            "has_profile": np.array(self.profile is not None, dtype=np.float64),
+        }
+
+    @classmethod
+    def of_numbers(cls, numbers: Mapping[str, Floats]) -> Ground:
+        """Make the ground of :meth:`numbers`.
+
+        Parameters
+        ----------
+        numbers : mapping of str to array
+            What that returned.
+        """
+        return cls(
+            friction=_one_if_equal(numbers["friction"]),
+            restitution=_one_if_equal(numbers["restitution"]),
+            slope=float(numbers["slope"]),
+            profile=numbers["corner"] if numbers["has_profile"] else None,
+        )
+
     def model(self) -> GroundModel:
         """Return the arrays that the kernels use."""
         return self._model
 
     def height(self, x: ArrayLike) -> Floats:
-        """Height of the ground at x, in metres; on a vertical step, that of its right side."""
+        """Height of the ground at x, in metres; on a vertical step, that of its right side.
+
+        Parameters
+        ----------
+        x : array
+            Where (m), of any shape.
+
+        Returns
+        -------
+        array of the same shape
+            Heights (m).
+        """
         x = np.asarray(x, dtype=np.float64)
         vertices = self._model.vertices
         segment = np.clip(
@@ -153,6 +239,10 @@ class Ground:
         slope = (right[..., 1] - left[..., 1]) / np.where(run > 0.0, run, np.inf)
         height: Floats = left[..., 1] + slope * (x - left[..., 0])
         return height
+
+
+def _one_if_equal(values: Floats) -> Floats | float:
+    return float(values[0]) if len(values) and np.all(values == values[0]) else values
 
 
 def _polyline(profile: ArrayLike) -> Floats:

@@ -24,7 +24,7 @@ class LcpSolution:
         The solution and ``w = M @ z + q``.
     certificate : Certificate
         Status and residuals; ``complementarity`` is the largest of min(w_i, z_i),
-        ``penetration`` the largest negative w_i and ``cone`` the largest negative z_i, all
+        ``non_penetration`` the largest negative w_i and ``cone`` the largest negative z_i, all
         relative.
     """
 

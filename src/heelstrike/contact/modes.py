@@ -66,7 +66,18 @@ class Solver(enum.Enum):
 
     @classmethod
     def from_code(cls, code: int) -> Solver:
-        """Return the solver that kernels know by this integer."""
+        """Return the solver that kernels know by this integer.
+
+        Parameters
+        ----------
+        code : int
+            The integer.
+
+        Returns
+        -------
+        Solver
+            The solver.
+        """
         return _SOLVERS_BY_CODE[int(code)]
 
 

@@ -76,7 +76,7 @@ def solve_contact_kernel(
         Out: the solution, or after a failure the candidate with the smallest residuals; always
         finite if the data are.
     residual : (3,) float64
-        Out: complementarity, cone and penetration, relative (see ``Certificate``).
+        Out: complementarity, cone and non-penetration, relative (see ``Certificate``).
     work : ContactWorkspace
         Buffers; ``counters`` is updated, row ``SETTINGS`` of ``vectors`` is read.
     """
@@ -271,7 +271,7 @@ def run_solvers(
         fallbacks=int(work.counters[LAST_FALLBACKS]),
         complementarity=float(residual[0]),
         cone=float(residual[1]),
-        penetration=float(residual[2]),
+        non_penetration=float(residual[2]),
         rounding=float(work.vectors[SETTINGS, ROUNDING]),
         tolerance=float(tolerance),
         velocity_error=error,

@@ -24,7 +24,6 @@ from heelstrike.dynamics.kernels import (
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
-from heelstrike.gait.piecewise import PiecewiseGait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -369,7 +368,7 @@ def computed_torque(
 class ComputedTorque:
     """Follow a gait by computed torque, on either foot, step after step.
 
-    On point feet (a `PiecewiseGait`) the joints follow the gait and the trunk's pitch, which no
+    On point feet the joints follow the gait and the trunk's pitch, which no
     motor reaches, follows from them. Nothing then brings the pitch back to the gait: a disturbance
     of it lasts, and most gaits are unstable under this law.
 
@@ -426,7 +425,22 @@ class ComputedTorque:
         return CompiledController(kernel, self._parameters, self._initial_memory())
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
-        """Return the joint torques (nu,), in N m."""
+        """Return the joint torques (nu,), in N m.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        state : State
+            Where the robot is.
+        contacts : Contacts
+            How it touches the ground.
+
+        Returns
+        -------
+        (nu,) float
+            Torques, in the order of the actuators.
+        """
         if t <= 0.0:
             self.reset()
         forward_kinematics(self.robot.model, state.q, self._tree)
@@ -450,7 +464,7 @@ class ComputedTorque:
     def _initial_memory(self) -> NDArray[np.float64]:
         nv, nu = self.robot.nv, self.robot.nu
         size = MEMORY_HEADER + SAMPLES_KEPT * nu + 5 * nv
-        if isinstance(self.gait, PiecewiseGait):
+        if self.gait.point_feet:
             from heelstrike.control.point_feet import memory_size
 
             size = memory_size(self.robot)
@@ -490,7 +504,7 @@ class ComputedTorque:
         header[LANDING] = 0.02 * gait.step_duration
         header[PITCH] = pitch
         header[PITCH_SIGN] = model.axis[pitch, 0]
-        if isinstance(gait, PiecewiseGait):
+        if gait.point_feet:
             blocks = self._point_foot_blocks(gait, unactuated)
             return np.concatenate([header, self.kp, self.kd, blocks])
         both = np.zeros((2, 4, robot.nu))
@@ -511,9 +525,7 @@ class ComputedTorque:
             ]
         )
 
-    def _point_foot_blocks(
-        self, gait: PiecewiseGait, unactuated: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def _point_foot_blocks(self, gait: Gait, unactuated: NDArray[np.int64]) -> NDArray[np.float64]:
         # Compiled only by those who walk on points.
         from heelstrike.control.point_feet import packed_blocks, point_foot_torque
 

@@ -27,7 +27,7 @@ from heelstrike.control.computed_torque import (
 )
 from heelstrike.dynamics.kernels import inverse_dynamics, passive_force, point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.gait.piecewise import PiecewiseGait
+from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import CONTROLLER_SIGNATURE, Contacts
@@ -174,7 +174,7 @@ def point_foot_torque(
         torque[i] = force[joint] - (columns[joint, 0] * x + columns[joint, 1] * z)
 
 
-def packed_blocks(robot: Robot, gait: PiecewiseGait, unactuated: NDArray[np.int64]) -> Floats:
+def packed_blocks(robot: Robot, gait: Gait, unactuated: NDArray[np.int64]) -> Floats:
     """Parameters of the kernel after header and gains; what belongs to the robot's feet last."""
     count, terms, _ = gait.pieces.shape
     both = np.zeros((2, *gait.pieces.shape))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from heelstrike.dynamics.coordinates import difference, integrate
 from heelstrike.dynamics.energies import energy, kinetic_energy, potential_energy
@@ -36,6 +36,9 @@ from heelstrike.dynamics.points import (
     point_velocity,
 )
 from heelstrike.dynamics.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
+
+if TYPE_CHECKING:
+    from heelstrike.dynamics.casadi_functions import CasadiDynamics as CasadiDynamics
 
 __all__ = [
     "CasadiDynamics",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -17,7 +18,7 @@ from heelstrike.dynamics.evaluation import Evaluation
 
 def traced(kernel: Callable[..., Any]) -> Callable[..., Any]:
     """Return a kernel that runs over object arrays of CasADi ``SX`` instead of numbers."""
-    return uncompiled(kernel, replace={"sin": casadi.sin, "cos": casadi.cos})
+    return uncompiled(kernel, replace={math.sin: casadi.sin, math.cos: casadi.cos})
 
 
 def symbols(vector: casadi.SX) -> NDArray[np.object_]:

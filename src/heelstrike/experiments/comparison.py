@@ -23,7 +23,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
 from heelstrike.sim import CompiledController, Controller, Run, simulate
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 from heelstrike.sim.status import RunStatus
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.dynamics import center_of_mass, contact_positions
 from heelstrike.errors import GaitError, SimulationError
-from heelstrike.gait import Gait, PiecewiseGait, optimize_gait
+from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot
 from heelstrike.sim import Controller, Run, simulate
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 
 HEIGHT = 1.044
 """Height of bravo7's centre of mass above its soles, in m."""
@@ -186,7 +186,7 @@ def why_unstable(gait: Gait) -> str | None:
     gravity will, whatever the joints do: the linearised step multiplies an error of that motion by
     some factor, 7.8 for rabbit's usual gait (:func:`heelstrike.find_limit_cycle`).
     """
-    if not isinstance(gait, PiecewiseGait):
+    if not gait.point_feet:
         return None
     return (
         f"robot {gait.robot!r} stands on point feet, on which the ground exerts no moment: no "

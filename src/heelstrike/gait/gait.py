@@ -1,24 +1,84 @@
-"""A periodic gait: one step as a cubic polynomial a joint, and its mirror image for the next."""
+"""A periodic gait: the phases of one step, and their mirror images for the next."""
 
 from __future__ import annotations
 
+import enum
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.errors import GaitError
-from heelstrike.gait import cubic
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
+from heelstrike.gait.polynomials import evaluated
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
 Floats = NDArray[np.float64]
+
+
+class Footing(enum.Enum):
+    """How a foot stands: flat, so that the ground bears a moment, or on a point, without one."""
+
+    FLAT = "flat"
+    POINT = "point"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Phase:
+    """A part of a step in which the same feet stand in the same way.
+
+    Attributes
+    ----------
+    contacts : mapping of int to Footing
+        The feet that stand in the first step, by their index in ``robot.feet``, and how.
+    breakpoints : (K + 1,) float
+        Times, since the beginning of the phase, between which one polynomial holds, in s.
+    pieces : (K, d + 1, nu) float
+        Coefficients, lowest first, of the joints' polynomials in the time since the beginning of
+        each piece. A cubic (paper eq. 41) is one piece of degree d = 3.
+    pitch_pieces : (K, d + 1) float or None
+        The same for the trunk's pitch, where no flat foot makes it follow from the joints.
+
+    Raises
+    ------
+    GaitError
+        If numbers are missing, not finite or contradict each other.
+    """
+
+    contacts: Mapping[int, Footing]
+    breakpoints: Floats
+    pieces: Floats
+    pitch_pieces: Floats | None = None
+
+    def __post_init__(self) -> None:
+        if not self.contacts:
+            raise GaitError("gait: a phase needs at least one foot that stands")
+        if not set(self.contacts) <= {0, 1}:
+            raise GaitError(f"gait: stance_foot must be 0 or 1, got {sorted(self.contacts)}")
+        for name in ("breakpoints", "pieces", "pitch_pieces"):
+            if getattr(self, name) is not None:
+                _store(self, name)
+        object.__setattr__(self, "contacts", dict(self.contacts))
+        count, shape = self.breakpoints.size - 1, self.pieces.shape
+        if self.breakpoints.ndim != 1 or len(shape) != 3 or shape[0] != count or 0 in shape:
+            raise GaitError(
+                f"gait: {count + 1} breakpoints need pieces of shape ({count}, degree + 1, "
+                f"joints), got {shape}"
+            )
+        if self.pitch_pieces is not None and self.pitch_pieces.shape != shape[:2]:
+            raise GaitError(
+                f"gait: pitch_pieces must have shape {shape[:2]}, got {self.pitch_pieces.shape}"
+            )
+        if self.breakpoints[0] != 0.0 or np.any(np.diff(self.breakpoints) <= 0.0):
+            raise GaitError(
+                "gait: a phase's breakpoints must rise from 0; its duration be positive"
+            )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -37,21 +97,15 @@ class Gait:
         Actuated joints.
     step_length : float
         Distance (m) between the feet when both are on the ground: how far the body moves a step.
-    step_duration : float
-        Duration T of a step, in s.
-    start_position, end_position : (nu,) float
-        Joint positions q(0) and q(T) of the first step, in rad.
-    start_velocity, end_velocity : (nu,) float
-        Joint velocities just after the last touchdown and just before the next, in rad/s.
+    phases : tuple of Phase
+        The first step, phase by phase.
     mirror_joint : (nu,) int
         Counterpart of every joint on the other side.
     mirror_sign, mirror_offset : (nu,) float
         Mirrored positions are ``mirror_sign * q[mirror_joint] + mirror_offset``.
-    stance_foot : int
-        Index in ``robot.feet`` of the foot that stands during the first step.
     initial_state : State
         All coordinates at the beginning of the first step, just after touchdown, with the middle
-        of the stance sole at the origin of the world.
+        of the stance sole, or the point on which the robot stands, at the origin of the world.
     cost : float
         ∫ΓᵀΓ dt over one step, in N²m²s (paper eq. 40).
     friction : float
@@ -76,15 +130,10 @@ class Gait:
     fingerprint: str
     joint_names: tuple[str, ...]
     step_length: float
-    step_duration: float
-    start_position: Floats
-    end_position: Floats
-    start_velocity: Floats
-    end_velocity: Floats
+    phases: tuple[Phase, ...]
     mirror_joint: NDArray[np.int64]
     mirror_sign: Floats
     mirror_offset: Floats
-    stance_foot: int
     initial_state: State
     cost: float
     friction: float
@@ -95,30 +144,22 @@ class Gait:
 
     def __post_init__(self) -> None:
         nu = len(self.joint_names)
-        for name in (
-            "start_position",
-            "end_position",
-            "start_velocity",
-            "end_velocity",
-            "mirror_sign",
-            "mirror_offset",
-        ):
-            _store_vector(self, name, nu)
-        _store_vector(self, "touchdown_impulse", 3)
+        for name, size in (("mirror_sign", nu), ("mirror_offset", nu), ("touchdown_impulse", 3)):
+            _store(self, name, (size,))
         counterpart = np.array(self.mirror_joint, dtype=np.int64)
         if counterpart.shape != (nu,) or set(counterpart.tolist()) != set(range(nu)):
             raise GaitError(f"gait: mirror_joint must be a permutation of {nu} joints")
         object.__setattr__(self, "mirror_joint", counterpart)
         if not np.all(np.abs(self.mirror_sign) == 1.0):
             raise GaitError("gait: mirror_sign must hold +1 and -1 only")
-        for name in ("step_length", "step_duration", "friction", "clearance", "cost"):
+        for name in ("step_length", "friction", "clearance", "cost"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value >= 0.0):
                 raise GaitError(f"gait: {name} must be a number that is not negative, got {value}")
-        if self.step_length == 0.0 or self.step_duration == 0.0:
-            raise GaitError("gait: step_length and step_duration must be positive")
-        if self.stance_foot not in (0, 1):
-            raise GaitError(f"gait: stance_foot must be 0 or 1, got {self.stance_foot}")
+        if self.step_length == 0.0:
+            raise GaitError("gait: step_length must be positive")
+        if not self.phases or any(phase.pieces.shape[2] != nu for phase in self.phases):
+            raise GaitError(f"gait: it needs one phase or more, each with pieces of {nu} joints")
         state = self.initial_state
         if state.q.ndim != 1 or state.q.size <= nu or not np.all(np.isfinite(state.q)):
             raise GaitError("gait: the initial position must be finite, with trunk and joints")
@@ -126,20 +167,72 @@ class Gait:
             raise GaitError("gait: the initial velocity must be finite and as long as the position")
 
     @cached_property
+    def breakpoints(self) -> Floats:
+        """Times of the first step between which one polynomial holds, (K + 1,), in s."""
+        inner = [np.zeros(1)]
+        for phase in self.phases:
+            inner.append(inner[-1][-1] + phase.breakpoints[1:])
+        return np.concatenate(inner)
+
+    @cached_property
+    def pieces(self) -> Floats:
+        """Coefficients of the joints' polynomials of all phases, (K, d + 1, nu)."""
+        return _joined([phase.pieces for phase in self.phases])
+
+    @cached_property
     def coefficients(self) -> Floats:
-        """Coefficients a0 … a3 of the joints' polynomials in the first step, (4, nu)."""
-        return np.stack(
-            cubic.coefficients(
-                self.start_position,
-                self.end_position,
-                self.start_velocity,
-                self.end_velocity,
-                self.step_duration,
-            )
-        )
+        """Coefficients of the only polynomial a joint in the first step, (d + 1, nu).
+
+        Raises
+        ------
+        GaitError
+            If there are several, see `pieces`.
+        """
+        return _only(self.pieces)
+
+    @property
+    def point_feet(self) -> bool:
+        """Whether the robot always stands on points, which makes it underactuated."""
+        return all(Footing.FLAT not in phase.contacts.values() for phase in self.phases)
+
+    @property
+    def stance_foot(self) -> int:
+        """Index in ``robot.feet`` of the foot that stands from the beginning of the first step."""
+        return min(self.phases[0].contacts)
+
+    @property
+    def step_duration(self) -> float:
+        """Duration T of a step, in s."""
+        return float(self.breakpoints[-1])
+
+    @property
+    def start_position(self) -> Floats:
+        """Joint positions q(0) at the beginning of the first step, (nu,)."""
+        return self.in_step(0.0)
+
+    @property
+    def end_position(self) -> Floats:
+        """Joint positions q(T) at the end of the first step, (nu,)."""
+        return self.in_step(self.step_duration)
+
+    @property
+    def start_velocity(self) -> Floats:
+        """Joint velocities just after the last touchdown, (nu,)."""
+        return self.in_step(0.0, order=1)
+
+    @property
+    def end_velocity(self) -> Floats:
+        """Joint velocities just before the next touchdown, (nu,)."""
+        return self.in_step(self.step_duration, order=1)
+
+    def mirrored_pieces(self) -> Floats:
+        """Coefficients of the steps on the other foot, (K, d + 1, nu)."""
+        mirrored = self.mirrored(self.pieces, order=1)
+        mirrored[:, 0] += self.mirror_offset
+        return mirrored
 
     def mirrored_coefficients(self, robot: Robot | None = None) -> Floats:
-        """Coefficients of the steps on the other foot, (4, nu).
+        """Coefficients of the only polynomial a joint of the steps on the other foot, (d + 1, nu).
 
         Parameters
         ----------
@@ -149,13 +242,11 @@ class Gait:
         Raises
         ------
         GaitError
-            If the gait does not fit the robot.
+            If the gait does not fit the robot, or has several polynomials a joint.
         """
         if robot is not None:
             self.check_joints(robot)
-        mirrored: Floats = self.mirror_sign * self.coefficients[:, self.mirror_joint]
-        mirrored[0] += self.mirror_offset
-        return mirrored
+        return _only(self.mirrored_pieces())
 
     def check_joints(self, robot: Robot) -> None:
         """Raise a `GaitError` unless the gait moves exactly the actuated joints of a robot."""
@@ -178,7 +269,7 @@ class Gait:
             (eq. 41): the walk goes on with the mirrored step, then with the first again, and so
             also back in time.
         """
-        return self._walk(t, 0, offset=self.mirror_offset)
+        return self._walk(t, 0)
 
     def velocity(self, t: ArrayLike) -> Floats:
         """Joint velocities at times of the walk, (..., nu), in rad/s.
@@ -201,23 +292,38 @@ class Gait:
         order : int
             0 for positions, 1 for velocities, 2 for accelerations.
         """
-        polynomial: Any = (cubic.position, cubic.velocity, cubic.acceleration)[order]
-        value: Floats = polynomial(
-            self.coefficients, np.asarray(t, dtype=np.float64)[..., None]
-        ) + np.zeros(len(self.joint_names))
-        return value
+        return evaluated(self.pieces, self.breakpoints, np.asarray(t, np.float64), order)
+
+    def pitch(self, t: ArrayLike, *, order: int = 0) -> Floats:
+        """Pitch of the trunk (rad), or a derivative, at times of the first step, (...).
+
+        On point feet no motor acts on it; it moves as the dynamics demands when the joints follow
+        their polynomials exactly.
+
+        Raises
+        ------
+        GaitError
+            On flat feet, where it follows from the joints.
+        """
+        pitches = [phase.pitch_pieces for phase in self.phases]
+        given = [pieces[..., None] for pieces in pitches if pieces is not None]
+        if len(given) < len(pitches):
+            raise GaitError(
+                "on flat feet the trunk's pitch follows from the joints; use in_step()."
+            )
+        return evaluated(_joined(given), self.breakpoints, np.asarray(t, np.float64), order)[..., 0]
 
     def mirrored(self, joints: Floats, *, order: int = 0) -> Floats:
         """Mirror image of joint positions, or of a derivative of them, (..., nu)."""
         image: Floats = self.mirror_sign * joints[..., self.mirror_joint]
         return image + self.mirror_offset if order == 0 else image
 
-    def _walk(self, t: ArrayLike, order: int, *, offset: Floats | float = 0.0) -> Floats:
+    def _walk(self, t: ArrayLike, order: int) -> Floats:
         time = np.asarray(t, dtype=np.float64)
         step = np.floor(time / self.step_duration)
         value = self.in_step(time - step * self.step_duration, order=order)
-        mirrored = self.mirror_sign * value[..., self.mirror_joint] + offset
-        result: Floats = np.where((step % 2 == 1)[..., None], mirrored, value)
+        odd = (step % 2 == 1)[..., None]
+        result: Floats = np.where(odd, self.mirrored(value, order=order), value)
         return result
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -239,11 +345,30 @@ class Gait:
         )
 
 
-def _store_vector(gait: Gait, name: str, size: int) -> None:
-    value = np.array(getattr(gait, name), dtype=np.float64)
-    if value.shape != (size,) or not np.all(np.isfinite(value)):
-        raise GaitError(f"gait: {name} must hold {size} finite numbers, got {value}")
-    object.__setattr__(gait, name, value)
+def _store(owner: Phase | Gait, name: str, shape: tuple[int, ...] | None = None) -> None:
+    """Keep a copy of an array, once it is finite and of the right shape."""
+    value = np.array(getattr(owner, name), dtype=np.float64)
+    if shape not in (None, value.shape) or not np.all(np.isfinite(value)):
+        numbers = "" if shape is None else f"{shape[0]} "
+        raise GaitError(f"gait: {name} must hold {numbers}finite numbers, got {value}")
+    object.__setattr__(owner, name, value)
+
+
+def _only(pieces: Floats) -> Floats:
+    if len(pieces) > 1:
+        raise GaitError(
+            "a gait of piecewise polynomials has no single set of coefficients; use its pieces, or "
+            "position(), velocity() and acceleration()."
+        )
+    only: Floats = pieces[0]
+    return only
+
+
+def _joined(phases: list[Floats]) -> Floats:
+    """Pieces of all phases one after the other, with zeros for higher powers that some lack."""
+    terms = max(pieces.shape[1] for pieces in phases)
+    padded = [np.pad(p, ((0, 0), (0, terms - p.shape[1]), (0, 0))) for p in phases]
+    return np.concatenate(padded)
 
 
 def actuated_joints(robot: Robot) -> tuple[str, ...]:

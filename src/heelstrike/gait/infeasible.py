@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.program import Program, Solution
-from heelstrike.gait.starts import starting_points
-from heelstrike.gait.transcription import Group, Row
+from heelstrike.gait.starts import starts
+from heelstrike.gait.transcription import Group
 
 Floats = NDArray[np.float64]
 
@@ -32,21 +32,18 @@ def nearest_to_feasible(program: Program) -> Floats:
     InfeasibleGaitError
         If some violation always remains; the message names the constraints in conflict.
     """
-    transcription = program.transcription
     elastic = program.relaxed()
-    nearest: Solution | None = None
-    for guess in islice(starting_points(transcription.request), ATTEMPTS):
-        solution = elastic.solve(guess)
-        if np.abs(program.violations(solution.unknowns)).max() <= FEASIBLE:
-            return solution.unknowns
-        if nearest is None or solution.objective < nearest.objective:
-            nearest = solution
-    assert nearest is not None
+    found = []
+    for start in islice(starts(program.request), ATTEMPTS):
+        found.append(elastic.solve(program.sampled(start)))
+        if np.abs(program.violations(found[-1].unknowns)).max() <= FEASIBLE:
+            return found[-1].unknowns
+    nearest = min(found, key=lambda solution: solution.objective)
     raise InfeasibleGaitError(_message(program, nearest))
 
 
 def _message(program: Program, nearest: Solution) -> str:
-    request = program.transcription.request
+    request = program.request
     violated = _worst_violations(program, nearest.unknowns)
     binding = _binding_groups(program, nearest, set(violated))
     against = f" They are in conflict with: {_listed(binding)}." if binding else ""
@@ -66,20 +63,11 @@ def _listed(items: list[str]) -> str:
     return "; ".join(items[:NAMED]) + more
 
 
-def _labelled_rows(program: Program) -> list[tuple[Row, float | None]]:
-    """Meaning of every constraint of the program, with its phase if it is one along the path."""
-    transcription = program.transcription
-    rows: list[tuple[Row, float | None]] = [(row, None) for row in transcription.touchdown.rows]
-    for phase in program.phases:
-        rows += [(row, float(phase)) for row in transcription.path.rows]
-    return rows
-
-
 def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:
     """What is violated most in each group of constraints, in words, the worst group first."""
     violations = np.abs(program.violations(unknowns))
     worst: dict[Group, tuple[float, str]] = {}
-    for (row, phase), violation in zip(_labelled_rows(program), violations, strict=True):
+    for (row, phase), violation in zip(program.labelled_rows(), violations, strict=True):
         if violation <= FEASIBLE or violation <= worst.get(row.group, (0.0, ""))[0]:
             continue
         subject = f" ({row.subject})" if row.subject else ""
@@ -93,7 +81,7 @@ def _worst_violations(program: Program, unknowns: Floats) -> dict[Group, str]:
 def _binding_groups(program: Program, nearest: Solution, violated: set[Group]) -> list[str]:
     """Inequalities that hold, but only just, and keep the violated ones from holding."""
     strength: dict[Group, float] = {}
-    for (row, _), multiplier in zip(_labelled_rows(program), nearest.multipliers, strict=True):
+    for (row, _), multiplier in zip(program.labelled_rows(), nearest.multipliers, strict=True):
         if row.lower < row.upper:
             strength[row.group] = max(strength.get(row.group, 0.0), abs(float(multiplier)))
     ordered = sorted(strength, key=lambda group: -strength[group])

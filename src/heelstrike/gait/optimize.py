@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from itertools import islice
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.gait import Gait
-from heelstrike.gait.joint_ranges import JointRanges
-from heelstrike.gait.request import checked_request
+from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
+from heelstrike.gait.margins import margins_of
+from heelstrike.gait.request import JointRanges, Request
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
 
 if TYPE_CHECKING:
     from heelstrike.gait.program import Program, Solution
     from heelstrike.gait.transcription import Transcription
+
+Floats = NDArray[np.float64]
 
 
 def optimize_gait(
@@ -41,9 +48,10 @@ def optimize_gait(
 
     Every actuated joint follows one cubic polynomial a step; every step mirrors the one before
     (eq. 13). The robot always stands on one flat foot (eq. 11), in single support. The unknowns
-    are joint positions and velocities at the ends of the step. Where length and duration of the
-    step are not both fixed, they are unknowns too and the cost *per metre* is minimised: the cost
-    alone would be least for a robot that stands still.
+    are the joints' positions at the end of the step, their velocities at its beginning and their
+    accelerations. Where length and duration of the step are not both fixed, they are unknowns too
+    and the cost *per metre* is minimised: the cost alone would be least for a robot that stands
+    still.
 
     The constraints hold at all times, not only at the nodes of a grid: they are checked on a grid
     ten times finer and at the maxima between its points, and phases are added where they fail,
@@ -54,8 +62,8 @@ def optimize_gait(
     On point feet (one contact point each) the ground exerts no moment and the robot is
     underactuated: not every motion of the joints is possible. There, joints and the trunk's pitch
     follow piecewise polynomials of degree 5, which satisfy the equation of motion that no motor
-    enters at the Gauss points of every interval (direct collocation), and the result is a
-    :class:`PiecewiseGait`. Controllers that follow it in time need not be stable.
+    enters at the Gauss points of every interval (direct collocation). Controllers that follow such
+    a gait in time need not be stable.
 
     Parameters
     ----------
@@ -120,37 +128,17 @@ def optimize_gait(
     >>> gait.position([0.0, 0.35]).shape
     (2, 6)
     """
-    request = checked_request(
-        robot,
-        step_length=step_length,
-        step_duration=step_duration,
-        speed=speed,
-        friction=friction,
-        clearance=clearance,
-        clearance_profile=clearance_profile,
-        zmp_margin=zmp_margin,
-        force_margin=force_margin,
-        joint_speed_limit=joint_speed_limit,
-        joint_ranges=joint_ranges,
-        impact=impact,
-        intervals=intervals,
-        starts=starts,
-    )
-    report = _Forward(progress)
+    asked = dict(locals())  # all arguments, by name
+    report = _Forward(asked.pop("progress"))
+    request = Request(**asked)
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
-    if request.point_feet:
-        from heelstrike.gait.collocation import collocated_gait
-
-        return collocated_gait(request, report)
     from heelstrike.gait.transcription import Transcription
 
     transcription = Transcription(request)
     *others, last = request.profiles
     for profile in others:
-        try:
+        with suppress(InfeasibleGaitError):  # the last profile asks least of the swing foot
             return _designed(transcription, profile, report)
-        except InfeasibleGaitError:
-            continue  # the last profile asks least of the swing foot
     return _designed(transcription, last, report)
 
 
@@ -170,12 +158,10 @@ class _Forward:
 def _designed(
     transcription: Transcription, profile: ClearanceProfile, report: Callable[[float], None]
 ) -> Gait:
-    from heelstrike.gait.program import Program, lobatto
+    from heelstrike.gait.program import Program, first_instants
     from heelstrike.gait.refinement import held_between_nodes
-    from heelstrike.gait.result import designed_gait
 
-    nodes, weights = lobatto(transcription.request.intervals)
-    program = Program(transcription, nodes, weights, profile=profile)
+    program = Program(transcription, profile, *first_instants(transcription.request))
     report(0.05)
     best = _best_of_starts(program, report)
     unknowns = held_between_nodes(program, best)
@@ -185,10 +171,10 @@ def _designed(
 
 def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:
     from heelstrike.gait.infeasible import nearest_to_feasible
-    from heelstrike.gait.starts import starting_points
+    from heelstrike.gait.starts import starts
 
-    request = program.transcription.request
-    guesses = list(islice(starting_points(request), request.starts))
+    request = program.request
+    guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
     solutions: list[Solution] = []
     while guesses:
         solutions.append(program.solve(guesses.pop(0)))
@@ -205,3 +191,40 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
             "for a shorter or slower step or a lower clearance of the swing foot."
         )
     return min(converged, key=lambda solution: solution.objective)
+
+
+def designed_gait(program: Program, unknowns: Floats) -> Gait:
+    """Gait with the given unknowns, its joints in the order of the actuators."""
+    transcription, request = program.transcription, program.request
+    robot, stance = request.robot, request.stance
+    mirror, joint = robot.mirror, robot.model.actuator_joint
+    assert mirror is not None
+    pieces = program.pieces(unknowns)
+    end, _, start_velocity, duration, length = touchdown = program.at_touchdown(unknowns)
+    impulse = np.zeros(3)
+    if request.impact:
+        impulse[: stance.held] = np.array(transcription.landing(*touchdown[:3])[0]).ravel()
+    state = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
+    phase = Phase(
+        contacts={stance.foot: Footing.FLAT if stance.flat else Footing.POINT},
+        breakpoints=float(duration) * np.linspace(0.0, 1.0, len(pieces) + 1),
+        pieces=pieces[:, :, joint - stance.held],
+        pitch_pieces=None if stance.flat else pieces[:, :, 0],
+    )
+    return Gait(
+        robot=robot.name,
+        fingerprint=fingerprint(robot),
+        joint_names=actuated_joints(robot),
+        step_length=float(length),
+        phases=(phase,),
+        mirror_joint=np.argsort(joint)[mirror.joint[joint] - 3],
+        mirror_sign=mirror.sign[joint],
+        mirror_offset=mirror.position(np.zeros(robot.nv), robot.model.reference)[joint],
+        initial_state=State(*state),
+        cost=program.effort(unknowns),
+        friction=request.friction,
+        clearance=request.clearance,
+        clearance_profile=program.profile,
+        touchdown_impulse=impulse[[1, 0, 2]],
+        margins=margins_of(program, unknowns),
+    )

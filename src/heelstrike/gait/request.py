@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.joint_ranges import JointRanges, ranges_kept
-from heelstrike.gait.sole import Sole, point_sole, sole
+from heelstrike.gait.sole import Sole, reach, sole, standing_height
 from heelstrike.robot.robot import Robot
+
+Floats = NDArray[np.float64]
+
+JointRanges = Mapping[str, tuple[float, float]]
+"""Lowest and highest position (rad, m for a slide) of joints by name."""
 
 STANCE_FOOT = 0
 """Index of the foot that stands during the first step."""
@@ -21,6 +27,9 @@ NODES = 26
 """Default intervals of the Gauss-Lobatto grid of a step on flat feet."""
 MESH = 12
 """Default intervals of the mesh of a step on point feet."""
+
+STEP_UNITS = {"step_length": "m", "step_duration": "s", "speed": "m/s"}
+"""What may be asked of a step."""
 
 SHORTEST, LONGEST = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
@@ -32,56 +41,153 @@ LEAST_FREE_LENGTH = 0.05
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Request:
-    """A checked request for a gait; lengths in m, times in s, forces in N.
+    """A request for a gait, checked: the arguments of :func:`heelstrike.gait.optimize_gait`.
+
+    What follows from the others is filled in: the margins and intervals that were not given, and
+    where two of length, duration and speed fix the step, its length and duration, without a speed.
 
     Attributes
     ----------
-    robot : Robot
-        The robot.
     stance, swing : Sole
-        Its feet in the first step.
+        The feet in the first step.
     height : float
-        Height of the trunk above the soles when the robot stands in its reference configuration.
-    reach : float
-        Upper bound of the distance between the feet.
-    step_length, step_duration, speed : float or None
-        What is prescribed. The speed is None if it follows from the other two.
-    friction, clearance, zmp_margin, force_margin, joint_speed_limit : float
-        Options, with their defaults filled in.
+        Height (m) of the trunk above the soles when the robot stands in its reference
+        configuration.
     lower, upper : (nv,) arrays
         Ends of the ranges that the joints keep to (rad, m for a slide).
+    reach : float
+        Upper bound of the distance between the feet (m).
     profiles : tuple of ClearanceProfile
         Shapes of the swing foot's clearance, to be tried in this order.
-    impact : bool
-        Whether the foot lands with an impact.
-    intervals, starts : int
-        Size of the grid and number of starting points.
+
+    Raises
+    ------
+    GaitError
+        If the robot cannot walk this way or an argument makes no sense.
+    InfeasibleGaitError
+        If the step is longer than the legs reach.
     """
 
     robot: Robot
-    stance: Sole
-    swing: Sole
-    height: float
-    reach: float
     step_length: float | None
     step_duration: float | None
     speed: float | None
     friction: float
     clearance: float
+    clearance_profile: ClearanceProfile | str | None
     zmp_margin: float
     force_margin: float
     joint_speed_limit: float
-    lower: NDArray[np.float64]
-    upper: NDArray[np.float64]
-    profiles: tuple[ClearanceProfile, ...]
+    joint_ranges: JointRanges | None
     impact: bool
     intervals: int
     starts: int
+    stance: Sole = field(init=False)
+    swing: Sole = field(init=False)
+    height: float = field(init=False)
+    lower: Floats = field(init=False)
+    upper: Floats = field(init=False)
+    reach: float = field(init=False)
+    profiles: tuple[ClearanceProfile, ...] = field(init=False)
 
-    @property
-    def point_feet(self) -> bool:
-        """Whether the robot stands on points, without a moment of the ground."""
-        return self.stance.half_length == 0.0
+    def __post_init__(self) -> None:
+        robot = self.robot
+        _check_robot(robot)
+        lower, upper = ranges_kept(robot, self.joint_ranges)
+        stance, swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
+        self._set(
+            stance=stance,
+            swing=swing,
+            lower=lower,
+            upper=upper,
+            height=standing_height(robot, stance),
+            reach=reach(robot, (stance, swing), lower, upper),
+            profiles=_profiles(self.clearance_profile, self.impact),
+        )
+        self._check_step()
+        self._check_margins()
+        self._fill("intervals", NODES if stance.flat else MESH)
+        self._check_count("intervals", 10 if stance.flat else 4, 1000)
+        self._check_count("starts", 1, 100)
+
+    def _set(self, **values: Any) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    def _fill(self, name: str, default: float) -> None:
+        if getattr(self, name) is None:
+            self._set(**{name: default})
+
+    def _check_number(self, name: str, *, positive: str = "", infinite: bool = False) -> None:
+        """Make a number a float, once it is one: not negative, or positive, of some unit."""
+        value = getattr(self, name)
+        if value is None:
+            return
+        number = isinstance(value, int | float | np.integer | np.floating)
+        fits = number and not isinstance(value, bool) and (infinite or math.isfinite(value))
+        if not fits or not (value > 0.0 if positive else value >= 0.0):
+            what = (
+                f"a positive number ({positive})" if positive else "a number that is not negative"
+            )
+            raise GaitError(f"{name} must be {what}, got {value!r}")
+        self._set(**{name: float(value)})
+
+    def _check_count(self, name: str, lowest: int, highest: int) -> None:
+        value = getattr(self, name)
+        if isinstance(value, bool) or not isinstance(value, int | np.integer):
+            raise GaitError(f"{name} must be a whole number, got {value!r}")
+        if not lowest <= value <= highest:
+            raise GaitError(f"{name} must be between {lowest} and {highest}, got {value}")
+
+    def _check_step(self) -> None:
+        for name, unit in STEP_UNITS.items():
+            self._check_number(name, positive=unit)
+        length, duration, speed = self.step_length, self.step_duration, self.speed
+        if length is not None and duration is not None and speed is not None:
+            raise GaitError(
+                "step_length, step_duration and speed are all given; the speed is the length over "
+                "the duration, so give two of them at most."
+            )
+        if speed is not None and duration is not None:
+            length, speed = speed * duration, None
+        elif speed is not None and length is not None:
+            duration, speed = length / speed, None
+        self._set(step_length=length, step_duration=duration, speed=speed)
+        if length is not None and length >= self.reach:
+            raise InfeasibleGaitError(
+                f"robot {self.robot.name!r} cannot take a step of {length:g} m: stretched flat "
+                f"out, its legs put the feet less than {self.reach:.4g} m apart."
+            )
+        shortest, longest = (k * self.pendulum_time for k in (SHORTEST, LONGEST))
+        if duration is not None and not shortest <= duration <= longest:
+            raise InfeasibleGaitError(
+                f"a step of {duration:g} s is out of range for robot {self.robot.name!r}: with a "
+                f"trunk {self.height:.3g} m above the ground, steps between {shortest:.2g} s and "
+                f"{longest:.2g} s are considered."
+            )
+
+    def _check_margins(self) -> None:
+        stance, robot = self.stance, self.robot
+        if not stance.flat and self.zmp_margin is not None:
+            raise GaitError(
+                f"robot {robot.name!r} has point feet: the zero moment point is where they stand, "
+                "and zmp_margin means nothing. Leave it out."
+            )
+        self._fill("zmp_margin", 0.2 * stance.half_length)
+        self._fill("force_margin", 0.1 * robot.weight)
+        for name in ("friction", "clearance", "zmp_margin", "force_margin"):
+            self._check_number(name)
+        self._check_number("joint_speed_limit", positive="rad/s", infinite=True)
+        if stance.flat and self.zmp_margin >= stance.half_length:
+            raise GaitError(
+                f"zmp_margin = {self.zmp_margin:g} m leaves nothing of the sole, which reaches "
+                f"{stance.half_length:g} m to each side of its middle."
+            )
+        if self.force_margin >= robot.weight:
+            raise GaitError(
+                f"force_margin = {self.force_margin:g} N is more than the robot's weight, "
+                f"{robot.weight:g} N, which the ground carries on average."
+            )
 
     @property
     def pendulum_time(self) -> float:
@@ -108,113 +214,9 @@ class Request:
         return self.step_length is None or self.step_duration is None
 
     def __str__(self) -> str:
-        asked = [
-            f"{name} = {value:g} {unit}"
-            for name, value, unit in (
-                ("step_length", self.step_length, "m"),
-                ("step_duration", self.step_duration, "s"),
-                ("speed", self.speed, "m/s"),
-            )
-            if value is not None
-        ]
+        given = [name for name in STEP_UNITS if getattr(self, name) is not None]
+        asked = [f"{name} = {getattr(self, name):g} {STEP_UNITS[name]}" for name in given]
         return ", ".join([*asked, f"friction = {self.friction:g}"])
-
-
-def checked_request(
-    robot: Robot,
-    *,
-    step_length: float | None,
-    step_duration: float | None,
-    speed: float | None,
-    friction: float,
-    clearance: float,
-    clearance_profile: ClearanceProfile | str | None,
-    zmp_margin: float | None,
-    force_margin: float | None,
-    joint_speed_limit: float,
-    joint_ranges: JointRanges | None,
-    impact: bool,
-    intervals: int | None,
-    starts: int,
-) -> Request:
-    """Check the arguments of :func:`heelstrike.gait.optimize_gait` and fill in defaults.
-
-    Raises
-    ------
-    GaitError
-        If the robot cannot walk this way or an argument makes no sense.
-    InfeasibleGaitError
-        If the step is longer than the legs reach.
-    """
-    _check_robot(robot)
-    lower, upper = ranges_kept(robot, joint_ranges)
-    points = all(len(foot.contacts) == 1 for foot in robot.feet)
-    find = point_sole if points else sole
-    stance, swing = find(robot, STANCE_FOOT), find(robot, 1 - STANCE_FOOT)
-    _positive("step_length", step_length, "m")
-    _positive("step_duration", step_duration, "s")
-    _positive("speed", speed, "m/s")
-    if step_length is not None and step_duration is not None and speed is not None:
-        raise GaitError(
-            "step_length, step_duration and speed are all given; the speed is the length over the "
-            "duration, so give two of them at most."
-        )
-    if speed is not None and step_duration is not None:
-        step_length = speed * step_duration
-    elif speed is not None and step_length is not None:
-        step_duration = step_length / speed
-    if step_length is not None and step_duration is not None:
-        speed = None  # it has done its work
-    _not_negative("friction", friction)
-    _not_negative("clearance", clearance)
-    _positive("joint_speed_limit", joint_speed_limit, "rad/s", infinite=True)
-    if points and zmp_margin is not None:
-        raise GaitError(
-            f"robot {robot.name!r} has point feet: the zero moment point is where they stand, and "
-            "zmp_margin means nothing. Leave it out."
-        )
-    zmp_margin = 0.2 * stance.half_length if zmp_margin is None else zmp_margin
-    _not_negative("zmp_margin", zmp_margin)
-    if zmp_margin >= stance.half_length and not points:
-        raise GaitError(
-            f"zmp_margin = {zmp_margin:g} m leaves nothing of the sole, which reaches "
-            f"{stance.half_length:g} m to each side of its middle."
-        )
-    force_margin = 0.1 * robot.weight if force_margin is None else force_margin
-    _not_negative("force_margin", force_margin)
-    if force_margin >= robot.weight:
-        raise GaitError(
-            f"force_margin = {force_margin:g} N is more than the robot's weight, "
-            f"{robot.weight:g} N, which the ground carries on average."
-        )
-    if intervals is None:
-        intervals = MESH if points else NODES
-    _whole("intervals", intervals, 4 if points else 10, 1000)
-    _whole("starts", starts, 1, 100)
-    height = _standing_height(robot, stance)
-    request = Request(
-        robot=robot,
-        stance=stance,
-        swing=swing,
-        height=height,
-        reach=_reach(robot, stance, swing, lower, upper),
-        step_length=None if step_length is None else float(step_length),
-        step_duration=None if step_duration is None else float(step_duration),
-        speed=None if speed is None else float(speed),
-        friction=float(friction),
-        clearance=float(clearance),
-        zmp_margin=float(zmp_margin),
-        force_margin=float(force_margin),
-        joint_speed_limit=float(joint_speed_limit),
-        lower=lower,
-        upper=upper,
-        profiles=_profiles(clearance_profile, impact),
-        impact=bool(impact),
-        intervals=int(intervals),
-        starts=int(starts),
-    )
-    _check_scale(request)
-    return request
 
 
 def _profiles(profile: ClearanceProfile | str | None, impact: bool) -> tuple[ClearanceProfile, ...]:
@@ -263,98 +265,69 @@ def _check_robot(robot: Robot) -> None:
         )
 
 
-def _check_scale(request: Request) -> None:
-    length, duration = request.step_length, request.step_duration
-    if length is not None and length >= request.reach:
-        raise InfeasibleGaitError(
-            f"robot {request.robot.name!r} cannot take a step of {length:g} m: stretched flat out, "
-            f"its legs put the feet less than {request.reach:.4g} m apart."
+def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats]:
+    """Lowest and highest position of every coordinate, (nv,) each: the robot's ranges and `asked`.
+
+    Every step of a gait mirrors the one before, so that what is asked of a joint holds for its
+    counterpart on the other side, too.
+
+    Parameters
+    ----------
+    robot : Robot
+        A robot with a mirror map.
+    asked : mapping of str to (float, float), optional
+        Ranges by the names of joints (rad, m for a slide); an infinite end leaves the robot's own.
+
+    Raises
+    ------
+    GaitError
+        If there is no joint of that name, or if a range is none or has no part in the robot's.
+    """
+    model, mirror = robot.model, robot.mirror
+    assert mirror is not None
+    lower, upper = model.lower.copy(), model.upper.copy()
+    joints = {name: j for j, name in enumerate(robot.joint_names) if j > 2}
+    for name, ends in _named(asked).items():
+        if name not in joints:
+            raise GaitError(
+                f"joint_ranges: robot {robot.name!r} has no joint {name!r}; its joints are "
+                f"{', '.join(joints)}."
+            )
+        j, (low, high) = joints[name], _ends(name, ends)
+        lower[j], upper[j] = max(lower[j], low), min(upper[j], high)
+        # Where its counterpart is when this joint is at either end of what is asked.
+        other = int(np.flatnonzero(mirror.joint == j)[0])
+        seen = sorted(
+            model.reference[other] + mirror.sign[other] * (end - model.reference[j])
+            for end in (low, high)
         )
-    shortest, longest = (k * request.pendulum_time for k in (SHORTEST, LONGEST))
-    if duration is not None and not shortest <= duration <= longest:
-        raise InfeasibleGaitError(
-            f"a step of {duration:g} s is out of range for robot {request.robot.name!r}: with a "
-            f"trunk {request.height:.3g} m above the ground, steps between {shortest:.2g} s and "
-            f"{longest:.2g} s are considered."
-        )
+        lower[other], upper[other] = max(lower[other], seen[0]), min(upper[other], seen[1])
+        if lower[j] >= upper[j] or lower[other] >= upper[other]:
+            raise GaitError(
+                f"joint_ranges: {name!r} from {low:g} to {high:g} has no part in the range that "
+                f"robot {robot.name!r} gives it, {model.lower[j]:g} to {model.upper[j]:g}, or in "
+                "what is asked of its counterpart."
+            )
+    return lower, upper
 
 
-def _positive(name: str, value: float | None, unit: str, *, infinite: bool = False) -> None:
-    if value is None:
-        return
-    if not _is_number(value) or not (value > 0.0 and (infinite or math.isfinite(value))):
-        raise GaitError(f"{name} must be a positive number ({unit}), got {value!r}")
-
-
-def _not_negative(name: str, value: float) -> None:
-    if not _is_number(value) or not (value >= 0.0 and math.isfinite(value)):
-        raise GaitError(f"{name} must be a number that is not negative, got {value!r}")
-
-
-def _whole(name: str, value: int, lowest: int, highest: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise GaitError(f"{name} must be a whole number, got {value!r}")
-    if not lowest <= value <= highest:
-        raise GaitError(f"{name} must be between {lowest} and {highest}, got {value}")
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
-
-
-def _standing_height(robot: Robot, stance: Sole) -> float:
-    """Height of the trunk above a sole in the reference configuration, in m."""
-    model = robot.model
-    ground = np.zeros(2)
-    link = stance.link
-    ground += _turned(stance.point, stance.angle)
-    while link > 2:
-        ground += model.offset[link]
-        link = model.parent[link]
-    height = -float(ground[1])
-    if not height > 0.0:
+def _named(asked: JointRanges | None) -> dict[str, object]:
+    try:
+        return dict(asked or {})
+    except (TypeError, ValueError):
         raise GaitError(
-            f"robot {robot.name!r}: in its reference configuration the trunk is not above the "
-            "feet; give the robot's file a configuration in which it stands."
+            f"joint_ranges must give ranges by the names of joints, got {asked!r}"
+        ) from None
+
+
+def _ends(name: str, ends: object) -> tuple[float, float]:
+    try:
+        low, high = (float(end) for end in ends)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        low, high = np.nan, np.nan
+    if not low < high:
+        raise GaitError(
+            f"joint_ranges: {name!r} needs its lowest and highest position, two numbers in rising "
+            f"order (rad; m for a slide), got {ends!r}"
         )
-    return height
-
-
-def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([c * vector[0] + s * vector[1], c * vector[1] - s * vector[0]])
-
-
-def _reach(
-    robot: Robot,
-    stance: Sole,
-    swing: Sole,
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
-) -> float:
-    """Distance of the feet with both legs in one line, an upper bound of any step (m)."""
-    model = robot.model
-    chains = []
-    for foot in (stance, swing):
-        chain = []
-        link = foot.link
-        while link >= 0:
-            chain.append(link)
-            link = int(model.parent[link])
-        chains.append(chain)
-    common = set(chains[0]) & set(chains[1])
-    total = 0.0
-    hips = []
-    for chain in chains:
-        for link in chain:
-            if link in common:
-                break
-            # The last offset is from the trunk to the hip: only the distance of the hips counts.
-            if model.parent[link] in common:
-                hips.append(model.offset[link])
-            else:
-                total += float(np.hypot(*model.offset[link]))
-            if model.axis[link, 0] == 0.0:
-                span = np.abs([lower[link], upper[link]] - model.reference[link])
-                total += float(span.max())
-    return total + float(np.hypot(*(hips[0] - hips[1])))
+    return low, high

@@ -1,4 +1,4 @@
-"""The flat underside of a foot: how it must be turned to lie on level ground, and where it ends."""
+"""How a foot stands on level ground: flat between heel and toe, or on a point."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TOUCHING = 1e-9
 
 @dataclass(frozen=True)
 class Sole:
-    """A foot lying flat.
+    """A foot standing on level ground.
 
     Attributes
     ----------
@@ -28,11 +28,13 @@ class Sole:
     link : int
         Link of the foot.
     angle : float
-        Rotation of the link about +y (rad) at which the foot lies flat.
+        Rotation of the link about +y (rad) at which the foot lies flat; zero for a point foot.
     point : (2,) float
-        Middle of the sole on the ground, in the link frame (m).
+        Middle of the sole on the ground, or centre of a point foot's disc, in the link frame (m).
+    radius : float
+        Radius of a point foot's disc (m), which rolls; zero for a flat foot.
     half_length : float
-        Distance (m) from the middle of the sole to its heel and toe.
+        Distance (m) from the middle of the sole to its heel and toe; zero for a point foot.
     contacts : tuple of int
         All contact points of the foot.
     """
@@ -41,27 +43,37 @@ class Sole:
     link: int
     angle: float
     point: Floats
+    radius: float
     half_length: float
     contacts: tuple[int, ...]
 
+    @property
+    def flat(self) -> bool:
+        """Whether the ground can exert a moment on the foot."""
+        return self.half_length > 0.0
+
+    @property
+    def held(self) -> int:
+        """How many coordinates of the trunk follow from the others: x, z and, if flat, pitch."""
+        return 3 if self.flat else 2
+
 
 def sole(robot: Robot, foot: int) -> Sole:
-    """Find the flat sole of a foot: the pair of its contact discs it can rest on.
+    """Find what a foot stands on: its only contact disc, or the pair of them it can rest on.
 
     Of several such pairs, the one nearest to the foot's reference orientation counts.
 
     Raises
     ------
     GaitError
-        If the foot has fewer than two contact points, or they all lie in one place.
+        If the foot has several contact points, but all in one place.
     """
-    name = robot.feet[foot].name
+    name, link = robot.feet[foot].name, robot.feet[foot].link
     contacts = robot.feet[foot].contacts
-    if len(contacts) < 2:
-        raise GaitError(
-            f"robot {robot.name!r}: foot {name!r} has {len(contacts)} contact point(s). A flat "
-            "foot needs a heel and a toe; for a gait on points, give each foot a single one."
-        )
+    if len(contacts) == 1:
+        (contact,) = contacts
+        center, disc = robot.model.contact_position[contact], robot.model.contact_radius[contact]
+        return Sole(foot, link, 0.0, center, float(disc), 0.0, contacts)
     center = robot.model.contact_position[list(contacts)]
     radius = robot.model.contact_radius[list(contacts)]
     best: tuple[float, float, float, float] | None = None
@@ -78,19 +90,11 @@ def sole(robot: Robot, foot: int) -> Sole:
     if best is None:
         raise GaitError(
             f"robot {robot.name!r}: foot {name!r} cannot rest flat on its contact points; they "
-            "lie in one place. Give it a heel and a toe."
+            "lie in one place. Give it a heel and a toe, or a single one for a gait on points."
         )
     angle, heel, toe, ground = best
     point = np.array(_rotated(np.array([[0.5 * (heel + toe), ground]]), -angle)).ravel()
-    return Sole(foot, robot.feet[foot].link, angle, point, 0.5 * (toe - heel), contacts)
-
-
-def point_sole(robot: Robot, foot: int) -> Sole:
-    """Return the sole of a foot with a single contact disc: the bottom of it, without length."""
-    (contact,) = robot.feet[foot].contacts
-    radius = float(robot.model.contact_radius[contact])
-    point = robot.model.contact_position[contact] - np.array([0.0, radius])
-    return Sole(foot, robot.feet[foot].link, 0.0, point, 0.0, (contact,))
+    return Sole(foot, link, angle, point, 0.0, 0.5 * (toe - heel), contacts)
 
 
 def _rotated(points: Floats, angle: float) -> tuple[Floats, Floats]:
@@ -113,3 +117,36 @@ def _tangent_angles(difference: Floats, radii: float) -> list[float]:
     offset = np.arcsin(radii / length)
     angles = np.array([direction - offset, direction - np.pi + offset])
     return [float(a) for a in np.arctan2(np.sin(angles), np.cos(angles))]
+
+
+def leg(robot: Robot, foot: Sole) -> list[int]:
+    """Links from a foot up, without those of the trunk's coordinates."""
+    links = [foot.link]
+    while (parent := int(robot.model.parent[links[-1]])) > 2:
+        links.append(parent)
+    return links
+
+
+def standing_height(robot: Robot, stance: Sole) -> float:
+    """Height of the trunk above a sole in the reference configuration, in m."""
+    ground = np.array(_rotated(stance.point, stance.angle)) - [0.0, stance.radius]
+    height = -float(ground[1] + robot.model.offset[leg(robot, stance), 1].sum())
+    if not height > 0.0:
+        raise GaitError(
+            f"robot {robot.name!r}: in its reference configuration the trunk is not above the "
+            "feet; give the robot's file a configuration in which it stands."
+        )
+    return height
+
+
+def reach(robot: Robot, feet: tuple[Sole, Sole], lower: Floats, upper: Floats) -> float:
+    """Distance of the feet with both legs in one line, an upper bound of any step (m)."""
+    model = robot.model
+    right, left = (leg(robot, foot) for foot in feet)
+    own = [[j for j in right if j not in left], [j for j in left if j not in right]]
+    # The last offset is from the trunk to the hip: only the distance of the hips counts.
+    hips = model.offset[own[0][-1]] - model.offset[own[1][-1]]
+    lengths = np.linalg.norm(model.offset[own[0][:-1] + own[1][:-1]], axis=1)
+    slides = [j for j in own[0] + own[1] if model.axis[j, 0] == 0.0]
+    spans = np.abs(np.array([lower[slides], upper[slides]]) - model.reference[slides])
+    return float(lengths.sum() + np.hypot(*hips) + spans.max(axis=0).sum())

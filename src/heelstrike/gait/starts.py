@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import product
 
 import casadi
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics.symbolic import TracedDynamics, symbols
 from heelstrike.gait.request import Request
-from heelstrike.gait.sole import Sole
+from heelstrike.gait.sole import leg
 
 Floats = NDArray[np.float64]
 
@@ -29,25 +30,53 @@ SWEEPS = 60
 DAMPING = 1e-4
 
 
-def starting_points(request: Request) -> Iterator[Floats]:
-    """Guesses of the unknowns (q(T), v(T), v(0), T, L), the most promising ones first.
+@dataclass(frozen=True)
+class Start:
+    """A step to start from: the parabola through three postures.
 
-    Each draws two postures, both feet on the ground and the swing foot passing the stance foot,
-    and takes the boundary velocities from the cubic through them.
+    Attributes
+    ----------
+    begin, middle, end : (n,) float
+        Positions of the coordinates that the stance foot leaves free, at the beginning, in the
+        middle and at the end of the step.
+    duration, length : float
+        Duration (s) and length (m) of the step.
     """
-    length, duration = typical_step(request)
+
+    begin: Floats
+    middle: Floats
+    end: Floats
+    duration: float
+    length: float
+
+    def motion(self, phases: Floats) -> tuple[Floats, Floats, Floats]:
+        """Positions, velocities and accelerations at phases of the step, (n, N) each."""
+        begin, middle, end = (part[:, None] for part in (self.begin, self.middle, self.end))
+        bow = 4.0 * (middle - 0.5 * (begin + end))
+        position = begin + phases * (end - begin) + phases * (1.0 - phases) * bow
+        velocity = (end - begin + (1.0 - 2.0 * phases) * bow) / self.duration
+        return position, velocity, (0.0 * phases - 2.0) * bow / self.duration**2
+
+
+def starts(request: Request) -> Iterator[Start]:
+    """Steps to start from, the most promising ones first.
+
+    Each goes from the mirror image of a posture with both feet on the ground, through one with the
+    swing foot passing the stance foot, to that posture.
+    """
+    mirror = request.robot.mirror
+    assert mirror is not None
+    length, duration, held = *typical_step(request), request.stance.held
     kinematics = _Kinematics(request)
     bends = (1.0, -1.0) if kinematics.bend_is_free else (1.0,)
-    for lean, height, bend in product(LEANS, HEIGHTS, bends):
+    for bend, lean, height in product(bends, LEANS, HEIGHTS):
         legs = height * request.height
-        low = np.sqrt(max(legs**2 - (0.5 * length) ** 2, (0.5 * legs) ** 2))
+        low = float(np.sqrt(max(legs**2 - (0.5 * length) ** 2, (0.5 * legs) ** 2)))
         lift = request.clearance + 0.02 * request.height
         end = kinematics.posture((length, 0.0), (0.5 * length, low, lean), bend)
         middle = kinematics.posture((0.0, lift), (0.0, legs, lean), bend)
-        start = _mirrored(request, end)
-        change = 2.0 * (end - start) / duration
-        bow = 8.0 / duration * (middle - 0.5 * (start + end))
-        yield np.concatenate([end, 0.5 * (change - bow), 0.5 * (change + bow), [duration, length]])
+        begin = mirror.position(end, request.robot.model.reference)
+        yield Start(begin[held:], middle[held:], end[held:], duration, length)
 
 
 def typical_step(request: Request) -> tuple[float, float]:
@@ -66,59 +95,52 @@ def typical_step(request: Request) -> tuple[float, float]:
     )
 
 
-def _mirrored(request: Request, joints: Floats) -> Floats:
-    mirror = request.robot.mirror
-    assert mirror is not None
-    reference = request.robot.model.reference[3:]
-    counterpart = mirror.joint[3:] - 3
-    mirrored: Floats = mirror.sign[3:] * (joints - reference)[counterpart] + reference
-    return mirrored
-
-
 class _Kinematics:
-    """Postures with both soles and the trunk in given places, as nearly as the robot can."""
+    """Postures with both feet and the trunk in given places, as nearly as the robot can."""
 
     def __init__(self, request: Request) -> None:
         robot = request.robot
-        self._robot = robot
+        self._request = request
         q = casadi.SX.sym("q", robot.nv)
         dynamics = TracedDynamics(robot, symbols(q))
         places = []
         for foot in (request.stance, request.swing):
-            places += [*dynamics.point_position(foot.link, foot.point)]
-            places.append(dynamics.work.angle[foot.link] - foot.angle)
+            x, z = dynamics.point_position(foot.link, foot.point)
+            turned = dynamics.work.angle[foot.link] - foot.angle
+            places += [x, z - foot.radius, turned][: foot.held]
         places += [*dynamics.work.origin[2], dynamics.work.angle[2]]
         places_vector = casadi.vertcat(*places)
         self._places = casadi.Function(
             "places", [q], [places_vector, casadi.jacobian(places_vector, q)]
         )
-        self._lower, self._upper = request.lower, request.upper
-        self._inside = [*_inside(request, request.stance), *_inside(request, request.swing)]
+        self._inside: list[int] = []  # hinges between hip and foot, or to a foot that is a point
+        for foot in (request.stance, request.swing):
+            hinges = [j for j in leg(robot, foot) if robot.model.axis[j, 0] != 0.0]
+            self._inside += hinges[1 if foot.flat else 0 : -1]
 
     @property
     def bend_is_free(self) -> bool:
         """Whether a joint inside a leg may bend both ways from the reference configuration."""
-        reference = self._robot.model.reference
-        return any(
-            self._lower[j] < reference[j] - BENT and self._upper[j] > reference[j] + BENT
-            for j in self._inside
-        )
+        asked, reference = self._request, self._request.robot.model.reference
+        free = (asked.lower < reference - BENT) & (asked.upper > reference + BENT)
+        return bool(free[self._inside].any())
 
     def posture(
         self, swing: tuple[float, float], trunk: tuple[float, float, float], bend: float
     ) -> Floats:
-        """Joint positions with the stance sole at the origin, (nv - 3,).
+        """Position with the stance foot at the origin, (nv,).
 
         Parameters
         ----------
         swing : tuple of 2 float
-            Place (x, z) of the middle of the swing sole, which is level.
+            Place (x, z) of the swing foot; a flat one is level.
         trunk : tuple of 3 float
             Place (x, z) and pitch of the trunk.
         bend : float
             Sense (+1, -1) in which joints inside a leg are bent at first if they may both ways.
         """
-        target = np.array([0.0, 0.0, 0.0, *swing, 0.0, *trunk])
+        level = [0.0][: self._request.stance.held - 2]  # a flat foot's angle
+        target = np.array([0.0, 0.0, *level, *swing, *level, *trunk])
         q = self._bent(bend)
         for _ in range(SWEEPS):
             value, jacobian = (np.array(part) for part in self._places(q))
@@ -127,29 +149,20 @@ class _Kinematics:
                 break
             normal = jacobian.T @ jacobian + DAMPING * np.eye(q.size)
             step = np.linalg.solve(normal, jacobian.T @ missing)
-            q = np.clip(q + step / max(1.0, np.abs(step).max() / BENT), self._lower, self._upper)
-        return q[3:]
+            q = self._in_range(q + step / max(1.0, np.abs(step).max() / BENT))
+        return q
 
     def _bent(self, bend: float) -> Floats:
         """Reference configuration with the joints inside the legs bent, in range."""
-        reference = self._robot.model.reference
-        q = np.clip(reference, self._lower, self._upper)
+        model = self._request.robot.model
+        q = self._in_range(model.reference)
         for j in self._inside:
-            wanted = reference[j] + bend * BENT * self._robot.model.axis[j, 0]
-            q[j] = np.clip(wanted, self._lower[j], self._upper[j])
-            if abs(q[j] - reference[j]) < 0.5 * BENT:  # a stop is in the way
-                other = reference[j] - bend * BENT * self._robot.model.axis[j, 0]
-                q[j] = np.clip(other, self._lower[j], self._upper[j])
+            for sense in (bend, -bend):  # the other one where a stop is in the way
+                q[j] = model.reference[j] + sense * BENT * model.axis[j, 0]
+                q = self._in_range(q)
+                if abs(q[j] - model.reference[j]) >= 0.5 * BENT:
+                    break
         return q
 
-
-def _inside(request: Request, foot: Sole) -> list[int]:
-    """Hinges between the first and the last of a leg: its knees."""
-    model = request.robot.model
-    chain = []
-    link = foot.link
-    while link > 2:
-        if model.axis[link, 0] != 0.0:
-            chain.append(int(link))
-        link = int(model.parent[link])
-    return chain[1:-1]
+    def _in_range(self, q: Floats) -> Floats:
+        return np.clip(q, self._request.lower, self._request.upper)

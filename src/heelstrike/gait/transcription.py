@@ -1,28 +1,22 @@
-"""The paper's optimisation as functions of finitely many unknowns (eq. 40-43 with 11-13, 20-22).
+"""What a step costs and must satisfy at one instant and at touchdown (eq. 11-13, 20-22, 40).
 
-The unknowns of one step are the joint positions at its end, the joint velocities at both ends, its
-duration and its length; the positions at its start are the mirror image of those at its end. All
-functions are exact expressions traced from the dynamics kernels, with exact derivatives.
+The kind of the feet decides: a flat sole bears a moment of the ground as long as its centre stays
+inside; on a point there is none, which is an equation along the path.
 """
 
 from __future__ import annotations
 
 import enum
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import casadi
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.dynamics.symbolic import expression, symbols
-from heelstrike.gait import cubic
-from heelstrike.gait.impact import Impact
 from heelstrike.gait.request import Request
-from heelstrike.gait.single_support import SingleSupport, Symbols
-
-Floats = NDArray[np.float64]
-
+from heelstrike.gait.support import Impact, Support, Symbols
 
 LIFT_TOLERANCE = 1e-6
 """Velocity (m/s) into the ground that the rear foot may have after the impact. A foot whose toe is
@@ -81,37 +75,6 @@ class Row:
     scale: float
 
 
-@dataclass(frozen=True)
-class Differentiable:
-    """Constraints with first and second derivatives with respect to the unknowns.
-
-    Attributes
-    ----------
-    rows : tuple of Row
-        Meaning of every constraint.
-    value : casadi.Function
-        Cost and values.
-    gradient : casadi.Function
-        Cost and its gradient.
-    jacobian : casadi.Function
-        Values and their Jacobian.
-    hessian : casadi.Function
-        Upper triangle of the Hessian of the Lagrangian; its last argument holds the multipliers of
-        the cost and of the constraints.
-
-    Notes
-    -----
-    Constraints along the path are functions of the unknowns and the phase, and the cost is the
-    integrand of the objective. Those at touchdown are functions of the unknowns, at no cost.
-    """
-
-    rows: tuple[Row, ...]
-    value: casadi.Function
-    gradient: casadi.Function
-    jacobian: casadi.Function
-    hessian: casadi.Function
-
-
 class Constraints:
     """Expressions and their meaning, collected one by one."""
 
@@ -136,7 +99,12 @@ class Constraints:
 
 
 class Transcription:
-    """Functions of the unknowns (q(T), v(T), v(0), T, L), each joint vector in coordinate order.
+    """Functions of the motion of a robot on one foot, and of the landing on the other.
+
+    The motion is that of the coordinates that the stance foot leaves free: the joints and, on a
+    point foot, the trunk's pitch before them. Torques and ground forces follow from it (inverse
+    dynamics), so that they are no unknowns. All functions are exact expressions traced from the
+    dynamics kernels.
 
     Parameters
     ----------
@@ -145,126 +113,91 @@ class Transcription:
 
     Attributes
     ----------
-    joints : int
-        Number of actuated joints.
-    path : Differentiable
-        Constraints at a phase t / T in [0, 1] of the step, and the integrand of the objective.
-    touchdown : Differentiable
-        Constraints at the end of the step.
+    size : int
+        Number n of free coordinates.
+    path_rows, touchdown_rows : list of Row
+        Meaning of the constraints.
+    path : casadi.Function
+        (q, v, a), each (n,), to ΓᵀΓ and the scaled constraints along the path.
     motion : casadi.Function
-        (unknowns, phase) to the scalars and vectors of the motion at that phase: foot wrench (x,
-        z, moment), torques, heights of the swing foot's contact points, joint positions.
+        (q, v, a) to the ground's wrench (x, z and, on a flat foot, moment), the torques and the
+        heights of the swing foot's contact points.
+    mirror : casadi.Function
+        (q, v) to their mirror images.
     start : casadi.Function
-        Unknowns to the whole position and velocity at the beginning of the step.
+        (q(T), v(0)) to the whole position and velocity at the beginning of the step, the stance
+        foot at the origin.
+    touchdown : casadi.Function
+        (q(T), v(T), v(0), duration, length) to the scaled constraints at the end of the step.
     landing : casadi.Function
-        Unknowns to the impulse (x, z, moment), and the vertical velocities of the landing contact
-        points before and of the rear contact points after touchdown.
+        (q(T), v(T), v(0)) to the impulse (x, z and, on a flat foot, moment) and the vertical
+        velocities of the landing contact points before and of the rear contact points after it.
     """
 
     def __init__(self, request: Request) -> None:
         self.request = request
         self.robot = request.robot
-        self.joints = self.robot.nv - 3
-        self._unknowns = casadi.SX.sym("unknowns", 3 * self.joints + 2)
-        entries = symbols(self._unknowns)
-        self._end, self._end_velocity, self._start_velocity = np.split(entries[:-2], 3)
-        self._duration, self._length = entries[-2:]
+        self.held = request.stance.held
+        self.size = self.robot.nv - self.held
         self._build_path()
         self._build_touchdown()
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return 3 * self.joints + 2
+    def _symbol(self, name: str) -> casadi.SX:
+        return casadi.SX.sym(name, self.size)
 
-    def _mirrored(self, joints: Symbols, *, positions: bool) -> Symbols:
-        """Mirror image of joint positions or velocities."""
-        mirror = self.robot.mirror
+    def _mirrored(self, q: Symbols, v: Symbols) -> tuple[Symbols, Symbols]:
+        """Mirror images of positions and velocities."""
+        mirror, reference = self.robot.mirror, self.robot.model.reference
         assert mirror is not None
-        reference = self.robot.model.reference[3:] if positions else np.zeros(self.joints)
-        counterpart = mirror.joint[3:] - 3
-        return mirror.sign[3:] * (joints[counterpart] - reference[counterpart]) + reference
-
-    def _polynomials(self) -> tuple[Any, Any, Any, Any]:
-        return cubic.coefficients(
-            expression(self._mirrored(self._end, positions=True)),
-            expression(self._end),
-            expression(self._start_velocity),
-            expression(self._end_velocity),
-            self._duration,
-        )
+        whole_q, whole_v = (np.array([*reference[: self.held], *part]) for part in (q, v))
+        images: Any = (mirror.position(whole_q, reference), mirror.velocity(whole_v))
+        return images[0][self.held :], images[1][self.held :]
 
     def _build_path(self) -> None:
-        request, robot, model = self.request, self.robot, self.robot.model
-        phase = casadi.SX.sym("phase")
-        polynomials = self._polynomials()
-        motion = [
-            symbols(function(polynomials, phase * self._duration))
-            for function in (cubic.position, cubic.velocity, cubic.acceleration)
-        ]
-        support = SingleSupport(robot, request.stance, *motion)
-        heights = [
-            support.point(request.swing.link, model.contact_position[i])[1]
-            - model.contact_radius[i]
-            for i in request.swing.contacts
-        ]
+        request, robot = self.request, self.robot
+        arguments = [self._symbol(name) for name in "qva"]
+        q, v, a = (symbols(part) for part in arguments)
+        support = Support(robot, request.stance, q, v, a)
+        heights = [support.height(i) for i in request.swing.contacts]
+        weight = robot.weight
         constraints = Constraints()
-        self._add_forces(constraints, support)
+        for moment in support.missing:
+            constraints.add(Group.ANKLE, moment, upper=0.0, unit=weight * request.height)
+        force_z = support.wrench[1]
+        constraints.add(Group.NORMAL_FORCE, force_z, lower=request.force_margin, unit=weight)
+        self._add_cone(
+            constraints, support.wrench, (Group.FRICTION, Group.ZERO_MOMENT_POINT), weight
+        )
         for i, height in zip(request.swing.contacts, heights, strict=True):
             constraints.add(Group.CLEARANCE, height, subject=robot.contact_names[i])
-        add_joint_limits(constraints, self.request, motion[0], motion[1], support.torque)
-
-        effort = self._duration * casadi.sumsqr(expression(support.torque))
-        if request.free_step:
-            effort = effort / self._length
-        x = self._unknowns
-        self.path = _differentiated(constraints, [x, phase], effort)
+        first = 3 - self.held  # of the joints among the free coordinates
+        _add_joint_limits(constraints, request, q[first:], v[first:], support)
+        self.path_rows = constraints.rows
+        torque = expression(support.torque)
+        stacked = casadi.cse(casadi.vertcat(casadi.sumsqr(torque), *constraints.expressions))
+        self.path = casadi.Function("path", arguments, [stacked[0], stacked[1:]])
+        wrench = expression(support.wrench)
         self.motion = casadi.Function(
-            "motion",
-            [x, phase],
-            [
-                casadi.vertcat(support.force_x, support.force_z, support.moment),
-                expression(support.torque),
-                casadi.vertcat(*heights),
-                expression(motion[0]),
-            ],
-        )
-        at_start = casadi.Function(
-            "state", [x, phase], [expression(support.q), expression(support.v)]
-        )
-        self.start = casadi.Function("start", [x], at_start(x, 0.0))
-
-    def _add_forces(self, constraints: Constraints, support: SingleSupport) -> None:
-        """Ground wrench unilateral, in the friction cone, centred inside the sole."""
-        request = self.request
-        weight = self.robot.weight
-        constraints.add(
-            Group.NORMAL_FORCE, support.force_z, lower=request.force_margin, unit=weight
-        )
-        self._add_cone(
-            constraints,
-            (support.force_x, support.force_z, support.moment),
-            (Group.FRICTION, Group.ZERO_MOMENT_POINT),
-            weight,
+            "motion", arguments, [wrench, torque, casadi.vertcat(*heights)]
         )
 
     def _add_cone(
         self,
         constraints: Constraints,
-        wrench: tuple[Any, Any, Any],
+        wrench: Symbols,
         groups: tuple[Group, Group],
         unit: float,
     ) -> None:
-        """Friction cone and centre of pressure of a wrench, p_x = -m / f_z (paper eq. 44).
+        """Friction cone of a wrench and, on a flat foot, its centre p_x = -m / f_z (eq. 44).
 
         The sign is that of a moment about +y, which a force f_z at x > 0 makes negative.
         """
-        x, z, moment = wrench
+        x, z, *moments = wrench
         friction, half = self.request.friction, self.request.stance.half_length
         inside = half - self.request.zmp_margin
         for side, name in ((1.0, "forward"), (-1.0, "backward")):
             constraints.add(groups[0], friction * z - side * x, subject=name, unit=unit)
-        for side, name in ((1.0, "toe"), (-1.0, "heel")):
+        for moment, (side, name) in product(moments, ((1.0, "toe"), (-1.0, "heel"))):
             # A distance times a force; one unit of it is half a sole at `unit`.
             constraints.add(
                 groups[1],
@@ -275,88 +208,71 @@ class Transcription:
             )
 
     def _build_touchdown(self) -> None:
-        request, robot, model = self.request, self.robot, self.robot.model
-        swing = request.swing
-        support = SingleSupport(robot, request.stance, self._end, self._end_velocity)
-        after = self._mirrored(self._start_velocity, positions=False)
-        impact = Impact(support, swing, after)
-        before_x, before_z, before_turn = support.jacobian(swing.link, swing.point) @ support.v
-        landing = [
-            support.jacobian(swing.link, model.contact_position[i])[1] @ support.v
-            for i in swing.contacts
-        ]
-        lift = [
-            support.jacobian(request.stance.link, model.contact_position[i])[1] @ impact.v
-            for i in request.stance.contacts
-        ]
-
-        constraints = Constraints()
-        place = support.point(swing.link, swing.point)
-        exact: dict[str, Any] = {"lower": 0.0, "upper": 0.0}
-        constraints.add(Group.TOUCHDOWN_PLACE, place[0] - self._length, subject="x", **exact)
-        constraints.add(Group.TOUCHDOWN_PLACE, place[1], subject="z", **exact)
-        constraints.add(Group.TOUCHDOWN_ANGLE, support.angle(swing.link) - swing.angle, **exact)
-        joint_names = robot.joint_names[3:]
-        impulse = (impact.impulse_x, impact.impulse_z, impact.impulse_moment)
-        if request.impact:
-            unit = robot.weight
-            for name, residual in zip(joint_names, impact.joint_impulse, strict=True):
-                constraints.add(Group.IMPACT, residual, subject=name, unit=unit, **exact)
-            constraints.add(Group.IMPULSE, impact.impulse_z, unit=unit)
-            self._add_cone(
-                constraints, impulse, (Group.IMPULSE_FRICTION, Group.IMPULSE_CENTER), unit
-            )
-            for i, speed in zip(swing.contacts, landing, strict=True):
-                subject = robot.contact_names[i]
-                constraints.add(Group.LANDING, speed, subject=subject, lower=-np.inf, upper=0.0)
-            for i, speed in zip(request.stance.contacts, lift, strict=True):
-                constraints.add(
-                    Group.LIFT, speed, subject=robot.contact_names[i], lower=-LIFT_TOLERANCE
-                )
-        else:
-            for subject, speed in (("x", before_x), ("z", before_z), ("turn", before_turn)):
-                constraints.add(Group.REST, speed, subject=subject, **exact)
-            for name, jump in zip(joint_names, after - self._end_velocity, strict=True):
-                constraints.add(Group.PERIODIC, jump, subject=name, **exact)
-        if request.speed is not None:
-            speed = self._length / self._duration
-            constraints.add(
-                Group.SPEED, speed, lower=request.speed, upper=request.speed, unit=request.speed
-            )
-        x = self._unknowns
-        self.touchdown = _differentiated(constraints, [x], casadi.SX(0))
+        request, robot = self.request, self.robot
+        q, v, v_start = moving = [self._symbol(name) for name in ("q", "v", "v_start")]
+        duration, length = casadi.SX.sym("duration"), casadi.SX.sym("length")
+        q_start, after = self._mirrored(symbols(q), symbols(v_start))
+        self.mirror = casadi.Function(
+            "mirror", [q, v_start], [expression(q_start), expression(after)]
+        )
+        start = Support(robot, request.stance, q_start, symbols(v_start))
+        self.start = casadi.Function(
+            "start", [q, v_start], [expression(start.q), expression(start.v)]
+        )
+        end = Support(robot, request.stance, symbols(q), symbols(v))
+        impact = Impact(end, request.swing, after)
+        landing = [end.rise(i, end.v) for i in request.swing.contacts]
+        lift = [end.rise(i, impact.v) for i in request.stance.contacts]
         self.landing = casadi.Function(
             "landing",
-            [x],
-            [casadi.vertcat(*impulse), casadi.vertcat(*landing), casadi.vertcat(*lift)],
+            moving,
+            [expression(impact.impulse), casadi.vertcat(*landing), casadi.vertcat(*lift)],
         )
+        constraints = Constraints()
+        x, z = end.place(request.swing)
+        ahead = x + end.rolled - start.rolled - length
+        constraints.add(Group.TOUCHDOWN_PLACE, ahead, subject="x", upper=0.0)
+        constraints.add(Group.TOUCHDOWN_PLACE, z, subject="z", upper=0.0)
+        if request.swing.flat:
+            tilt = end.angle(request.swing) - request.swing.angle
+            constraints.add(Group.TOUCHDOWN_ANGLE, tilt, upper=0.0)
+        if request.impact:
+            self._add_impact(constraints, impact, landing, lift)
+        else:
+            before = end.jacobian(request.swing) @ end.v
+            for subject, speed in zip(("x", "z", "turn"), before, strict=False):
+                constraints.add(Group.REST, speed, subject=subject, upper=0.0)
+            for name, jump in zip(robot.joint_names[self.held :], after - symbols(v), strict=True):
+                constraints.add(Group.PERIODIC, jump, subject=name, upper=0.0)
+        if request.speed is not None:
+            speed, unit = length / duration, request.speed
+            constraints.add(Group.SPEED, speed, lower=unit, upper=unit, unit=unit)
+        self.touchdown_rows = constraints.rows
+        values = casadi.cse(casadi.vertcat(*constraints.expressions))
+        self.touchdown = casadi.Function("touchdown", [*moving, duration, length], [values])
+
+    def _add_impact(
+        self, constraints: Constraints, impact: Impact, landing: list[Any], lift: list[Any]
+    ) -> None:
+        """Momentum balanced, impulse inside cone and sole, one foot coming down, one let go."""
+        request, names, unit = self.request, self.robot.contact_names, self.robot.weight
+        for name, residual in zip(self.robot.joint_names[self.held :], impact.rest, strict=True):
+            constraints.add(Group.IMPACT, residual, subject=name, upper=0.0, unit=unit)
+        constraints.add(Group.IMPULSE, impact.impulse[1], unit=unit)
+        groups = (Group.IMPULSE_FRICTION, Group.IMPULSE_CENTER)
+        self._add_cone(constraints, impact.impulse, groups, unit)
+        for i, speed in zip(request.swing.contacts, landing, strict=True):
+            constraints.add(Group.LANDING, speed, subject=names[i], lower=-np.inf, upper=0.0)
+        for i, speed in zip(request.stance.contacts, lift, strict=True):
+            constraints.add(Group.LIFT, speed, subject=names[i], lower=-LIFT_TOLERANCE)
 
 
-def _differentiated(
-    constraints: Constraints, arguments: list[casadi.SX], cost: casadi.SX
-) -> Differentiable:
-    """Functions of a cost and constraints with derivatives by the first argument."""
-    x = arguments[0]
-    stacked = casadi.cse(casadi.vertcat(cost, *constraints.expressions))
-    cost, values = stacked[0], stacked[1:]
-    multipliers = casadi.SX.sym("multipliers", stacked.numel())
-    hessian, _ = casadi.hessian(casadi.dot(multipliers, stacked), x)
-    return Differentiable(
-        tuple(constraints.rows),
-        casadi.Function("value", arguments, [cost, values]),
-        casadi.Function("gradient", arguments, [cost, casadi.gradient(cost, x)]),
-        casadi.Function("jacobian", arguments, [values, casadi.jacobian(values, x)]),
-        casadi.Function("hessian", [*arguments, multipliers], [casadi.triu(hessian)]),
-    )
-
-
-def add_joint_limits(
-    constraints: Constraints, request: Request, position: Any, velocity: Any, torque: Any
+def _add_joint_limits(
+    constraints: Constraints, request: Request, position: Any, velocity: Any, support: Support
 ) -> None:
     """Add ranges, speeds and torques of the joints, where robot or request have limits.
 
-    Positions, velocities and torques are those of the joints from the first leg on, without the
-    floating base.
+    Positions and velocities are those of the joints from the first leg on, without the trunk.
     """
     robot, model = request.robot, request.robot.model
     actuator = np.argsort(model.actuator_joint)
@@ -370,9 +286,8 @@ def add_joint_limits(
         finite = [abs(limit) for limit in (lower, upper) if np.isfinite(limit)]
         if finite:
             unit = max(finite) or 1.0
-            constraints.add(
-                Group.TORQUE, torque[k], subject=name, lower=lower, upper=upper, unit=unit
-            )
+            torque = support.torque[k]
+            constraints.add(Group.TORQUE, torque, subject=name, lower=lower, upper=upper, unit=unit)
         limit = min(request.joint_speed_limit, float(model.speed_limit[j]))
         if np.isfinite(limit):
             constraints.add(

@@ -12,7 +12,7 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
-from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Model, Pair
+from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Pair, model_of
 from heelstrike.robot.robot import Robot
 
 UNLIMITED = (-math.inf, math.inf)
@@ -149,9 +149,32 @@ class RobotBuilder:
         link: str = "",
         **properties: Unpack[JointProperties],
     ) -> str:
-        """Add a link that slides on another along `direction` (x, z), of any length.
+        """Add a link that slides on another.
 
-        The other parameters are those of :meth:`hinge`.
+        Parameters
+        ----------
+        name : str
+            Name of the joint.
+        parent : str or None
+            Link that carries it; None for the world.
+        direction : (2,) float
+            Way of a positive coordinate in the frame of that link, of any length.
+        at : (2,) float
+            Place of the joint in the frame of that link (m).
+        link : str, optional
+            Name of the new link, by default that of the joint.
+        **properties : JointProperties
+            Everything that link and joint have.
+
+        Returns
+        -------
+        str
+            Name of the new link.
+
+        Raises
+        ------
+        RobotError
+            If a name is taken or unknown, or a number is impossible.
         """
         x, z = _pair("direction", direction)
         length = math.hypot(x, z)
@@ -181,7 +204,17 @@ class RobotBuilder:
         self._points.append(ContactPoint(self._index(link), x, z, size, roughness))
 
     def sole(self, link: str, *, heel: Pair, toe: Pair, friction: float = 1.0) -> None:
-        """Add the two ends of a flat sole; see :meth:`contact`."""
+        """Add the two ends of a flat sole; see :meth:`contact`.
+
+        Parameters
+        ----------
+        link : str
+            Link that carries it.
+        heel, toe : (2,) float
+            Its ends in the frame of that link (m).
+        friction : float
+            Friction of its surface.
+        """
         self.contact(link, heel, friction=friction)
         self.contact(link, toe, friction=friction)
 
@@ -205,7 +238,7 @@ class RobotBuilder:
         driven = [i for i, link in enumerate(links) if link.torque is not None]
         torques = np.reshape([links[i].torque for i in driven], (-1, 2)).T
         numbers = {name: [link.numbers[name] for link in links] for name in links[0].numbers}
-        model = Model.made(
+        model = model_of(
             **numbers,
             parent=[link.parent for link in links],
             axis=[link.axis for link in links],

@@ -73,6 +73,11 @@ def human(
     table : BodyTable or its value, ``"winter"`` or ``"de_leva"``
         Where the numbers of the segments come from.
 
+    Returns
+    -------
+    Robot
+        The human.
+
     Raises
     ------
     RobotError

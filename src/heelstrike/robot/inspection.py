@@ -125,6 +125,11 @@ def inspect_robot(
     floating, projected : bool
         As for :func:`load_robot`.
 
+    Returns
+    -------
+    Inspection
+        What was found, in words and as data.
+
     Raises
     ------
     RobotError

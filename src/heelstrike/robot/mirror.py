@@ -41,9 +41,18 @@ class Mirror:
     reference: Floats = field(default_factory=lambda: np.zeros(0))
 
     def among(self, coordinates: Sequence[int] | Integers) -> Mirror:
-        """Return the mirror of vectors that have these coordinates only, in this order.
+        """Return the mirror of vectors that have some of the coordinates only.
 
-        The counterpart of a coordinate that is not among them is the coordinate itself.
+        Parameters
+        ----------
+        coordinates : sequence of int
+            Indices of the coordinates in the order of the vectors. One whose counterpart is not
+            among them counts as its own.
+
+        Returns
+        -------
+        Mirror
+            It mirrors vectors over these coordinates.
         """
         chosen = np.asarray(coordinates, dtype=np.int64)
         place = {coordinate: i for i, coordinate in enumerate(chosen.tolist())}
@@ -62,25 +71,82 @@ class Mirror:
         return offset
 
     def position(self, q: Any, reference: Floats | None = None) -> Any:
-        """Mirror positions (..., nq); about another reference than the robot's if one is given."""
+        """Mirror positions.
+
+        Parameters
+        ----------
+        q : (..., nq) array
+            Positions, in m and rad.
+        reference : (nq,) float, optional
+            Another reference than the robot's.
+
+        Returns
+        -------
+        (..., nq) array
+            Those of the mirror image.
+        """
         about = self.reference if reference is None else reference
         return self.sign * (self._exchanged(q) - about[self.joint]) + about
 
     def velocity(self, v: Any) -> Any:
-        """Mirror velocities, accelerations or generalised forces, (..., nv)."""
+        """Mirror velocities, accelerations or generalised forces.
+
+        Parameters
+        ----------
+        v : (..., nv) array
+            One of these.
+
+        Returns
+        -------
+        (..., nv) array
+            That of the mirror image.
+        """
         return self.sign * self._exchanged(v)
 
     def state(self, state: State) -> State:
-        """Mirror a state."""
+        """Mirror a state.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        State
+            That of the mirror image.
+        """
         return State(self.position(state.q), self.velocity(state.v))
 
     def ranges(self, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-        """Mirror the ends of ranges of the coordinates, (nq,) each."""
+        """Mirror ranges of the coordinates.
+
+        Parameters
+        ----------
+        lower, upper : (nq,) float
+            Ends of the ranges, in m and rad.
+
+        Returns
+        -------
+        tuple of (nq,) float
+            Those of the mirror image.
+        """
         ends = self.position(lower), self.position(upper)
         return np.minimum(*ends), np.maximum(*ends)
 
     def at_contacts(self, values: Floats) -> Floats:
-        """Mirror forces, positions … of the contact points in x–z, (nc, ...)."""
+        """Mirror what the contact points have in x–z: forces, positions, gaps.
+
+        Parameters
+        ----------
+        values : (nc, ...) float
+            A row for every contact point.
+
+        Returns
+        -------
+        (nc, ...) float
+            Those of the mirror image.
+        """
         return values[self.contact]
 
     def _exchanged(self, vector: Any) -> Any:

@@ -129,6 +129,16 @@ class Robot:
     def joint_index(self, joint: str | int) -> int:
         """Index of a coordinate, given by the name of its joint (or by an index, which is checked).
 
+        Parameters
+        ----------
+        joint : str or int
+            Name of the joint, or an index.
+
+        Returns
+        -------
+        int
+            Its place in q and v.
+
         Raises
         ------
         RobotError
@@ -137,7 +147,18 @@ class Robot:
         return index_of(self, "joint", self.joint_names, joint)
 
     def actuator_index(self, actuator: str | int) -> int:
-        """Index of an actuator, given by its name or index; see `joint_index`."""
+        """Index of an actuator, given by its name or index; see `joint_index`.
+
+        Parameters
+        ----------
+        actuator : str or int
+            Name of the actuator, or an index.
+
+        Returns
+        -------
+        int
+            Its place among the torques.
+        """
         return index_of(self, "actuator", self.actuator_names, actuator)
 
     def state(
@@ -158,6 +179,11 @@ class Robot:
         start : State, optional
             Where all others are, by default at rest in the reference configuration. It is left as
             it is.
+
+        Returns
+        -------
+        State
+            The state.
 
         Raises
         ------
@@ -183,15 +209,47 @@ class Robot:
         return state
 
     def positions(self, state: State) -> dict[str, float]:
-        """Positions of a state by the names of the joints, in rad and m."""
+        """Positions of a state by the names of the joints, in rad and m.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Position by name of the joint.
+        """
         return dict(zip(self.joint_names, checked(self, state).q.tolist(), strict=True))
 
     def velocities(self, state: State) -> dict[str, float]:
-        """Velocities of a state by the names of the joints, in rad/s and m/s."""
+        """Velocities of a state by the names of the joints, in rad/s and m/s.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        dict
+            Velocity by name of the joint.
+        """
         return dict(zip(self.joint_names, checked(self, state).v.tolist(), strict=True))
 
     def mirrored(self, state: State) -> State:
         """Return a state with left and right exchanged.
+
+        Parameters
+        ----------
+        state : State
+            The state.
+
+        Returns
+        -------
+        State
+            Its mirror image.
 
         Raises
         ------
@@ -257,6 +315,18 @@ class Robot:
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.
 
+        Parameters
+        ----------
+        state : State
+            The state.
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+
         Raises
         ------
         RobotError
@@ -270,6 +340,16 @@ class Robot:
         """Read a state from a file of :meth:`save_state`, bit by bit the one that was saved.
 
         Joints are matched by name, so that their order in the robot may have changed since.
+
+        Parameters
+        ----------
+        path : str or path
+            File to read.
+
+        Returns
+        -------
+        State
+            The state, in the order of this robot's joints.
 
         Raises
         ------
@@ -310,6 +390,37 @@ class Robot:
         from heelstrike.robot.files.saving import save_robot
 
         return save_robot(self, path)
+
+    def c_code(self, name: str | None = None) -> str:
+        """Return its equations of motion as a page of C99, for other programs.
+
+        Four functions of plain arrays of doubles, without branches; the robot's numbers stand in
+        tables at the head. Nothing is included but ``math.h``.
+
+        - ``NAME_kinematics(q, angle, origin)``: poses of the links, (nv,) and (nv, 2);
+        - ``NAME_mass_matrix(q, matrix)``: the mass matrix A, (nv, nv);
+        - ``NAME_bias_force(q, v, bias)``: centrifugal, Coriolis and gravitational forces H, (nv,);
+        - ``NAME_solve(q, v, force, acceleration)``: A⁻¹ (force − H), (nv,).
+
+        Parameters
+        ----------
+        name : str, optional
+            What the functions' names begin with; the robot's own name if none is given.
+
+        Returns
+        -------
+        str
+            The page, to be written to a file.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> "void bravo7_mass_matrix(" in hs.load_robot("bravo7").c_code()
+        True
+        """
+        from heelstrike.dynamics.c_code import c_code
+
+        return c_code(self.model, name or self.name, self.joint_names)
 
     def __repr__(self) -> str:
         return (

@@ -1,26 +1,28 @@
 """simulate(), the ways through time, and the run they leave behind."""
 
 from heelstrike.sim.batch import Batch, simulate_batch
+from heelstrike.sim.compliant import Compliant
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,
     KelvinVoigt,
     RegularisedFriction,
 )
-from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.controller.interface import (
     CompiledController,
     Contacts,
     Controller,
     controller_kernel,
 )
-from heelstrike.sim.event_driven.method import EventDriven
+from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.files.run_file import load_run
+from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
-from heelstrike.sim.simulation import simulate
+from heelstrike.sim.simulation import Simulation, simulate
+from heelstrike.sim.snapshot import Snapshot, load_snapshot
 from heelstrike.sim.status import EventKind, RunStatus, Scheme
-from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.time_stepping import TimeStepping
 
 __all__ = [
     "Batch",
@@ -35,16 +37,20 @@ __all__ = [
     "EventKind",
     "HuntCrossley",
     "KelvinVoigt",
+    "Method",
     "Push",
     "RegularisedFriction",
     "Run",
     "RunStatus",
     "Scheme",
+    "Simulation",
+    "Snapshot",
     "SolverCount",
     "TimeStepping",
     "Timing",
     "controller_kernel",
     "load_run",
+    "load_snapshot",
     "simulate",
     "simulate_batch",
 ]

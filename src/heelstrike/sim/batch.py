@@ -19,28 +19,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
-from heelstrike.dynamics.workspace import workspace
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller.interface import CompiledController, Controller
-from heelstrike.sim.engine import Method
-from heelstrike.sim.memory import (
-    COMPLEMENTARITY,
-    CONE,
-    NON_PENETRATION,
-    PENETRATION,
-    SATURATIONS,
-    STEPS,
-    Memory,
-    Record,
-    allocate_memory,
-)
+from heelstrike.sim.clock import Clock
+from heelstrike.sim.controller.interface import CompiledController, Controller, compiled_form
+from heelstrike.sim.frame import compiled_loop
+from heelstrike.sim.memory import Memory, Record, allocate_memory
+from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push, pushes_on
 from heelstrike.sim.record_size import check_runs
 from heelstrike.sim.run import Run, Timing
-from heelstrike.sim.simulation import Loop, compiled_form, prepared
+from heelstrike.sim.setting import Setting, checked_setting
+from heelstrike.sim.simulation import check_duration, checked_method, simulation_to_the_end
 from heelstrike.sim.status import EventKind, RunStatus
 
 Floats = NDArray[np.float64]
@@ -241,22 +233,24 @@ def simulate_batch(
     count = _number_of_runs(entries)
     every = {name: _Entries(values) for name, values in entries.items()}
     _check_robots(entries["robot"])
-    work = workspace(entries["robot"][0].nv)
+    method = checked_method(method)
 
-    def loop(index: int) -> Loop:
+    def setting_of(index: int) -> Setting:
         with _naming(index, count):
-            return prepared(
-                robot=every["robot"][index],
-                state=every["state"][index],
-                duration=every["duration"][index],
-                method=method,
+            setting = checked_setting(
+                every["robot"][index],
+                every["state"][index],
                 ground=every["ground"][index],
                 control_period=control_period,
                 record_every=NO_ROWS if record_every is None else record_every,
                 stop_when_fallen=stop_when_fallen,
                 pushes=every["pushes"][index],
-                work=work,
             )
+            check_duration(every["duration"][index])
+            method.check(setting)
+            method.check_span(setting, every["duration"][index])
+            method.set_clock(setting, Clock())
+            return setting
 
     compiled = [_compiled(every["robot"][0], each) for each in entries["controller"]]
     controllers = _Entries(compiled)
@@ -267,21 +261,13 @@ def simulate_batch(
         return own if numbers is None else replace(own, parameters=numbers)
 
     _check_parameters(compiled, entries["parameters"])
-    loops = [loop(index) for index in range(count)]
-    # What only the method can refuse (and compiling) comes before the first run, too.
-    rows = 0
-    for index, each in enumerate(loops):
-        with _naming(index, count):
-            if index == 0:
-                each.begin()
-                rows += each.engine.rows_left
-            else:
-                rows += each.new_engine(loops[0].memory).rows_left
+    settings = [setting_of(index) for index in range(count)]
+    durations = [every["duration"][index] for index in range(count)]
     if record_every is not None:
+        rows = sum(method.rows_in(duration, record_every) for duration in durations)
         check_runs(entries["robot"][0], rows, count, record_every)
-    compile_s = loops[0].engine.compile_s
-    crew = _Crew(loops, controller_of, recorded=record_every is not None)
-    del loops, each  # the crew lets go of each when it is finished
+    _, compile_s = compiled_loop(method.kernels, method.work)
+    crew = _Crew(settings, durations, method, controller_of, recorded=record_every is not None)
     with _shown(progress, count) as show:
         crew.work(min(workers, count), show)
     timing = Timing(compile_s, perf_counter() - begin - compile_s)
@@ -443,12 +429,14 @@ class _Crew:
 
     def __init__(
         self,
-        loops: list[Loop],
+        settings: list[Setting],
+        durations: Sequence[float],
+        method: Method,
         controller_of: Callable[[int], CompiledController],
         *,
         recorded: bool,
     ) -> None:
-        self._loops: list[Loop | None] = list(loops)
+        self._settings, self._durations, self._method = settings, durations, method
         self._controller_of = controller_of
         self._recorded = recorded
         self._lock = threading.Lock()
@@ -456,12 +444,12 @@ class _Crew:
         self._why = ""
         self._next = 0
         self._done = 0
-        count = len(loops)
-        robot = loops[0].robot
+        count = len(settings)
+        robot = settings[0].robot
         self._count = count
         self._runs: list[Run | None] = [None] * count
-        self._q = np.array([loop.state.q for loop in loops]).reshape(count, robot.nq)
-        self._v = np.array([loop.state.v for loop in loops]).reshape(count, robot.nv)
+        self._q = np.array([setting.state.q for setting in settings]).reshape(count, robot.nq)
+        self._v = np.array([setting.state.v for setting in settings]).reshape(count, robot.nv)
         self._time = np.zeros(count)
         self._status = [RunStatus.INTERRUPTED] * count
         self._message = [NOT_BEGUN] * count
@@ -504,53 +492,49 @@ class _Crew:
                 self._next += 1
             if index >= self._count:
                 return
-            loop = self._loops[index]
-            assert loop is not None
+            setting = self._settings[index]
             # Straight-line code, dry joints and sizes of the memory are those of its robot.
             if (
                 memory is None
                 or fresh is None
-                or robot is not loop.robot
-                or len(memory.pushes.link) != len(loop.pushes)
+                or robot is not setting.robot
+                or len(memory.pushes.link) != len(setting.pushes)
             ):
-                robot = loop.robot
-                memory = allocate_memory(robot, loop.pushes)
+                robot = setting.robot
+                memory = allocate_memory(robot, setting.pushes)
                 fresh = deepcopy(memory)
                 record = None
             else:
                 memory.become(fresh)
-                memory.pushes.become(pushes_on(robot, loop.pushes))
-            record = self._simulate(index, loop, memory, record)
+                memory.pushes.become(pushes_on(robot, setting.pushes))
+            record = self._simulate(index, setting, memory, record)
             with self._lock:
                 self._done += 1
 
     def _simulate(
-        self, index: int, loop: Loop, memory: Memory, record: Record | None
+        self, index: int, setting: Setting, memory: Memory, record: Record | None
     ) -> Record | None:
         """Simulate one run; return its record if the next may use it."""
-        loop.keep_rows = self._recorded
-        loop.stopped = self._stop.is_set
-        loop.begin(memory, record)
-        status, message, timing = loop.advance(self._controller_of(index))
-        self._q[index] = loop.final_state.q
-        self._v[index] = loop.final_state.v
-        self._time[index] = loop.engine.time
-        self._status[index] = status
-        self._message[index] = message
-        if status is RunStatus.INTERRUPTED:
+        ending = simulation_to_the_end(
+            setting, self._method, self._controller_of(index), self._durations[index],
+            memory=memory, record=record, keep_rows=self._recorded, stopped=self._stop.is_set,
+        )  # fmt: skip
+        self._q[index] = ending.state.q
+        self._v[index] = ending.state.v
+        self._time[index] = ending.time
+        self._status[index] = ending.status
+        self._message[index] = ending.message
+        if ending.status is RunStatus.INTERRUPTED:
             self._message[index] += self._why
-        self._tally[index] = memory.tally[[STEPS, SATURATIONS]]
-        places = [PENETRATION, COMPLEMENTARITY, CONE, NON_PENETRATION]
-        self._extreme[index] = memory.extreme[places]
-        self._counters[index] = memory.solver.counters[[SOLVES, SHORTCUTS, FALLBACKS, FAILURES]]
-        if self._recorded:
-            run = loop.result(status, message, timing)
-            self._runs[index] = run
-            kinds = [event.kind for event in run.events]
-            loop.event_counts += np.bincount(kinds, minlength=len(EventKind)).astype(np.int64)
-        self._events[index] = loop.event_counts
-        self._loops[index] = None
-        return None if self._recorded else loop.records[-1]
+        tally, counters = memory.tally, memory.solver.counters
+        self._tally[index] = tally.steps, tally.saturations
+        self._extreme[index] = (
+            tally.penetration, tally.complementarity, tally.cone, tally.non_penetration,
+        )  # fmt: skip
+        self._counters[index] = counters[[SOLVES, SHORTCUTS, FALLBACKS, FAILURES]]
+        self._runs[index] = ending.run
+        self._events[index] = ending.events
+        return ending.record
 
     def batch(self, threads: int, timing: Timing) -> Batch:
         """Return what came out."""

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, part
+from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
@@ -22,27 +21,32 @@ from heelstrike.sim.push import Push, Pushes, pushes_on
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Places in ``Memory.tally``: counts over the whole run.
-SATURATIONS = 0
-STEPS = 1
-BAD_TORQUE = 2
-CONDUCT = 3
-NOT_FINITE = 4
-TALLIES = 5
 
-# What CONDUCT says of the controller: that nobody looks whether it changes state and contacts, or
-# that one does; that it has; that it wrote beyond its own arrays.
-TRUSTED = 0
-WATCHED = 1
-CHANGED = 2
-OVERRAN = 3
+class Tally(Bundle):
+    """Counts and worst values of a simulation, over every step, recorded or not.
 
-# Places in ``Memory.extreme``: worst values over every step, recorded or not.
-PENETRATION = 0
-COMPLEMENTARITY = 1
-CONE = 2
-NON_PENETRATION = 3
-EXTREMES = 4
+    Attributes
+    ----------
+    steps, saturations : int
+        Steps taken; torques clipped to their limits.
+    bad_torque : int
+        Actuator whose torque was not finite.
+    bad_trial : int
+        One more than the actuator whose torque was not finite when asked for within a step.
+    penetration : float
+        Deepest penetration of a contact point (m).
+    complementarity, cone, non_penetration : float
+        Largest residuals of the contact problems.
+    """
+
+    steps: int = cell(int)
+    saturations: int = cell(int)
+    bad_torque: int = cell(int)
+    bad_trial: int = cell(int)
+    penetration: float = cell(float)
+    complementarity: float = cell(float)
+    cone: float = cell(float)
+    non_penetration: float = cell(float)
 
 
 class Memory(Bundle):
@@ -124,9 +128,8 @@ class Memory(Bundle):
         Memory of the contact solvers.
     pushes : Pushes
         Forces from outside.
-    tally : (5,) int
-    extreme : (4,) float
-        Counts and worst values of the run; their places are module constants.
+    tally : Tally
+        Counts and worst values of the run.
     """
 
     q: Floats = array("nq")
@@ -175,12 +178,11 @@ class Memory(Bundle):
     usual_place: Integers = array("nc", of=int)
     point_rows: Floats = array("2 usual", "nv")
     point_delassus: Floats = array("2 usual", "2 usual")
-    point_velocity: Floats = array("nc", "rows")
-    point_impulse: Floats = array("nc", "rows")
+    point_velocity: Floats = array("nc", "components")
+    point_impulse: Floats = array("nc", "components")
     solver: ContactWorkspace = part(ContactWorkspace)
     pushes: Pushes = part(Pushes)
-    tally: Integers = array("tallies", of=int)
-    extreme: Floats = array("extremes")
+    tally: Tally = part(Tally)
 
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
@@ -194,13 +196,13 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     place[usual] = np.arange(len(usual))
     return Memory.allocate(
         nl=nv, nq=robot.nq, nv=nv, nu=nu, nc=nc, nd=len(dry), capacity=capacity, usual=len(usual),
-        axes=2, rows=2, tallies=TALLIES, extremes=EXTREMES,
+        axes=2, components=2,
         q=guarded(np.zeros(nv)),
         v=guarded(np.zeros(nv)),
         torque=guarded(np.zeros(nu)),
         tree=guarded_bundle(workspace(nv)),
         scratch=guarded_bundle(workspace(nv)),
-        contacts=guarded_bundle(Contacts.allocate(nc=nc, axes=2, rows=2)),
+        contacts=guarded_bundle(Contacts.allocate(nc=nc, axes=2, components=2)),
         friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
         dry_joint=dry.astype(np.int64),
         resting=np.full(len(dry), -1, dtype=np.int64),
@@ -217,10 +219,11 @@ class Record(Bundle):
     """Rows of a run, filled by the compiled loop, one row an instant.
 
     Forces and torques of a row are those decided at its instant and acting over the step that
-    follows. `row_count` and `event_count` are the numbers of rows used.
+    follows. `rows` and `events` are the numbers of rows used.
     """
 
-    row_count: Integers = array(1, of=int)
+    rows: int = cell(int)
+    events: int = cell(int)
     time: Floats = array("nt")
     q: Floats = array("nt", "nq")
     v: Floats = array("nt", "nv")
@@ -230,38 +233,17 @@ class Record(Bundle):
     point: Floats = array("nt", "nc", "axes")
     normal: Floats = array("nt", "nc", "axes")
     gap: Floats = array("nt", "nc")
-    force: Floats = array("nt", "nc", "rows")
+    force: Floats = array("nt", "nc", "components")
     slip: Floats = array("nt", "nc")
     residual: Floats = array("nt", 3)
-    event_count: Integers = array(1, of=int)
     event_time: Floats = array("ne")
     event_kind: Integers = array("ne", of=int)
     event_contact: Integers = array("ne", of=int)
-    event_impulse: Floats = array("ne", "rows")
+    event_impulse: Floats = array("ne", "components")
 
 
 def allocate_record(robot: Robot, rows: int, events: int) -> Record:
     """Allocate a record of `rows` instants and `events` events."""
     return Record.allocate(
-        nt=rows, ne=events, nq=robot.nq, nv=robot.nv, nu=robot.nu, nc=robot.nc, axes=2, rows=2
-    )
-
-
-def joined(records: list[Record]) -> Record:
-    """Concatenate the used rows of consecutive records."""
-    rows = [int(part.row_count[0]) for part in records]
-    events = [int(part.event_count[0]) for part in records]
-
-    def join(name: str) -> Any:
-        used = events if name.startswith("event_") else rows
-        return np.concatenate(
-            [getattr(part, name)[:n] for part, n in zip(records, used, strict=True)]
-        )
-
-    counts = {
-        "row_count": np.array([sum(rows)]),
-        "event_count": np.array([sum(events)]),
-    }
-    return Record(
-        **{name: counts[name] if name in counts else join(name) for name in Record.declared}
+        nt=rows, ne=events, nq=robot.nq, nv=robot.nv, nu=robot.nu, nc=robot.nc, axes=2, components=2
     )

@@ -7,11 +7,10 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from llvmlite import ir
 from numpy.typing import NDArray
 
-from heelstrike.compiler.machine_code import addresses
-from heelstrike.compiler.straight_line import Recording, add_function, description
+from heelstrike.compiler.recording import Program
+from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.dynamics.kernels import solve_factorized, state_equations
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot.model import Model
@@ -90,25 +89,11 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
         },
     ][:count]  # fmt: skip
     scratch = tuple(f"tree.{name}" for name in ("acceleration", "force", "composite", "zero"))
-
-    def write() -> ir.Module:
-        module = ir.Module("straight_line")
-        known: dict[str, Any] = {"tree.zero": np.zeros(nv, object)}
-        for kernel, values in zip(KERNELS, arguments, strict=False):
-            recording = Recording(
-                kernel, values, scratch=(*scratch, "matrix", "rows", "force"), known=known
-            )
-            add_function(module, recording)
-            if kernel is state_equations:
-                # What it leaves of the tree is the same number always in places.
-                known |= {
-                    name: array
-                    for name, array in recording.arrays.items()
-                    if name.startswith("tree.") and name not in scratch
-                }
-        return module
-
-    described = b"\0".join(map(description, KERNELS, arguments))
-    names = [kernel.__name__ for kernel in KERNELS[:count]]
-    programs[:count] = addresses(names, described, write)
+    programs[:count] = straight_line_code(
+        [
+            Program(kernel, values, scratch=(*scratch, "matrix", "rows", "force"))
+            for kernel, values in zip(KERNELS, arguments, strict=False)
+        ],
+        known={"tree.zero": np.zeros(nv)},
+    )
     return programs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -152,6 +152,29 @@ def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:
         start=np.array([push.start for push in pushes], dtype=np.float64),
         end=np.array([push.end for push in pushes], dtype=np.float64),
         share=np.zeros(len(places)),
+    )
+
+
+def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Floats]:
+    """Return some pushes on a robot as arrays that :func:`pushes_of_numbers` makes them of."""
+    places = [push.place(robot) for push in pushes]
+    return {
+        "link": np.array([link for link, _ in places], dtype=np.float64),
+        "point": np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
+        "force": np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
+        "window": np.array([(p.start, p.duration) for p in pushes], dtype=np.float64).reshape(
+            -1, 2
+        ),
+    }
+
+
+def pushes_of_numbers(numbers: Mapping[str, Floats]) -> tuple[Push, ...]:
+    """Return the pushes of some numbers."""
+    return tuple(
+        Push(int(link), force=force, start=start, duration=duration, point=point)
+        for link, point, force, (start, duration) in zip(
+            *(numbers[name].tolist() for name in ("link", "point", "force", "window")), strict=True
+        )
     )
 
 

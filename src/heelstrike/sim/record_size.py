@@ -13,8 +13,8 @@ import numpy as np
 
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.engine import Setting
 from heelstrike.sim.memory import allocate_record
+from heelstrike.sim.setting import Setting
 
 MOST_STEPS = 2**53
 """Steps are counted, and times are whole multiples of a step, as long as they are exact."""
@@ -30,13 +30,17 @@ _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_b
 """Where Linux tells what a container may have."""
 
 
-def check_steps(setting: Setting, name: str, step: float, *, recorded: bool = True) -> None:
+def check_steps(
+    setting: Setting, duration: float, name: str, step: float, *, recorded: bool = True
+) -> None:
     """Refuse a step so short that the steps of a run cannot be counted.
 
     Parameters
     ----------
     setting : Setting
         What is to be simulated.
+    duration : float
+        For how long, in s.
     name : str
         What the step is called where the user gave it.
     step : float
@@ -49,7 +53,6 @@ def check_steps(setting: Setting, name: str, step: float, *, recorded: bool = Tr
     SimulationError
         With the shortest step that can be counted, and the `record_every` for it.
     """
-    duration = setting.duration
     if duration / step <= MOST_STEPS:
         return
     shortest = _rounded_up(duration / MOST_STEPS * (1.0 + 1e-9))
@@ -67,13 +70,15 @@ def check_steps(setting: Setting, name: str, step: float, *, recorded: bool = Tr
     raise SimulationError(words)
 
 
-def check_room(setting: Setting, name: str, period: float) -> None:
+def check_room(setting: Setting, duration: float, name: str, period: float) -> None:
     """Refuse a run whose record does not fit into memory.
 
     Parameters
     ----------
     setting : Setting
         What is to be simulated.
+    duration : float
+        For how long, in s.
     name : str
         What `period` is called where the user gave it.
     period : float
@@ -84,7 +89,7 @@ def check_room(setting: Setting, name: str, period: float) -> None:
     SimulationError
         With the rows it would have, and a `record_every` that fits.
     """
-    periods = setting.duration / period
+    periods = duration / period
     rows = periods / setting.record_every + BESIDE
     if rows <= FEW_ROWS:
         return
@@ -96,7 +101,7 @@ def check_room(setting: Setting, name: str, period: float) -> None:
     if 2.0 * rows * size <= available:
         return
     raise SimulationError(
-        f"the record of {setting.duration:g} s with {name} = {period:g} s and "
+        f"the record of {duration:g} s with {name} = {period:g} s and "
         f"record_every={setting.record_every} does not fit into memory: {_count(rows)} rows of "
         f"{size} bytes, {_gigabytes(2.0 * rows * size)} with room to join them, where a record may "
         f"take {_gigabytes(available)}. It fits with {_advice(periods, size, available)}"
@@ -144,8 +149,8 @@ def check_runs(robot: Robot, rows: int, runs: int, record_every: int) -> None:
 
 def row_size(robot: Robot) -> int:
     """Bytes of one row of the record."""
-    row = allocate_record(robot, 1, 0).members()
-    return sum(array.nbytes for name, array in row.items() if not name.endswith("_count"))
+    row = allocate_record(robot, 1, 0)
+    return sum(values.nbytes for name, values in row.storage() if name != "cells")
 
 
 def room() -> int:

@@ -5,19 +5,9 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.clock import Clock
 from heelstrike.sim.contact_geometry import contact_velocity
-from heelstrike.sim.memory import (
-    BAD_TORQUE,
-    COMPLEMENTARITY,
-    CONE,
-    NON_PENETRATION,
-    NOT_FINITE,
-    PENETRATION,
-    SATURATIONS,
-    STEPS,
-    Memory,
-    Record,
-)
+from heelstrike.sim.memory import Memory, Record
 from heelstrike.sim.status import EventKind
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
@@ -42,14 +32,14 @@ def limit_torque(model: Model, memory: Memory) -> bool:
     for i in range(model.actuator_joint.shape[0]):
         wanted = memory.torque[i]
         if not abs(wanted) < INFINITY:
-            memory.tally[BAD_TORQUE] = i
+            memory.tally.bad_torque = i
             return False
         if wanted > model.torque_upper[i]:
             memory.torque[i] = model.torque_upper[i]
-            memory.tally[SATURATIONS] += 1
+            memory.tally.saturations += 1
         elif wanted < model.torque_lower[i]:
             memory.torque[i] = model.torque_lower[i]
-            memory.tally[SATURATIONS] += 1
+            memory.tally.saturations += 1
     return True
 
 
@@ -70,30 +60,30 @@ def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memor
     for i in range(v.shape[0]):
         if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
             return
-    memory.tally[NOT_FINITE] = bad
+    memory.tally.bad_trial = bad
 
 
 @dissolved_kernel
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
-    extreme = memory.extreme
+    tally = memory.tally
     for contact in range(model.contact_link.shape[0]):
-        extreme[PENETRATION] = max(extreme[PENETRATION], -memory.contacts.gap[contact])
-    extreme[COMPLEMENTARITY] = max(extreme[COMPLEMENTARITY], memory.residual[0])
-    extreme[CONE] = max(extreme[CONE], memory.residual[1])
-    extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], memory.residual[2])
+        tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
+    tally.complementarity = max(tally.complementarity, memory.residual[0])
+    tally.cone = max(tally.cone, memory.residual[1])
+    tally.non_penetration = max(tally.non_penetration, memory.residual[2])
 
 
 @kernel
 def note_event(record: Record, time: float, kind: int, contact: int, memory: Memory) -> None:
     """Append an event; its impulse is that of the step it happened in."""
-    place = record.event_count[0]
+    place = record.events
     record.event_time[place] = time
     record.event_kind[place] = kind
     record.event_contact[place] = contact
     record.event_impulse[place, 0] = memory.contacts.force[contact, 0]
     record.event_impulse[place, 1] = memory.contacts.force[contact, 1]
-    record.event_count[0] = place + 1
+    record.events = place + 1
 
 
 @dissolved_kernel
@@ -106,11 +96,11 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
     """
     for contact in range(model.contact_link.shape[0]):
         pushed = memory.contacts.force[contact, 0] > 0.0
-        first = record.event_count[0]
+        first = record.events
         if memory.closed[contact] == 0 and pushed:
             memory.closed[contact] = 1
             memory.slipping[contact] = 0
-            stood = memory.tally[STEPS] == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
+            stood = memory.tally.steps == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
             if stood:
                 normal, _ = contact_velocity(
                     model.contact_link[contact],
@@ -137,7 +127,7 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             elif not slips and memory.slipping[contact] == 1:
                 memory.slipping[contact] = 0
                 note_event(record, time + step, STICK, contact, memory)
-        for place in range(first, record.event_count[0]):
+        for place in range(first, record.events):
             record.event_impulse[place, 0] *= step
             record.event_impulse[place, 1] *= step
     for joint in range(model.parent.shape[0]):
@@ -146,18 +136,18 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             continue
         way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
         stood = (
-            memory.tally[STEPS] == 0
+            memory.tally.steps == 0
             and way <= LIFTOFF_GAP
             and abs(memory.v[joint]) <= STANDING_SPEED
         )
         if pushed and memory.stopped[joint] == 0 and not stood:
-            place = record.event_count[0]
+            place = record.events
             record.event_time[place] = time + step
             record.event_kind[place] = JOINT_STOP
             record.event_contact[place] = joint
             record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
             record.event_impulse[place, 1] = 0.0
-            record.event_count[0] = place + 1
+            record.events = place + 1
         if pushed:
             memory.stopped[joint] = 1
         elif way > LIFTOFF_GAP:
@@ -167,20 +157,20 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
         if memory.resting[dry] == -1:
             memory.resting[dry] = 1 if abs(memory.v[memory.dry_joint[dry]]) <= SLIP_SPEED else 0
         if rests != (memory.resting[dry] == 1):
-            place = record.event_count[0]
+            place = record.events
             record.event_time[place] = time + step
             record.event_kind[place] = JOINT_STICK if rests else JOINT_SLIP
             record.event_contact[place] = memory.dry_joint[dry]
             record.event_impulse[place, 0] = 0.0
             record.event_impulse[place, 1] = 0.0
-            record.event_count[0] = place + 1
+            record.events = place + 1
             memory.resting[dry] = 1 if rests else 0
 
 
 @dissolved_kernel
 def note_row(record: Record, time: float, memory: Memory) -> None:
     """Append the state now and what acts on it to the record."""
-    row = record.row_count[0]
+    row = record.rows
     record.time[row] = time
     for i in range(memory.v.shape[0]):
         record.q[row, i] = memory.q[i]
@@ -199,7 +189,16 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
         record.slip[row, i] = memory.slip[i]
     for k in range(3):
         record.residual[row, k] = memory.residual[k]
-    record.row_count[0] = row + 1
+    record.rows = row + 1
+
+
+@kernel
+def note_row_when_due(record: Record, memory: Memory, clock: Clock) -> int:
+    """Append a row if one is due, every so many steps and at the end; return which, or -1."""
+    if clock.index % clock.record_every != 0 and clock.finishing == 0:
+        return -1
+    note_row(record, clock.time, memory)
+    return int(record.rows - 1)
 
 
 @dissolved_kernel

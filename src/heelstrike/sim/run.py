@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,10 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.engine import Method
+from heelstrike.sim.memory import Memory, Record
 from heelstrike.sim.push import Push
+from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.status import EventKind, RunStatus
 
 if TYPE_CHECKING:
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.summary import Summary
+    from heelstrike.sim.method import Method
 
 Floats = NDArray[np.float64]
 
@@ -150,6 +154,9 @@ class Run:
         What the controller raised, if that ended the run.
     pushes : tuple of Push
         What pushed the robot.
+    final : Snapshot or None
+        What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
+        run from a file, or under a controller in Python that takes no part in snapshots.
     """
 
     robot: Robot
@@ -177,6 +184,7 @@ class Run:
     timing: Timing
     error: BaseException | None = field(default=None, repr=False)
     pushes: tuple[Push, ...] = ()
+    final: Snapshot | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         last = self.time[-1] if len(self.time) else 0.0
@@ -231,3 +239,69 @@ class Run:
         from heelstrike.sim.files.run_file import save
 
         return save(self, path)
+
+
+def recorded(records: Sequence[Record], since: float) -> dict[str, Any]:
+    """Return the rows and events of consecutive records, from a time on, as fields of a run."""
+
+    def join(member: str, counts: Sequence[int]) -> Any:
+        used = [getattr(part, member)[:n] for part, n in zip(records, counts, strict=True)]
+        return np.concatenate(used)
+
+    counts = [part.rows for part in records]
+    first = int(np.searchsorted(join("time", counts), since))
+    fields = {name: join(member, counts)[first:] for name, member in _MEMBERS.items()}
+    counts = [part.events for part in records]
+    time, kind, contact, impulse = (
+        join(f"event_{name}", counts) for name in ("time", "kind", "contact", "impulse")
+    )
+    events = tuple(
+        Event(
+            time=float(time[i]),
+            kind=EventKind(int(kind[i])),
+            contact=int(contact[i]),
+            impulse=(float(impulse[i, 0]), float(impulse[i, 1])),
+        )
+        for i in np.argsort(time, kind="stable")
+        if time[i] >= since
+    )
+    return fields | {"events": events}
+
+
+_MEMBERS = {
+    "time": "time",
+    "position": "q",
+    "velocity": "v",
+    "torque": "torque",
+    "stop_torque": "stop_torque",
+    "friction_torque": "friction_torque",
+    "contact_point": "point",
+    "contact_normal": "normal",
+    "gap": "gap",
+    "contact_force": "force",
+    "slip_velocity": "slip",
+    "residual": "residual",
+}
+"""Which member of the record each field of a run is."""
+
+
+def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
+    """Return counts and worst values of a simulation, as fields of a run."""
+    tally, counters = memory.tally, memory.solver.counters
+    return {
+        "certificates": Certificates(
+            penetration=tally.penetration,
+            complementarity=tally.complementarity,
+            cone=tally.cone,
+            non_penetration=tally.non_penetration,
+        ),
+        "solver": SolverCount(
+            name=solves_with,
+            solves=int(counters[SOLVES]),
+            shortcuts=int(counters[SHORTCUTS]),
+            fallbacks=int(counters[FALLBACKS]),
+            failures=int(counters[FAILURES]),
+        ),
+        "steps": tally.steps,
+        "saturations": tally.saturations,
+    }

@@ -1,102 +1,70 @@
-"""simulate(): from a robot, a controller and a state to a run."""
+"""A simulation that can be stepped, pushed, kept and taken up again; and simulate()."""
 
 from __future__ import annotations
 
 import time as clock_time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
-from heelstrike.dynamics.kernels import center_of_mass, forward_kinematics
-from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.contact_geometry import observe
+from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.checked import CheckedController
-from heelstrike.sim.controller.guard import guarded
+from heelstrike.sim.controller.control import TRUSTED, WATCHED, control_with
 from heelstrike.sim.controller.interface import (
     CompiledController,
     Contacts,
     Controller,
-    checked_kernel,
+    Partaking,
+    compiled_form,
     hold_torque,
     is_stock,
     name_of,
     read_only,
 )
-from heelstrike.sim.controller.watch import Watch, numbers_of, restored
-from heelstrike.sim.engine import (
-    DIVERGED,
-    DONE,
-    FELL,
-    PAUSED,
-    RAISED,
-    RECORD_FULL,
-    SOLVER_FAILED,
-    Engine,
-    Method,
+from heelstrike.sim.controller.watch import Watch
+from heelstrike.sim.frame import Outcome, compiled_loop
+from heelstrike.sim.memory import Memory, Record, allocate_memory, allocate_record
+from heelstrike.sim.method import Method
+from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
+from heelstrike.sim.run import Run, Timing, recorded, tallied
+from heelstrike.sim.setting import (
     Setting,
+    Setup,
+    checked_pushes,
+    checked_setting,
+    identity_of,
 )
-from heelstrike.sim.memory import (
-    BAD_TORQUE,
-    COMPLEMENTARITY,
-    CONDUCT,
-    CONE,
-    NON_PENETRATION,
-    NOT_FINITE,
-    PENETRATION,
-    SATURATIONS,
-    STEPS,
-    TRUSTED,
-    WATCHED,
-    Memory,
-    Record,
-    allocate_memory,
-    allocate_record,
-    joined,
-)
-from heelstrike.sim.push import Push
-from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
+from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.status import EventKind, RunStatus
-from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.time_stepping import TimeStepping
 
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.
 CHUNK = 4096
 # Steps before the first look, and seconds that should pass between two.
 FIRST_LOOK = 256
 LOOK_EVERY = 0.05
-# Calls of a controller in Python between two reports of progress.
-LOOK_AFTER = 256
+# A pause that never comes, and a time (s).
+NEVER = 2**62
+FAR = 1e300
+# Points deeper than this (m) in ground that is laid under them are in it.
+LAID = 1e-6
 
-# The loops count in 64 bits.
-MOST_EVERY = 2**62
-
-# A walking robot has fallen when its centre of mass is below this fraction of its first height.
-FALL_FRACTION = 0.5
+CAN_GO_ON = (RunStatus.COMPLETED, RunStatus.INTERRUPTED)
 
 
-def simulate(
-    robot: Robot,
-    controller: Controller | CompiledController | None = None,
-    *,
-    state: State,
-    duration: float,
-    method: Method | None = None,
-    ground: Ground | None = None,
-    control_period: float | None = None,
-    record_every: int = 1,
-    stop_when_fallen: bool | None = None,
-    pushes: Sequence[Push] = (),
-    checked: bool = False,
-    progress: Callable[[float], None] | None = None,
-) -> Run:
-    """Simulate a robot on the ground under a controller.
+class Simulation:
+    """A robot on the ground under a controller, at some instant.
 
     Parameters
     ----------
@@ -105,10 +73,9 @@ def simulate(
     controller : object with ``torque(t, state, contacts)``, or None
         Decides the joint torques (nu,) in N m. Stock controllers run compiled; None applies no
         torque.
-    state : State
-        Where the robot starts.
-    duration : float
-        Time to simulate in seconds; time stepping rounds it to a whole number of steps.
+    state : State or Snapshot
+        Where the robot starts; or a simulation to go on with, such as ``run.final``: its time,
+        contact modes, pushes, ground and the memory of its controller are those of the snapshot.
     method : Method
         Way through time; ``TimeStepping()`` by default.
     ground : Ground
@@ -121,8 +88,8 @@ def simulate(
     record_every : int
         Steps between two rows of the record.
     stop_when_fallen : bool, optional
-        End the run when the height of the centre of mass above the ground drops below half of what
-        it was at first. By default true for floating robots with several feet.
+        End the simulation when the height of the centre of mass above the ground drops below half
+        of what it was at first. By default true for floating robots with several feet.
     pushes : sequence of Push
         Forces from outside, each on a point of the robot over a window of time.
     checked : bool
@@ -130,9 +97,600 @@ def simulate(
         that reads or writes beyond its arrays, or writes where it may not, ends the run with a
         message that names the array and the index. Like any controller in Python it is then called
         every `control_period`.
+
+    Attributes
+    ----------
+    status : RunStatus
+        How it goes: ``COMPLETED`` and ``INTERRUPTED`` can go on, the others are its end.
+    message : str
+        The same in a person's words.
+    error : BaseException or None
+        What a controller or `progress` raised.
+
+    Raises
+    ------
+    SimulationError, ControllerError
+        If the arguments are not usable, or the state is not one that the method can begin with.
+
+    Notes
+    -----
+    A simulation rests before the controller is asked: what is set acts at once. Methods whose steps
+    are as long as accuracy allows end one where they are told to stop; so does their motion depend,
+    within its tolerance, on where that is. Continued from ``run.final`` it does not.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("compass_gait")
+    >>> simulation = hs.Simulation(robot, state=robot.reference_state(), stop_when_fallen=False)
+    >>> simulation.step()
+    >>> simulation.advance(0.01).value, simulation.time
+    ('completed', 0.01)
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        controller: Controller | CompiledController | None = None,
+        *,
+        state: State | Snapshot,
+        method: Method | None = None,
+        ground: Ground | None = None,
+        control_period: float | None = None,
+        record_every: int = 1,
+        stop_when_fallen: bool | None = None,
+        pushes: Sequence[Push] | Push = (),
+        checked: bool = False,
+    ) -> None:
+        begin = state.state if isinstance(state, Snapshot) else state
+        setting = checked_setting(
+            robot, begin, ground=ground, control_period=control_period, record_every=record_every,
+            stop_when_fallen=stop_when_fallen, pushes=pushes, checked=checked,
+        )  # fmt: skip
+        self._begin(setting, checked_method(method))
+        self._control_with(controller)
+        if isinstance(state, Snapshot):
+            self.restore(state)
+            if ground is not None:
+                self.ground = ground
+            self.apply(setting.pushes)
+
+    def _begin(
+        self, setting: Setting, method: Method, memory: Memory | None = None,
+        record: Record | None = None, *, keep_rows: bool = True,
+    ) -> None:  # fmt: skip
+        """Allocate everything, compile, and check what only the method can.
+
+        Parameters
+        ----------
+        setting, method
+            What to simulate, and how.
+        memory : Memory, optional
+            Memory to use, as `allocate_memory` makes it for this robot and these pushes.
+        record : Record, optional
+            Record of an earlier simulation of this robot, to be used again.
+        keep_rows : bool
+            Whether rows and events are kept; otherwise they are counted and forgotten.
+        """
+        self.robot, self.method, self._setting = setting.robot, method, setting
+        self._ground, self._pushes = setting.ground, setting.pushes
+        method.check(setting)
+        self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
+        self._memory.q[:] = setting.state.q
+        self._memory.v[:] = setting.state.v
+        self._work = method.new_work(self.robot)
+        rows, events = method.room(self.robot)
+        self._clock = Clock(
+            record_every=setting.record_every,
+            fallen_height=setting.fallen_height,
+            row_margin=rows,
+            event_margin=events,
+        )
+        method.set_clock(setting, self._clock)
+        self._loop, compile_s = compiled_loop(method.kernels, method.work)
+        self._timing = Timing(compile_s, 0.0)
+        self._fork: Snapshot | None = None
+        self._records: list[Record] = [] if record is None else [record]
+        self._keeps_rows = keep_rows
+        self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
+        self._recorded_until = 0.0
+        self._complaint = ""
+        self.status = RunStatus.COMPLETED
+        self.message = "not begun"
+        self.error: BaseException | None = None
+
+    @property
+    def time(self) -> float:
+        """Simulated time now, in s."""
+        return self._clock.time
+
+    @property
+    def state(self) -> State:
+        """Position and velocity now."""
+        return State(self._memory.q, self._memory.v)
+
+    @property
+    def contacts(self) -> Contacts:
+        """Contact points now, with the forces of the step before."""
+        at = contact_kinematics(self.robot, self._memory.q, self._memory.v, self._ground)
+        return Contacts(
+            position=at.position,
+            normal=at.normal,
+            gap=at.gap,
+            force=self._memory.contacts.force.copy(),
+        )
+
+    @property
+    def ground(self) -> Ground:
+        """The ground; another may be laid, but not into a foot."""
+        return self._ground
+
+    @ground.setter
+    def ground(self, ground: Ground) -> None:
+        if not isinstance(ground, Ground):
+            raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
+        setting = replace(self._setting, ground=ground)
+        self.method.check(setting)
+        at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
+        deep = at.gap < min(-LAID, float(np.min(self.contacts.gap, initial=0.0)) - LAID)
+        if np.any(deep):
+            point = int(np.argmin(at.gap))
+            raise SimulationError(
+                f"this ground would lie {-at.gap[point]:.3g} m above contact point "
+                f"{self.robot.contact_names[point]!r}; lower it by "
+                f"{float(np.max(-at.gap[deep] / at.normal[deep, 1])):.3g} m, or lay it before "
+                "the robot is there"
+            )
+        self._ground, self._setting = ground, setting
+
+    @property
+    def controller(self) -> Controller | CompiledController | None:
+        """What decides the torques; one that is set begins anew."""
+        return self._controller
+
+    @controller.setter
+    def controller(self, controller: Controller | CompiledController | None) -> None:
+        self._control_with(controller)
+
+    @property
+    def parameters(self) -> Floats:
+        """Numbers of a compiled controller; others may be set, of the same shape."""
+        return self._control.parameters.copy()
+
+    @parameters.setter
+    def parameters(self, parameters: ArrayLike) -> None:
+        values = np.asarray(parameters, dtype=np.float64)
+        if values.shape != self._control.parameters.shape:
+            raise ControllerError(
+                f"{self._name} has parameters of shape {self._control.parameters.shape}, "
+                f"got {values.shape}"
+            )
+        self._control.parameters[:] = values
+
+    def apply(self, push: Push | Sequence[Push]) -> None:
+        """Let a push act, from its beginning or from now on, whichever is later.
+
+        Parameters
+        ----------
+        push : Push or sequence of Push
+            What pushes, with its own beginning and duration.
+
+        Raises
+        ------
+        SimulationError
+            If the robot has no such link.
+        """
+        self._pushes += checked_pushes(self.robot, push)
+        self._memory = self._memory.replaced(pushes=pushes_on(self.robot, self._pushes))
+
+    def step(self) -> RunStatus:
+        """Take one step of the method; return how the simulation goes.
+
+        Raises
+        ------
+        SimulationError
+            If the simulation has come to its end.
+        """
+        return self._advance(FAR, self._clock.index + 1)
+
+    def advance(
+        self, until: float, *, progress: Callable[[float], None] | None = None
+    ) -> RunStatus:
+        """Simulate until a time, or until something ends it; return how it goes.
+
+        Parameters
+        ----------
+        until : float
+            Simulated time to stop at, in s; time stepping rounds it to a whole number of steps.
+        progress : callable, optional
+            Called now and then with the simulated time. If it raises, the simulation stops there,
+            with status ``interrupted``.
+
+        Returns
+        -------
+        RunStatus
+            ``COMPLETED`` at that time; after Ctrl-C ``INTERRUPTED``, from where it can go on.
+
+        Raises
+        ------
+        SimulationError
+            If the simulation has come to its end, the time is past, or there is no room for the
+            record.
+        """
+        if not np.isfinite(until) or until < self.time:
+            raise SimulationError(f"until must be a time from now, {self._now}, on; got {until}")
+        self.method.check_span(self._setting, until - self.time)
+        return self._advance(self.method.instant(self._clock, until), NEVER, progress)
+
+    def _advance(
+        self, until: float, pause: int, progress: Callable[[float], None] | None = None,
+        stopped: Callable[[], bool] | None = None,
+    ) -> RunStatus:  # fmt: skip
+        if self.status not in CAN_GO_ON:
+            raise SimulationError(
+                f"the simulation has ended: {self.message}. Restore a snapshot to go on from there"
+            )
+        begin = clock_time.perf_counter()
+        self._clock.until = until
+        self._clock.forked = 0
+        self._fork = None
+        self._complaint = ""
+        try:
+            self.status, self.message = self._go(pause, progress, stopped)
+        except KeyboardInterrupt as interrupt:
+            acknowledge(interrupt)
+            self.status, self.message = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
+        wall_s = self._timing.wall_s + clock_time.perf_counter() - begin
+        self._timing = Timing(self._timing.compile_s, wall_s)
+        return self.status
+
+    def _go(
+        self,
+        last: int,
+        progress: Callable[[float], None] | None = None,
+        stopped: Callable[[], bool] | None = None,
+    ) -> tuple[RunStatus, str]:
+        """Run the loop, with a look now and then at progress, Ctrl-C and the controller."""
+        steps = FIRST_LOOK
+        while True:
+            self._clock.pause = min(last, self._clock.index + steps)
+            begin = clock_time.perf_counter()
+            code = self._run_loop()
+            elapsed = clock_time.perf_counter() - begin
+            misdeed = self._watch.misdeed()
+            if misdeed is not None:
+                return RunStatus.CONTROLLER_FAILED, (
+                    f"{self._name} {misdeed}; noticed at {self._now}"
+                    + ("" if self._python else ". simulate(..., checked=True) tells more")
+                )
+            self._report(progress)
+            if isinstance(code, tuple):
+                return code
+            if code is not Outcome.PAUSED or self._clock.index >= last:
+                status, message = self._ending(code)
+                return status, f"{message}; {self._complaint}" if self._complaint else message
+            if self._complaint or (stopped is not None and stopped()):
+                more = f": {self._complaint}" if self._complaint else ""
+                return RunStatus.INTERRUPTED, f"interrupted at {self._now}{more}"
+            steps = int(min(CHUNK, max(1.0, steps * min(4.0, LOOK_EVERY / max(elapsed, 1e-9)))))
+
+    def _run_loop(self) -> Outcome | tuple[RunStatus, str]:
+        """Run the loop until it pauses or ends, with what it needs from Python."""
+        if not self._records:
+            self._new_record()
+        while True:
+            try:
+                code = self._loop(
+                    self._kernel, self._control, self.robot.model, self._ground.model(),
+                    self._memory, self._work, self._records[-1], self._clock,
+                )  # fmt: skip
+            except KeyboardInterrupt:
+                raise
+            except BaseException as error:  # of a compiled controller: loops raise nothing
+                self.error = error
+                return Outcome.RAISED
+            outcome = Outcome(code)
+            if outcome is Outcome.RECORD_FULL:
+                self._new_record()
+            elif outcome is Outcome.FORK:
+                self._fork = self.snapshot() if self._can_be_kept else None
+            elif outcome is Outcome.ASKING:
+                ending = self._ask()
+                if ending is not None:
+                    return ending
+            else:
+                return outcome
+
+    def _report(self, progress: Callable[[float], None] | None) -> None:
+        """Report progress; keep in mind what went wrong with that, if something did."""
+        if progress is None:
+            return
+        try:
+            progress(self.time)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self.error = error
+            self._complaint = f"progress raised {_raised(error)}"
+
+    def _ask(self) -> tuple[RunStatus, str] | None:
+        """Ask a controller in Python for torques; return how it ended the run, if it did."""
+        controller = self._python
+        try:
+            torque = np.asarray(
+                controller.torque(self.time, self.state, self._shown),
+                dtype=np.float64,
+            )
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:
+            self.error = error
+            if isinstance(controller, CheckedController) and isinstance(error, ControllerError):
+                return RunStatus.CONTROLLER_FAILED, f"{error} (at {self._now})"
+            return RunStatus.CONTROLLER_FAILED, (
+                f"{self._name} raised {_raised(error)} at {self._now} (the exception is in "
+                "run.error)"
+            )
+        if torque.shape != (self.robot.nu,):
+            return RunStatus.CONTROLLER_FAILED, (
+                f"{self._name} returned shape {torque.shape} at {self._now}; robot "
+                f"{self.robot.name!r} needs ({self.robot.nu},): "
+                f"{', '.join(self.robot.actuator_names)}"
+            )
+        self._memory.torque[:] = torque
+        self._clock.answered = 1
+        return None
+
+    @property
+    def _now(self) -> str:
+        return f"t = {self.time:.6g} s"
+
+    def _ending(self, outcome: Outcome) -> tuple[RunStatus, str]:
+        if outcome in (Outcome.DONE, Outcome.PAUSED):
+            return RunStatus.COMPLETED, f"completed at {self._now}"
+        if outcome is Outcome.FELL:
+            return RunStatus.FELL, (
+                f"the robot fell at {self._now}: its centre of mass is below half its first height"
+            )
+        if outcome is Outcome.RAISED:
+            assert self.error is not None
+            more = "; simulate(..., checked=True) names the array and the index"
+            return RunStatus.CONTROLLER_FAILED, (
+                f"{self._name} raised {_raised(self.error)} at {self._now} (the exception is in "
+                f"run.error){more if isinstance(self.error, IndexError) else ''}"
+            )
+        tally = self._memory.tally
+        if outcome is Outcome.DIVERGED and tally.bad_trial > 0:
+            return self._not_finite(tally.bad_trial - 1, f"in the step after {self._now}")
+        if outcome is Outcome.DIVERGED:
+            reason = self.method.reason(self._work)
+            return RunStatus.DIVERGED, (
+                f"the simulation could not go on at {self._now}: {reason}"
+                if reason
+                else f"the state stopped being finite at {self._now}; try a smaller step or softer "
+                "gains"
+            )
+        if outcome is Outcome.SOLVER_FAILED:
+            return RunStatus.SOLVER_FAILED, (
+                f"no contact solver could certify a solution at {self._now}; residuals "
+                f"{self._memory.residual.tolist()}"
+            )
+        return self._not_finite(tally.bad_torque, f"at {self._now}")
+
+    def _not_finite(self, actuator: int, when: str) -> tuple[RunStatus, str]:
+        return RunStatus.CONTROLLER_FAILED, (
+            f"the controller asked for a torque that is not finite {when}, actuator "
+            f"{self.robot.actuator_names[actuator]!r}"
+        )
+
+    def _new_record(self) -> None:
+        if self._records and not self._keeps_rows:
+            self._count_events()
+            return
+        clock = self._clock
+        rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
+        rows = min(CHUNK, rows + clock.row_margin)
+        events = 256 + 2 * clock.event_margin
+        self._records.append(allocate_record(self.robot, rows, events))
+
+    def _count_events(self) -> None:
+        """Count the events of the record and forget it."""
+        record = self._records[-1]
+        kinds = record.event_kind[: record.events]
+        self._event_counts += np.bincount(kinds, minlength=len(EventKind))
+        record.rows = record.events = 0
+
+    def _control_with(self, controller: Controller | CompiledController | None) -> None:
+        """Begin with a controller."""
+        robot, setting = self.robot, self._setting
+        compiled = compiled_form(robot, controller)
+        self._controller = controller
+        self._python: Any = None
+        self._shown = read_only(self._memory.contacts)
+        memory = self._memory
+        memory.stiffness[:] = robot.model.stiffness
+        memory.damping[:] = robot.model.damping
+        if compiled is not None:
+            driven = robot.model.actuator_joint
+            if compiled.stiffness is not None:
+                memory.stiffness[driven] += compiled.stiffness
+            if compiled.damping is not None:
+                memory.damping[driven] += compiled.damping
+            if setting.checked and controller is not None:
+                self._python = CheckedController(robot, compiled)
+        else:
+            self._python = controller
+        if self._python is None:
+            assert compiled is not None
+            self._name = f"controller {name_of(compiled)!r}"
+            self._kernel = compiled.kernel
+            self._control = control_with(compiled.parameters, compiled.memory)
+            self._control.conduct = TRUSTED if is_stock(compiled) else WATCHED
+            self._control.continuous = setting.control_period is None and controller is not None
+        else:
+            self._name = f"{type(self._python).__name__}.torque"
+            self._kernel = hold_torque
+            self._control = control_with((), ())
+            self._control.in_python = 1
+            if setting.control_period is None and self.method.python_period is not None:
+                self._clock.control_period = self.method.python_period
+        self._watch = Watch(robot, self._control, memory)
+
+    def snapshot(self) -> Snapshot:
+        """Return everything that the further course hangs on.
+
+        Raises
+        ------
+        ControllerError
+            If a controller in Python does not take part: it needs methods ``snapshot()``, which
+            returns an array of numbers, and ``restore(numbers)``.
+        """
+        arrays: dict[str, Any] = {
+            "time": np.array(self.time),
+            **_named("ground", self._ground.numbers()),
+            **_named("push", numbers_of_pushes(self.robot, self._pushes)),
+        }
+        for name, bundle in self._bundles(self._memory):
+            arrays |= _named(name, bundle.contents())
+        if self._python is not None:
+            arrays["controller"] = np.array(_partaking(self._python, self._name).snapshot())
+        return Snapshot(arrays, self._identity())
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Be again as a simulation was; the record begins anew.
+
+        Parameters
+        ----------
+        snapshot : Snapshot
+            Of this simulation, or of one of the same robot, method and controller, in this process
+            or another.
+
+        Raises
+        ------
+        SimulationError, ControllerError
+            If it is one of another robot, method or controller, or damaged.
+        """
+        for what, mine in self._identity().items():
+            its = snapshot.identity.get(what)
+            if its != mine:
+                raise SimulationError(f"the snapshot is one of another {what}: {its}, not {mine}")
+        self._put_back(snapshot)
+        self._recorded_until = snapshot.time
+        self._records.clear()
+        self.status, self.message, self.error = (
+            RunStatus.COMPLETED,
+            f"restored at {self._now}",
+            None,
+        )
+
+    def _put_back(self, snapshot: Snapshot) -> None:
+        try:
+            pushes = pushes_of_numbers(snapshot.part("push"))
+            ground = Ground.of_numbers(snapshot.part("ground"))
+            memory = self._memory.replaced(pushes=pushes_on(self.robot, pushes))
+            for name, bundle in self._bundles(memory):
+                bundle.fill(snapshot.part(name))
+            if self._python is not None:
+                _partaking(self._python, self._name).restore(snapshot.arrays["controller"].copy())
+        except (KeyError, ValueError) as error:
+            raise SimulationError(f"the snapshot is damaged: {error}") from error
+        self._memory, self._pushes, self._ground = memory, pushes, ground
+        self._watch = Watch(self.robot, self._control, memory)
+
+    def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
+        """Name the bundles that change as a simulation goes on."""
+        return (
+            ("clock", self._clock),
+            ("memory", memory),
+            ("work", self._work),
+            ("control", self._control),
+        )
+
+    def _identity(self) -> dict[str, str]:
+        return identity_of(self._setting, self.method, self._name)
+
+    @property
+    def record(self) -> Run:
+        """Everything since the simulation began or was restored, up to now.
+
+        The last row is this instant, for which the controller is asked and forces are found. That
+        is forgotten again; where a controller in Python takes no part in snapshots it is not asked,
+        and the record ends a step before.
+        """
+        if self.status is not RunStatus.COMPLETED or not self._can_be_kept:
+            return self._run(self.status, self.message)
+        now = self.snapshot()
+        counts = [(record.rows, record.events) for record in self._records]
+        run = self._run(*self._decide_last(), final=now)
+        self._put_back(now)
+        del self._records[len(counts) :]
+        for record, (rows, events) in zip(self._records, counts, strict=True):
+            record.rows, record.events = rows, events
+        return run
+
+    @property
+    def _can_be_kept(self) -> bool:
+        return self._python is None or isinstance(self._python, Partaking)
+
+    def _decide_last(self) -> tuple[RunStatus, str]:
+        """Decide and record this instant; return how that went."""
+        if self.status is not RunStatus.COMPLETED:
+            return self.status, self.message
+        self._clock.finishing = 1
+        try:
+            return self._go(NEVER)
+        except KeyboardInterrupt as interrupt:  # too late for anything to be lost
+            acknowledge(interrupt)
+            return RunStatus.INTERRUPTED, f"interrupted at {self._now}"
+        finally:
+            self._clock.finishing = 0
+
+    def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
+        """Return what is recorded as a run, which goes on from `final`."""
+        if self._fork is not None:
+            final = self._fork
+        if final is not None:
+            final = Snapshot(final.arrays | {"time": np.array(self.time)}, final.identity)
+        return Run(
+            robot=self.robot,
+            ground=self._ground,
+            method=self.method,
+            status=status,
+            message=message,
+            **recorded(self._records, self._recorded_until),
+            **tallied(self._memory, self.method.solves_with),
+            timing=self._timing,
+            error=self.error,
+            pushes=self._pushes,
+            final=final,
+        )
+
+
+def simulate(
+    robot: Robot,
+    controller: Controller | CompiledController | None = None,
+    *,
+    duration: float,
+    progress: Callable[[float], None] | None = None,
+    **setup: Unpack[Setup],
+) -> Run:
+    """Simulate a robot on the ground under a controller.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    controller : object with ``torque(t, state, contacts)``, or None
+        Decides the joint torques; None applies none.
+    duration : float
+        Time to simulate in seconds; time stepping rounds it to a whole number of steps.
     progress : callable, optional
         Called now and then with the simulated time. If it raises, the run ends there, with status
         ``interrupted``.
+    **setup
+        How it begins and what it is simulated with: `state`, which has to be given, `method`,
+        `ground`, `control_period`, `record_every`, `stop_when_fallen`, `pushes`, `checked`; see
+        :class:`Simulation`.
 
     Returns
     -------
@@ -150,467 +708,100 @@ def simulate(
         raised before anything is simulated, except for a torque of the wrong shape, which ends the
         run with status ``controller_failed``.
     """
-    loop = prepared(
-        robot=robot,
-        state=state,
-        duration=duration,
-        method=method,
-        ground=ground,
-        control_period=control_period,
-        record_every=record_every,
-        stop_when_fallen=stop_when_fallen,
-        pushes=pushes,
-        checked=checked,
-        progress=progress,
-    )
-    return loop.run(controller)
+    check_duration(duration)
+    simulation = Simulation(robot, controller, **setup)
+    simulation.advance(simulation._recorded_until + duration, progress=progress)
+    final = simulation.snapshot() if simulation._can_be_kept else None
+    return simulation._run(*simulation._decide_last(), final=final)
 
 
-def prepared(
-    *,
-    robot: Robot,
-    state: State,
-    duration: float,
-    method: Method | None,
-    ground: Ground | None,
-    control_period: float | None,
-    record_every: int,
-    stop_when_fallen: bool | None,
-    pushes: Sequence[Push],
-    checked: bool = False,
-    progress: Callable[[float], None] | None = None,
-    work: Workspace | None = None,
-) -> Loop:
-    """Check the arguments of :func:`simulate` and return the simulation, not yet begun.
+@dataclass(frozen=True)
+class Ending:
+    """How one simulation of a batch came to its end.
 
-    `work` is scratch for the robot's kinematics.
+    Attributes
+    ----------
+    status, message
+        How, and the same in a person's words.
+    state, time
+        Where the robot was, and when.
+    events : (kinds,) int
+        Events of each kind.
+    run : Run or None
+        The record, if rows were kept.
+    record : Record or None
+        What the next simulation may record in, if they were not.
     """
-    method = TimeStepping() if method is None else method
-    ground = Ground() if ground is None else ground
+
+    status: RunStatus
+    message: str
+    state: State
+    time: float
+    events: Integers
+    run: Run | None
+    record: Record | None
+
+
+def simulation_to_the_end(
+    setting: Setting,
+    method: Method,
+    controller: CompiledController,
+    duration: float,
+    *,
+    memory: Memory,
+    record: Record | None,
+    keep_rows: bool,
+    stopped: Callable[[], bool],
+) -> Ending:
+    """Simulate as :func:`simulate` does, in memory that is given, until `stopped` says so."""
+    simulation = Simulation.__new__(Simulation)
+    simulation._begin(setting, method, memory, record, keep_rows=keep_rows)
+    simulation._control_with(controller)
+    until = method.instant(simulation._clock, duration)
+    simulation._advance(until, NEVER, stopped=stopped)
+    status, message = simulation._decide_last()
+    last = simulation._records[-1]
+    state = simulation.state
+    row = last.rows - 1
+    if row >= 0 and last.time[row] == simulation.time:  # event-driven rows lie on the constraints
+        state = State(last.q[row], last.v[row])
+    if not keep_rows:
+        simulation._count_events()
+        events = simulation._event_counts
+        return Ending(status, message, state, simulation.time, events, None, last)
+    run = simulation._run(status, message)
+    events = np.bincount([event.kind for event in run.events], minlength=len(EventKind))
+    return Ending(status, message, state, simulation.time, events, run, None)
+
+
+def check_duration(duration: float) -> None:
+    """Refuse a duration that is none."""
+    if not (np.isfinite(duration) and duration >= 0.0):
+        raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
+
+
+def checked_method(method: Method | None) -> Method:
+    """Return a way through time, time stepping if none is asked for, or refuse what is none."""
+    if method is None:
+        return TimeStepping()
     if not isinstance(method, Method):
         raise SimulationError(
             f"method must be a way through time such as TimeStepping(), got {type(method).__name__}"
         )
-    if not isinstance(ground, Ground):
-        raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-    _check_state(robot, state)
-    if not (np.isfinite(duration) and duration >= 0.0):
-        raise SimulationError(f"duration must be a finite number ≥ 0, got {duration}")
-    if control_period is not None and not 0.0 < control_period < np.inf:
-        raise SimulationError(f"control_period must be a positive number, got {control_period}")
-    if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
-        raise SimulationError(f"record_every must be a whole number ≥ 1, got {record_every!r}")
-    if stop_when_fallen is None:
-        stop_when_fallen = robot.floating and len(robot.feet) > 1
-    fallen_height = -np.inf
-    if stop_when_fallen:
-        work = workspace(robot.nv) if work is None else work
-        center = np.zeros(2)
-        forward_kinematics(robot.model, state.q, work)
-        center_of_mass(robot.model, work, center)
-        fallen_height = FALL_FRACTION * (center[1] - float(ground.height(center[0])))
-    return Loop(
-        robot=robot,
-        ground=ground,
-        method=method,
-        state=state,
-        duration=duration,
-        control_period=control_period,
-        record_every=record_every,
-        fallen_height=fallen_height,
-        pushes=_checked_pushes(robot, pushes),
-        checked=checked,
-        progress=progress,
-    )
+    return method
 
 
-def _checked_pushes(robot: Robot, pushes: Sequence[Push]) -> tuple[Push, ...]:
-    if isinstance(pushes, Push):
-        return _checked_pushes(robot, (pushes,))
-    for push in pushes:
-        if not isinstance(push, Push):
-            raise SimulationError(f"pushes must be Push(...), got {push!r}")
-        push.place(robot)
-    return tuple(pushes)
+def _named(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
+    return {f"{prefix}.{name}": values for name, values in arrays.items()}
 
 
-def _check_state(robot: Robot, state: State) -> None:
-    for name, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
-        if vector.shape != (size,):
-            raise SimulationError(
-                f"state.{name} must have {size} entries for robot {robot.name!r}, "
-                f"got shape {vector.shape}"
-            )
-        if not np.all(np.isfinite(vector)):
-            joint = robot.joint_names[int(np.flatnonzero(~np.isfinite(vector))[0])]
-            raise SimulationError(f"state.{name} of joint {joint!r} is not finite")
-
-
-def compiled_form(
-    robot: Robot, controller: Controller | CompiledController | None
-) -> CompiledController | None:
-    """Return a controller in the form that runs inside the compiled loop, None if it has none.
-
-    Raises
-    ------
-    ControllerError
-        If it is no controller at all, or one that loops cannot call.
-    """
-    if controller is None:
-        return CompiledController(hold_torque, np.zeros(robot.nu), np.zeros(0))
-    if isinstance(controller, CompiledController):
-        return checked_kernel(controller)
-    make = getattr(controller, "compiled", None)
-    compiled = make() if callable(make) else None
-    if isinstance(compiled, CompiledController):
-        return checked_kernel(compiled)
-    if not callable(getattr(controller, "torque", None)):
+def _partaking(controller: Any, name: str) -> Partaking:
+    if not isinstance(controller, Partaking):
         raise ControllerError(
-            f"a controller needs a method torque(t, state, contacts), "
-            f"{type(controller).__name__} has none"
+            f"{name} takes no part in snapshots: give its class methods snapshot(), which returns "
+            "an array of numbers, and restore(numbers)"
         )
-    return None
-
-
-@dataclass
-class Loop:
-    """One simulation in progress.
-
-    With `keep_rows` false, rows and events are counted and forgotten. `stopped` is asked now and
-    then whether to end early.
-    """
-
-    robot: Robot
-    ground: Ground
-    method: Method
-    state: State
-    duration: float
-    control_period: float | None
-    record_every: int
-    fallen_height: float
-    pushes: tuple[Push, ...]
-    checked: bool
-    progress: Callable[[float], None] | None
-    keep_rows: bool = True
-    stopped: Callable[[], bool] | None = None
-
-    def run(self, controller: Controller | CompiledController | None) -> Run:
-        """Simulate from beginning to end."""
-        self.begin()
-        status, message, timing = self.advance(controller)
-        try:
-            return self.result(status, message, timing)
-        except KeyboardInterrupt as interrupt:  # too late for anything to be lost
-            acknowledge(interrupt)
-            return self.result(RunStatus.INTERRUPTED, self._interrupted(), timing)
-
-    def begin(self, memory: Memory | None = None, record: Record | None = None) -> None:
-        """Allocate everything, compile, and check what only the method can.
-
-        Parameters
-        ----------
-        memory : Memory, optional
-            Memory to use, as `allocate_memory` makes it for this robot and these pushes.
-        record : Record, optional
-            Empty record of an earlier simulation of this robot, to be used again.
-        """
-        if memory is None:
-            memory = allocate_memory(self.robot, self.pushes)
-        self.memory: Memory = memory
-        self.memory.stiffness[:] = self.robot.model.stiffness
-        self.memory.damping[:] = self.robot.model.damping
-        self.ground_model = self.ground.model()
-        self.engine: Engine = self.new_engine(memory)
-        self.event_counts = np.zeros(len(EventKind), dtype=np.int64)
-        self.error: BaseException | None = None
-        self.controller = "the controller"
-        self.records: list[Record] = [] if record is None else [record]
-        if record is None:
-            self._new_record()
-        # Bundles look up where their arrays are when first asked; the loop shall not wait for it.
-        for bundle in (self.robot.model, self.ground_model, self.memory, self.records[-1]):
-            _ = bundle.address
-
-    def new_engine(self, memory: Memory) -> Engine:
-        """Put the initial state into a memory and make an engine, which checks what it needs."""
-        memory.q[:] = self.state.q
-        memory.v[:] = self.state.v
-        return self.method.engine(
-            Setting(
-                robot=self.robot,
-                ground=self.ground.model(),
-                memory=memory,
-                duration=self.duration,
-                control_period=self.control_period,
-                record_every=self.record_every,
-                fallen_height=self.fallen_height,
-            )
-        )
-
-    def advance(
-        self, controller: Controller | CompiledController | None
-    ) -> tuple[RunStatus, str, Timing]:
-        """Simulate to the end; return how that came and how long it took."""
-        begin = clock_time.perf_counter()
-        try:
-            status, message = self._walk(controller)
-        except KeyboardInterrupt as interrupt:
-            acknowledge(interrupt)
-            status = RunStatus.INTERRUPTED
-            message = self._interrupted()
-        self.final_state = self._state_now()
-        if not self.keep_rows:
-            self._count_events()
-        wall_s = clock_time.perf_counter() - begin
-        return status, message, Timing(self.engine.compile_s, wall_s)
-
-    def _state_now(self) -> State:
-        """State of the row just written, if one was; event-driven rows lie on the constraints."""
-        record = self.records[-1]
-        row = int(record.row_count[0]) - 1
-        if row >= 0 and record.time[row] == self.engine.time:
-            return State(record.q[row], record.v[row])
-        return State(self.memory.q, self.memory.v)
-
-    def _interrupted(self) -> str:
-        return f"interrupted at t = {self.engine.time:.6g} s"
-
-    def _count_events(self) -> None:
-        """Count the events of the record and forget it."""
-        record = self.records[-1]
-        kinds = record.event_kind[: record.event_count[0]]
-        self.event_counts += np.bincount(kinds, minlength=len(EventKind))
-        record.row_count[0] = record.event_count[0] = 0
-
-    def _new_record(self) -> None:
-        if self.records and not self.keep_rows:
-            self._count_events()
-            return
-        rows = min(CHUNK, self.engine.rows_left + 2)
-        self.records.append(
-            allocate_record(self.robot, rows, max(256, 64 * (self.robot.nc + 3 * self.robot.nv)))
-        )
-
-    def _walk(self, controller: Controller | CompiledController | None) -> tuple[RunStatus, str]:
-        compiled = compiled_form(self.robot, controller)
-        if compiled is None:
-            return self._run_python(controller)  # type: ignore[arg-type]
-        driven = self.robot.model.actuator_joint
-        if compiled.stiffness is not None:
-            self.memory.stiffness[driven] += compiled.stiffness
-        if compiled.damping is not None:
-            self.memory.damping[driven] += compiled.damping
-        if self.checked and controller is not None:
-            return self._run_python(CheckedController(self.robot, compiled))
-        return self._run_compiled(compiled)
-
-    def _run_compiled(self, controller: CompiledController) -> tuple[RunStatus, str]:
-        self.controller = f"controller {name_of(controller)!r}"
-        parameters = guarded(controller.parameters)
-        controller_memory = guarded(controller.memory)
-        self.memory.tally[CONDUCT] = TRUSTED if is_stock(controller) else WATCHED
-        watch = Watch(self.robot, self.engine, self.memory, parameters, controller_memory)
-        steps = FIRST_LOOK
-        while True:
-            begin = clock_time.perf_counter()
-            code = self._run(steps, controller.kernel, parameters, controller_memory)
-            elapsed = clock_time.perf_counter() - begin
-            misdeed = watch.misdeed()
-            if misdeed is not None:
-                return RunStatus.CONTROLLER_FAILED, (
-                    f"{self.controller} {misdeed}; noticed at t = {self.engine.time:.6g} s. "
-                    "simulate(..., checked=True) tells more"
-                )
-            complaint = self._report()
-            if code != PAUSED:
-                status, message = self._ending(code)
-                return status, f"{message}; {complaint}" if complaint else message
-            if complaint:
-                return RunStatus.INTERRUPTED, f"{self._interrupted()}: {complaint}"
-            if self.stopped is not None and self.stopped():
-                return RunStatus.INTERRUPTED, self._interrupted()
-            steps = int(min(CHUNK, max(1.0, steps * min(4.0, LOOK_EVERY / max(elapsed, 1e-9)))))
-
-    def _report(self) -> str:
-        """Report progress; say what went wrong with that, if something did."""
-        if self.progress is None:
-            return ""
-        try:
-            self.progress(self.engine.time)
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
-            self.error = error
-            return f"progress raised {_raised(error)}"
-        return ""
-
-    def _run(
-        self,
-        steps: int | None,
-        kernel: Callable[..., None],
-        parameters: NDArray[np.float64],
-        controller_memory: NDArray[np.float64],
-    ) -> int:
-        """Advance by a number of steps, or by one control period; return how it came back."""
-        self.engine.pause_after(steps)
-        while True:
-            try:
-                code = self.engine.advance(kernel, parameters, controller_memory, self.records[-1])
-            except KeyboardInterrupt:
-                raise
-            except BaseException as error:  # of a compiled controller: loops raise nothing
-                self.error = error
-                return RAISED
-            if code != RECORD_FULL:
-                return code
-            self._new_record()
-
-    def _run_python(self, controller: Controller) -> tuple[RunStatus, str]:
-        self.controller = f"{type(controller).__name__}.torque"
-        empty, held = guarded(()), guarded(np.zeros(self.robot.nu))
-        contacts = read_only(self.memory.contacts)
-        numbers = numbers_of(self.robot)
-        calls = 0
-        while True:
-            ending = self._ask(controller, contacts, held)
-            code = PAUSED if ending else self._run(None, hold_torque, held, empty)
-            calls += 1
-            if calls % LOOK_AFTER != 0 and code == PAUSED and ending is None:
-                continue
-            changed = restored(self.robot, numbers)
-            if changed:
-                return RunStatus.CONTROLLER_FAILED, (
-                    f"{self.controller} changed the robot: {changed}; noticed at "
-                    f"t = {self.engine.time:.6g} s"
-                )
-            if ending is not None:
-                return ending
-            complaint = self._report()
-            if code != PAUSED:
-                status, message = self._ending(code)
-                return status, f"{message}; {complaint}" if complaint else message
-            if complaint:
-                return RunStatus.INTERRUPTED, f"{self._interrupted()}: {complaint}"
-
-    def _ask(
-        self, controller: Controller, contacts: Contacts, held: NDArray[np.float64]
-    ) -> tuple[RunStatus, str] | None:
-        """Ask for the torques to hold; return how the controller ended the run, if it did."""
-        observe(self.robot.model, self.ground_model, self.memory)
-        now = f"t = {self.engine.time:.6g} s"
-        try:
-            torque = np.asarray(
-                controller.torque(self.engine.time, State(self.memory.q, self.memory.v), contacts),
-                dtype=np.float64,
-            )
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
-            self.error = error
-            if isinstance(controller, CheckedController) and isinstance(error, ControllerError):
-                return RunStatus.CONTROLLER_FAILED, f"{error} (at {now})"
-            return RunStatus.CONTROLLER_FAILED, (
-                f"{self.controller} raised {_raised(error)} at {now} (the exception is in "
-                "run.error)"
-            )
-        if torque.shape != (self.robot.nu,):
-            return RunStatus.CONTROLLER_FAILED, (
-                f"{self.controller} returned shape {torque.shape} at {now}; robot "
-                f"{self.robot.name!r} needs ({self.robot.nu},): "
-                f"{', '.join(self.robot.actuator_names)}"
-            )
-        held[:] = torque
-        return None
-
-    def _ending(self, code: int) -> tuple[RunStatus, str]:
-        now = f"t = {self.engine.time:.6g} s"
-        if code == DONE:
-            return RunStatus.COMPLETED, f"completed at {now}"
-        if code == FELL:
-            return RunStatus.FELL, (
-                f"the robot fell at {now}: its centre of mass is below half its first height"
-            )
-        if code == RAISED:
-            assert self.error is not None
-            more = "; simulate(..., checked=True) names the array and the index"
-            return RunStatus.CONTROLLER_FAILED, (
-                f"{self.controller} raised {_raised(self.error)} at {now} (the exception is in "
-                f"run.error){more if isinstance(self.error, IndexError) else ''}"
-            )
-        tally = self.memory.tally
-        if code == DIVERGED and tally[NOT_FINITE] > 0:
-            return self._not_finite(int(tally[NOT_FINITE]) - 1, f"in the step after {now}")
-        reason = getattr(self.engine, "reason", "")
-        if code == DIVERGED and reason:
-            return RunStatus.DIVERGED, f"the simulation could not go on at {now}: {reason}"
-        if code == DIVERGED:
-            return RunStatus.DIVERGED, (
-                f"the state stopped being finite at {now}; try a smaller step or softer gains"
-            )
-        if code == SOLVER_FAILED:
-            return RunStatus.SOLVER_FAILED, (
-                f"no contact solver could certify a solution at {now}; residuals "
-                f"{self.memory.residual.tolist()}"
-            )
-        return self._not_finite(int(tally[BAD_TORQUE]), f"at {now}")
-
-    def _not_finite(self, actuator: int, when: str) -> tuple[RunStatus, str]:
-        return RunStatus.CONTROLLER_FAILED, (
-            f"the controller asked for a torque that is not finite {when}, actuator "
-            f"{self.robot.actuator_names[actuator]!r}"
-        )
-
-    def result(self, status: RunStatus, message: str, timing: Timing) -> Run:
-        """Return the record of the simulation."""
-        rows = joined(self.records)
-        counters = self.memory.solver.counters
-        extreme = self.memory.extreme
-        return Run(
-            robot=self.robot,
-            ground=self.ground,
-            method=self.method,
-            status=status,
-            message=message,
-            time=rows.time,
-            position=rows.q,
-            velocity=rows.v,
-            torque=rows.torque,
-            stop_torque=rows.stop_torque,
-            friction_torque=rows.friction_torque,
-            contact_point=rows.point,
-            contact_normal=rows.normal,
-            gap=rows.gap,
-            contact_force=rows.force,
-            slip_velocity=rows.slip,
-            residual=rows.residual,
-            events=tuple(
-                Event(
-                    time=float(rows.event_time[i]),
-                    kind=EventKind(int(rows.event_kind[i])),
-                    contact=int(rows.event_contact[i]),
-                    impulse=(float(rows.event_impulse[i, 0]), float(rows.event_impulse[i, 1])),
-                )
-                for i in np.argsort(rows.event_time, kind="stable")
-            ),
-            certificates=Certificates(
-                penetration=float(extreme[PENETRATION]),
-                complementarity=float(extreme[COMPLEMENTARITY]),
-                cone=float(extreme[CONE]),
-                non_penetration=float(extreme[NON_PENETRATION]),
-            ),
-            solver=SolverCount(
-                name=self.engine.solver,
-                solves=int(counters[SOLVES]),
-                shortcuts=int(counters[SHORTCUTS]),
-                fallbacks=int(counters[FALLBACKS]),
-                failures=int(counters[FAILURES]),
-            ),
-            steps=int(self.memory.tally[STEPS]),
-            saturations=int(self.memory.tally[SATURATIONS]),
-            timing=timing,
-            error=self.error,
-            pushes=self.pushes,
-        )
+    return controller
 
 
 def _raised(error: BaseException) -> str:

@@ -283,6 +283,11 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
     path : str or path
         Picture to write: .png, .pdf or .svg.
 
+    Returns
+    -------
+    Path
+        The file.
+
     Raises
     ------
     ViewError

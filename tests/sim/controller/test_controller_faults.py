@@ -19,7 +19,7 @@ from heelstrike.sim import (
     TimeStepping,
     controller_kernel,
 )
-from heelstrike.sim.engine import Method
+from heelstrike.sim.method import Method
 
 METHODS = [TimeStepping(), EventDriven(max_step=1e-3), Compliant()]
 AFTER = 0.02

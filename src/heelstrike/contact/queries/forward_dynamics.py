@@ -77,6 +77,11 @@ def contact_forward_dynamics(
     solver : str
         First contact solver to try, see :func:`heelstrike.solve_contact`.
 
+    Returns
+    -------
+    ContactForwardDynamics
+        Acceleration, contact forces and the certificate.
+
     Raises
     ------
     ContactProblemError

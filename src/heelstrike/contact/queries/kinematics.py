@@ -53,6 +53,20 @@ def contact_kinematics(
 ) -> ContactKinematics:
     """Evaluate all contact points of a robot; level ground with its default friction if not given.
 
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    q, v : (nq,) and (nv,) array
+        State.
+    ground : Ground, optional
+        Level ground with its default friction if not given.
+
+    Returns
+    -------
+    ContactKinematics
+        Gaps, velocities, normals and Jacobians of the points.
+
     Raises
     ------
     RobotError

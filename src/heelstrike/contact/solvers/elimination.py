@@ -5,12 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from llvmlite import ir
 from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.machine_code import addresses
-from heelstrike.compiler.straight_line import Recording, add_function
+from heelstrike.compiler.recording import Program, inverse_above
+from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.robot.model import Floats
 
 LARGEST = 8
@@ -18,12 +17,6 @@ LARGEST = 8
 
 POOR_PIVOT = 1e-7
 """Pivots that keep more than this of their diagonal can be divided by, if need be."""
-
-
-@kernel
-def inverse_above(value: float, least: float) -> float:
-    """Inverse of a number if it is more than `least`, or else zero."""
-    return 1.0 / value if value > least else 0.0
 
 
 @kernel
@@ -76,19 +69,17 @@ def elimination_programs() -> NDArray[np.int64]:
 
 
 def _programs() -> tuple[int, ...]:
-    sizes = range(1, LARGEST + 1)
-
-    def write() -> ir.Module:
-        module = ir.Module("elimination")
-        for size in sizes:
-            arguments = {
-                "matrix": np.zeros(size * (size + 1) // 2),
-                "x": np.zeros(size),
-                "pivot": np.zeros(size),
-            }
-            recording = Recording(eliminate, arguments)
-            recording.name = f"eliminate_{size}"
-            add_function(module, recording)
-        return module
-
-    return addresses([f"eliminate_{size}" for size in sizes], b"elimination", write)
+    return straight_line_code(
+        [
+            Program(
+                eliminate,
+                {
+                    "matrix": np.zeros(size * (size + 1) // 2),
+                    "x": np.zeros(size),
+                    "pivot": np.zeros(size),
+                },
+                name=f"eliminate_{size}",
+            )
+            for size in range(1, LARGEST + 1)
+        ]
+    )

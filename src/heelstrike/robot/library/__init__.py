@@ -43,6 +43,11 @@ def load_robot(
         Lock the joints of a robot of three dimensions that leave the x–z plane, and let its trunk
         float in the plane. Its mass must be symmetric about that plane.
 
+    Returns
+    -------
+    Robot
+        The robot.
+
     Raises
     ------
     RobotError

@@ -17,12 +17,11 @@ inertia of the whole robot.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
@@ -53,7 +52,8 @@ from heelstrike.sim.compliant.contact_law import (
 )
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 from heelstrike.sim.contact_geometry import contact_rows, observe, row_product
-from heelstrike.sim.controller.asking import ask
+from heelstrike.sim.controller.asking import ask, consult
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
@@ -69,6 +69,12 @@ GAINS_LAST = 20
 # In steps shorter than this (s), which only a controller that changes its mind can bring about, it
 # is taken at its word wherever it is asked: it decides once, not to and fro.
 DECISIVE = 1e-8
+
+# How a controller that acts continuously is called when a state is evaluated.
+HELD = 0
+TRIED = 1
+DECIDED = 2
+ACCEPTED = 3
 
 # A bristle bent less than this (m) is straight.
 NO_BEND = 1e-30
@@ -93,27 +99,6 @@ class Laws(Bundle):
     numbers: Floats = array("numbers")
     stop: int = number(int)
     stop_numbers: Floats = array("numbers")
-
-
-class Control(NamedTuple):
-    """The controller as the integration sees it.
-
-    Attributes
-    ----------
-    continuous : bool
-        Whether it acts at every instant; otherwise its torques are held.
-    kernel : compiled function
-    parameters, memory : float arrays
-        The controller and its numbers.
-    trial : float array
-        Copy of its memory for the calls within a step.
-    """
-
-    continuous: bool
-    kernel: Callable[..., None]
-    parameters: Floats
-    memory: Floats
-    trial: Floats
 
 
 class CompliantWorkspace(Bundle):
@@ -168,12 +153,19 @@ class CompliantWorkspace(Bundle):
     touched, left : (nc,) float
         When a contact point last came to the ground and left it since the last sample; negative
         if it did not.
+    laws : Laws
+    step, rtol, atol : float
+        Seconds between two samples; tolerated errors of a step, relative and absolute.
+    proposed : float
+        Length of the next step as far as accuracy allows (s).
+    row : int
+        Row of the record for this sample, -1 for none.
     """
 
     bristle: Floats = array("nc")
     acceleration: Floats = array("nv")
     bristle_rate: Floats = array("nc")
-    force: Floats = array("nc", "rows")
+    force: Floats = array("nc", "components")
     partial: Floats = array("nc", "partials")
     stop_force: Floats = array("nv")
     dry_force: Floats = array("nv")
@@ -188,7 +180,7 @@ class CompliantWorkspace(Bundle):
     base_bristle: Floats = array("nc")
     base_rate: Floats = array("nc")
     base_gap: Floats = array("nc")
-    base_force: Floats = array("nc", "rows")
+    base_force: Floats = array("nc", "components")
     base_stop_force: Floats = array("nv")
     base_dry_force: Floats = array("nv")
     base_stop_partial: Floats = array("nv", 2)
@@ -204,69 +196,73 @@ class CompliantWorkspace(Bundle):
     right_q: Floats = array("nv")
     right_v: Floats = array("nv")
     right_bristle: Floats = array("nc")
-    impulse: Floats = array("nc", "rows")
+    impulse: Floats = array("nc", "components")
     stop_impulse: Floats = array("nv")
     dry_impulse: Floats = array("nv")
     touched: Floats = array("nc")
     left: Floats = array("nc")
+    laws: Laws = part(Laws)
+    step: float = number(float)
+    rtol: float = number(float)
+    atol: float = number(float)
+    proposed: float = cell(float)
+    row: int = cell(int)
 
 
-def compliant_workspace(robot: Robot) -> CompliantWorkspace:
+def compliant_workspace(
+    robot: Robot, laws: Laws, step: float, rtol: float, atol: float
+) -> CompliantWorkspace:
     """Allocate the scratch for a robot."""
     return CompliantWorkspace.allocate(
-        nv=robot.nv, nu=robot.nu, nc=robot.nc, rows=2, partials=PARTIALS, stages=STAGES,
-        trial_torque=guarded(np.zeros(robot.nu)), age=GAINS_LAST,
+        nv=robot.nv, nu=robot.nu, nc=robot.nc, components=2, partials=PARTIALS, stages=STAGES,
+        trial_torque=guarded(np.zeros(robot.nu)), age=GAINS_LAST, laws=laws, step=step, rtol=rtol,
+        atol=atol, proposed=step,
     )  # fmt: skip
 
 
 @kernel
-def command(
-    control: Control, memory_now: Floats, time: float, model: Model, memory: Memory, torque: Floats
-) -> None:
-    """Torques of a controller at the state now, within their limits."""
-    ask(
-        control.kernel,
-        time,
-        memory.q,
-        memory.v,
-        model,
-        memory,
-        control.parameters,
-        memory_now,
-        torque,
-    )
-    try_torque(model, memory.q, memory.v, torque, memory)
+def command(controller: Any, control: Control, time: float, model: Model, memory: Memory) -> None:
+    """Ask the controller for its torques at the state now, within their limits."""
+    ask(controller, control, time, memory.q, memory.v, model, memory, memory.torque)
+    try_torque(model, memory.q, memory.v, memory.torque, memory)
 
 
 @kernel
 def try_command(
-    control: Control, time: float, model: Model, memory: Memory, torque: Floats
+    controller: Any, control: Control, time: float, model: Model, memory: Memory, torque: Floats
 ) -> None:
     """Torques that a controller would ask for, were this its next call; it remembers nothing."""
-    for i in range(control.memory.shape[0]):
-        control.trial[i] = control.memory[i]
-    command(control, control.trial, time, model, memory, torque)
+    consult(controller, control, time, memory.q, memory.v, model, memory, torque)
+    try_torque(model, memory.q, memory.v, torque, memory)
 
 
 @kernel
 def find_gains(
-    control: Control, time: float, model: Model, memory: Memory, work: CompliantWorkspace
-) -> None:
+    controller: Any, control: Control, time: float, model: Model, memory: Memory,
+    work: CompliantWorkspace,
+) -> None:  # fmt: skip
     """Derivatives of the controller's torques at the start of the step, by differences."""
     for j in range(model.parent.shape[0]):
         memory.q[j] = work.base_q[j]
         memory.v[j] = work.base_v[j]
     forward_kinematics(model, memory.q, memory.tree)
     link_velocities(model, memory.v, memory.tree)
-    try_command(control, time, model, memory, memory.torque)
+    try_command(controller, control, time, model, memory, memory.torque)
     for j in range(model.parent.shape[0]):
-        difference(control, time, model, memory, memory.q, j, work.trial_torque, work.torque_by_q)
-        difference(control, time, model, memory, memory.v, j, work.trial_torque, work.torque_by_v)
+        difference(
+            controller, control, time, model, memory, memory.q, j, work.trial_torque,
+            work.torque_by_q,
+        )  # fmt: skip
+        difference(
+            controller, control, time, model, memory, memory.v, j, work.trial_torque,
+            work.torque_by_v,
+        )  # fmt: skip
     work.age = 0
 
 
 @kernel
 def difference(
+    controller: Any,
     control: Control,
     time: float,
     model: Model,
@@ -287,7 +283,7 @@ def difference(
         varied[j] = kept + change
         forward_kinematics(model, memory.q, memory.tree)
         link_velocities(model, memory.v, memory.tree)
-        try_command(control, time, model, memory, trial)
+        try_command(controller, control, time, model, memory, trial)
         for i in range(trial.shape[0]):
             slope = (trial[i] - memory.torque[i]) / change
             if side == 0 or abs(slope) < abs(gains[i, j]):
@@ -297,35 +293,34 @@ def difference(
 
 @kernel
 def evaluate(
+    controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    laws: Laws,
-    control: Control,
-    accepted: bool,
-    decisive: bool,
+    how: int,
     time: float,
     memory: Memory,
     work: CompliantWorkspace,
 ) -> None:
     """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.bristle``.
 
-    A controller that acts continuously is called: for good, with the contact forces of this very
-    state, if the state is `accepted`; for good also if it must be `decisive`; otherwise to see what
-    it would do.
+    A controller that acts continuously is called, unless its torques are ``HELD``: to see what it
+    would do (``TRIED``), for good (``DECIDED``), or for good with the contact forces of this very
+    state, which is ``ACCEPTED``.
     """
     observe(model, ground, memory)
-    push_contacts(model, laws, memory, work)
-    push_stops(model, laws, memory, work)
-    rub_joints(model, laws.numbers[JOINT_SCALE], memory, work)
-    if control.continuous:
-        if accepted:
+    push_contacts(model, work.laws, memory, work)
+    push_stops(model, work.laws, memory, work)
+    rub_joints(model, work.laws.numbers[JOINT_SCALE], memory, work)
+    if control.continuous == 1 and how != HELD:
+        if how == ACCEPTED:
             for contact in range(model.contact_link.shape[0]):
                 memory.contacts.force[contact, 0] = work.force[contact, 0]
                 memory.contacts.force[contact, 1] = work.force[contact, 1]
-        if accepted or decisive:
-            command(control, control.memory, time, model, memory, memory.torque)
+        if how == TRIED:
+            try_command(controller, control, time, model, memory, memory.torque)
         else:
-            try_command(control, time, model, memory, memory.torque)
+            command(controller, control, time, model, memory)
     mass_matrix(model, memory.tree, memory.mass_matrix)
     factorize(model, memory.mass_matrix, memory.factor)
     bias_force(model, memory.tree, memory.rate)
@@ -454,7 +449,7 @@ def factorize_step(model: Model, control: Control, g: float, work: CompliantWork
             by_q[i, j] = 0.0
         system[i, i] += g * (model.damping[i] - work.base_stop_partial[i, NORMAL_BY_SPEED])
         by_q[i, i] = work.base_stop_partial[i, NORMAL_BY_GAP] - model.stiffness[i]
-    if control.continuous:
+    if control.continuous == 1:
         for i in range(model.actuator_joint.shape[0]):
             joint = model.actuator_joint[i]
             for j in range(nv):
@@ -565,18 +560,18 @@ def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) ->
 
 @kernel
 def attempt_step(
+    controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    laws: Laws,
-    control: Control,
     time: float,
     h: float,
-    rtol: float,
-    atol: float,
     memory: Memory,
     work: CompliantWorkspace,
 ) -> float:
     """Go from the start of the step, at `time`, to its end; return the error over the tolerance."""
+    rtol, atol = work.rtol, work.atol
+    how = DECIDED if h <= DECISIVE else TRIED
     nv = model.parent.shape[0]
     nc = model.contact_link.shape[0]
     g = GAMMA * h
@@ -593,17 +588,7 @@ def attempt_step(
                 work.bristle[i] = work.base_bristle[i]
                 for k in range(stage):
                     work.bristle[i] += A[stage, k] * work.stage_bristle[k, i]
-            evaluate(
-                model,
-                ground,
-                laws,
-                control,
-                False,
-                h <= DECISIVE,
-                time + TIMES[stage] * h,
-                memory,
-                work,
-            )
+            evaluate(controller, control, model, ground, how, time + TIMES[stage] * h, memory, work)
         for i in range(nv):
             work.right_q[i] = work.base_v[i] if stage == 0 else memory.v[i]
             work.right_v[i] = work.base_acceleration[i] if stage == 0 else work.acceleration[i]

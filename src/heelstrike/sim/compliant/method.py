@@ -10,17 +10,16 @@ where the force really changes fast, after an impact.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
-from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba import types
 
-from heelstrike.compiler.compilation import kernel, loop_for
+from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.clock import Clock
 from heelstrike.sim.compliant.contact_law import (
     NUMBERS,
     BristleFriction,
@@ -32,9 +31,11 @@ from heelstrike.sim.compliant.contact_law import (
     slips,
 )
 from heelstrike.sim.compliant.dynamics import (
+    ACCEPTED,
     GAINS_LAST,
+    HELD,
+    TRIED,
     CompliantWorkspace,
-    Control,
     Laws,
     attempt_step,
     begin_step,
@@ -44,33 +45,11 @@ from heelstrike.sim.compliant.dynamics import (
 )
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contact_geometry import observe
-from heelstrike.sim.controller.asking import ask
-from heelstrike.sim.controller.guard import guarded
-from heelstrike.sim.controller.interface import (
-    CONTROLLER_TYPE,
-    MODEL_TYPE,
-    hold_torque,
-)
-from heelstrike.sim.engine import (
-    BAD_CONTROLLER,
-    DIVERGED,
-    DONE,
-    FELL,
-    PAUSED,
-    RECORD_FULL,
-    Engine,
-    Setting,
-    whole_steps,
-)
-from heelstrike.sim.memory import (
-    CONE,
-    PENETRATION,
-    STEPS,
-    Memory,
-    Record,
-)
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels
+from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
-from heelstrike.sim.record_size import check_room, check_steps
 from heelstrike.sim.recording import (
     JOINT_STOP,
     LIFTOFF,
@@ -78,12 +57,11 @@ from heelstrike.sim.recording import (
     SLIP,
     STICK,
     TOUCHDOWN,
-    center_height,
     limit_torque,
     note_event,
-    note_row,
-    sound,
+    note_row_when_due,
 )
+from heelstrike.sim.setting import Setting
 
 # Shortest step in s. It is taken whatever its error: only a torque that jumps asks for less, and a
 # jump of 1000 rad/s² over so short a time is 1e-7 rad/s.
@@ -92,23 +70,9 @@ SAFETY = 0.9
 SHRINK = 0.2
 GROW = 5.0
 
-# Places in the clock and the span of a run.
-START = 0
-STEP = 1
-FALLEN = 2
-RTOL = 3
-ATOL = 4
-PROPOSED = 5
-NOW = 0
-LAST = 1
-PAUSE = 2
-CONTROL_EVERY = 3
-RECORD_EVERY = 4
-CONTINUOUS = 5
-
 
 @dataclass(frozen=True, kw_only=True)
-class Compliant:
+class Compliant(Method):
     """Ground that gives way: contact forces from a law instead of a contact problem.
 
     Parameters
@@ -176,16 +140,47 @@ class Compliant:
             if not 0.0 < value < np.inf:
                 raise SimulationError(f"{name} must be a positive number, got {value}")
 
-    def engine(self, setting: Setting) -> Engine:
-        """Return this way through time, compiled and ready to run.
+    @property
+    def step_length(self) -> float:  # type: ignore[override]
+        """Time between two samples."""
+        return self.step
 
-        Raises
-        ------
-        SimulationError
-            If the ground has a restitution of its own; if steps or rows are too many to be counted
-            or kept.
-        """
-        return _CompliantEngine(self, setting)
+    @property
+    def row_period(self) -> tuple[str, float]:
+        """A row a sample."""
+        return "step", self.step
+
+    @property
+    def solves_with(self) -> str:
+        """Return the names of the laws."""
+        return f"{type(self.law).__name__}, {type(self.friction).__name__}"
+
+    def new_work(self, robot: Robot) -> CompliantWorkspace:
+        """Allocate its scratch, with the numbers of the laws."""
+        numbers, stop_numbers = np.zeros(NUMBERS), np.zeros(NUMBERS)
+        self.law.write(numbers)
+        self.friction.write(numbers)
+        self.stop.write(stop_numbers)
+        laws = Laws(
+            normal=self.law.kind,
+            friction=self.friction.kind,
+            numbers=numbers,
+            stop=self.stop.kind,
+            stop_numbers=stop_numbers,
+        )
+        return compliant_workspace(robot, laws, self.step, self.rtol, self.atol)
+
+    def room(self, robot: Robot) -> tuple[int, int]:
+        """Return how many rows and events a sample may add to the record."""
+        return 1, 4 * robot.nc + robot.nv
+
+    def check(self, setting: Setting) -> None:
+        """Refuse ground with a restitution of its own."""
+        if np.any(setting.ground.model().restitution > 0.0):
+            raise SimulationError(
+                "on compliant ground the restitution follows from the contact law; leave that of "
+                "the ground at zero and use HuntCrossley.from_sink or KelvinVoigt.from_sink"
+            )
 
 
 @kernel
@@ -205,7 +200,7 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
             )
         gap = memory.contacts.gap[contact]
         before = work.base_gap[contact]
-        memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -gap)
+        memory.tally.penetration = max(memory.tally.penetration, -gap)
         if memory.closed[contact] == 0 and gap < 0.0:
             memory.closed[contact] = 1
             share = before / (before - gap) if before > 0.0 else 0.0
@@ -247,15 +242,9 @@ def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> flo
 
 @kernel
 def sample(
-    model: Model,
-    ground: GroundModel,
-    laws: Laws,
-    control: Control,
-    start: float,
-    clock: Floats,
-    memory: Memory,
-    work: CompliantWorkspace,
-) -> int:
+    controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
+    memory: Memory, work: CompliantWorkspace,
+) -> int:  # fmt: skip
     """Integrate from one sample to the next; return DONE or what was in the way.
 
     ``memory.contacts.force`` receives the mean contact forces.
@@ -269,34 +258,25 @@ def sample(
         work.stop_impulse[joint] = 0.0
         work.dry_impulse[joint] = 0.0
     memory.residual[1] = cone_residual(model, memory, work)
-    span = clock[STEP]
+    span = work.step
     elapsed = 0.0
-    h = clock[PROPOSED]
+    h = work.proposed
     begin_step(model, memory, work)
-    if control.continuous and work.age >= GAINS_LAST:
-        find_gains(control, start, model, memory, work)
+    if control.continuous == 1 and work.age >= GAINS_LAST:
+        find_gains(controller, control, start, model, memory, work)
     rejected = False
     while elapsed < span:
         remaining = span - elapsed
         final = h >= remaining * (1.0 - 1e-9)
         taken = remaining if final else h
         error = attempt_step(
-            model,
-            ground,
-            laws,
-            control,
-            start + elapsed,
-            taken,
-            clock[RTOL],
-            clock[ATOL],
-            memory,
-            work,
+            controller, control, model, ground, start + elapsed, taken, memory, work
         )
         shortest = taken <= SHORTEST
         finite = error < np.inf
         if not (error <= 1.0 or (shortest and finite)):
-            if control.continuous and (work.age > 0 or shortest):
-                find_gains(control, start + elapsed, model, memory, work)
+            if control.continuous == 1 and (work.age > 0 or shortest):
+                find_gains(controller, control, start + elapsed, model, memory, work)
             if shortest:
                 for i in range(model.parent.shape[0]):
                     memory.q[i] = work.base_q[i]
@@ -309,17 +289,16 @@ def sample(
             rejected = True
             continue
         observe(model, ground, memory)
-        met = landing(model, clock[ATOL], memory, work)
+        met = landing(model, work.atol, memory, work)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
-        # At the sample itself the controller is called by the one who takes it.
-        evaluate(
-            model, ground, laws, control, not final, False, start + elapsed + taken, memory, work
-        )
+        # At the sample itself the controller is called by the frame.
+        how = TRIED if final else ACCEPTED
+        evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
         memory.residual[1] = max(memory.residual[1], cone_residual(model, memory, work))
-        memory.tally[STEPS] += 1
+        memory.tally.steps += 1
         work.age += 1
         begin_step(model, memory, work)
         elapsed = span if final else elapsed + taken
@@ -331,20 +310,20 @@ def sample(
             rejected = False
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
-    clock[PROPOSED] = min(h, span)
+    work.proposed = min(h, span)
     for contact in range(model.contact_link.shape[0]):
         for k in range(2):
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
     for joint in range(model.parent.shape[0]):
         memory.stop_torque[joint] = work.stop_impulse[joint] / span
         memory.friction_torque[joint] = work.dry_impulse[joint] / span
-    memory.extreme[CONE] = max(memory.extreme[CONE], memory.residual[1])
+    memory.tally.cone = max(memory.tally.cone, memory.residual[1])
     return DONE
 
 
 @kernel
 def note_events(
-    model: Model, laws: Laws, record: Record, time: float, memory: Memory, work: CompliantWorkspace
+    model: Model, record: Record, time: float, memory: Memory, work: CompliantWorkspace
 ) -> None:
     """Note what happened since the last sample; `time` is now.
 
@@ -364,8 +343,8 @@ def note_events(
         if left >= 0.0 or work.force[contact, 0] <= 0.0:
             continue
         sliding = slips(
-            laws.friction,
-            laws.numbers,
+            work.laws.friction,
+            work.laws.numbers,
             memory.friction[contact] * work.force[contact, 0],
             memory.slip[contact],
             work.bristle[contact],
@@ -379,13 +358,13 @@ def note_events(
     for joint in range(model.parent.shape[0]):
         pressed = memory.stop_torque[joint] != 0.0
         if pressed and memory.stopped[joint] == 0:
-            place = record.event_count[0]
+            place = record.events
             record.event_time[place] = time
             record.event_kind[place] = JOINT_STOP
             record.event_contact[place] = joint
             record.event_impulse[place, 0] = abs(memory.stop_torque[joint])
             record.event_impulse[place, 1] = 0.0
-            record.event_count[0] = place + 1
+            record.events = place + 1
         memory.stopped[joint] = 1 if pressed else 0
 
 
@@ -404,212 +383,100 @@ def note_forces(
     record.residual[row, 1] = memory.residual[1]
 
 
-def _advance(
-    controller: Any,
+@kernel
+def begin(
     model: Model,
     ground: GroundModel,
-    laws: Laws,
-    parameters: Floats,
-    controller_memory: Floats,
-    trial_memory: Floats,
+    memory: Memory,
+    work: CompliantWorkspace,  # noqa: ARG001
+    record: Record,  # noqa: ARG001
+) -> int:
+    """Points in the ground, or on it, are closed when the simulation begins."""
+    observe(model, ground, memory)
+    for contact in range(model.contact_link.shape[0]):
+        memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
+    return DONE
+
+
+@kernel
+def prepare(
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    work: CompliantWorkspace,  # noqa: ARG001
+) -> None:
+    """Kinematics and contact points of the state now."""
+    observe(model, ground, memory)
+
+
+@kernel
+def decide(
+    controller: Any,
+    control: Control,
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    work: CompliantWorkspace,
+    record: Record,  # noqa: ARG001
+    clock: Clock,
+) -> int:
+    """Forces and rates at this sample, under the torques that the frame asked for."""
+    share_over_step(memory.pushes, clock.time, work.step)
+    evaluate(controller, control, model, ground, HELD, clock.time, memory, work)
+    return DONE
+
+
+@kernel
+def report(
+    controller: Any,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
+    model: Model,  # noqa: ARG001
+    ground: GroundModel,  # noqa: ARG001
     memory: Memory,
     work: CompliantWorkspace,
     record: Record,
-    clock: Floats,
-    span: Integers,
+    clock: Clock,
+) -> None:
+    """Append a row if one is due, with the forces of this instant."""
+    work.row = note_row_when_due(record, memory, clock)
+    if work.row >= 0:
+        note_forces(record, work.row, work.force, work.stop_force, work.dry_force, memory)
+
+
+@kernel
+def move(
+    controller: Any,
+    control: Control,
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    work: CompliantWorkspace,
+    record: Record,
+    clock: Clock,
 ) -> int:
-    """Advance a simulation on compliant ground until its span ends or something stops it.
-
-    Parameters
-    ----------
-    clock : (6,) float
-        Time of sample 0, time between samples, height of the centre of mass below which it fell,
-        relative and absolute tolerance, step that the integration proposes next.
-    span : (6,) int
-        Sample now, last sample, sample to pause before, samples between controller calls and
-        between rows, whether the controller acts between the samples too. At the last sample
-        everything is evaluated and recorded, but time does not move on.
-    """
-    step = clock[STEP]
-    last = span[LAST]
-    nv = model.parent.shape[0]
-    count = model.contact_link.shape[0]
-    continuous = span[CONTINUOUS] == 1
-    control = Control(continuous, controller, parameters, controller_memory, trial_memory)
-    held = Control(False, controller, parameters, controller_memory, trial_memory)
-    while True:
-        if (
-            record.row_count[0] >= record.time.shape[0]
-            or record.event_count[0] + 2 * count + nv > record.event_time.shape[0]
-        ):
-            return RECORD_FULL
-        k = span[NOW]
-        if k == span[PAUSE]:
-            return PAUSED
-        time = clock[START] + k * step
-        if not sound(memory):
-            return DIVERGED
-        observe(model, ground, memory)
-        if k == 0:
-            for contact in range(count):
-                memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
-        if k % span[CONTROL_EVERY] == 0:
-            ask(
-                controller,
-                time,
-                memory.q,
-                memory.v,
-                model,
-                memory,
-                parameters,
-                controller_memory,
-                memory.torque,
-            )
-            if not limit_torque(model, memory):
-                return BAD_CONTROLLER
-        share_over_step(memory.pushes, time, step)
-        evaluate(model, ground, laws, held, True, False, time, memory, work)
-        recorded = k % span[RECORD_EVERY] == 0 or k == last
-        row = record.row_count[0]
-        if recorded:
-            note_row(record, time, memory)
-            note_forces(record, row, work.force, work.stop_force, work.dry_force, memory)
-        if center_height(model, ground, memory) < clock[FALLEN]:
-            return FELL
-        if k == last:
-            return DONE
-        code = sample(model, ground, laws, control, time, clock, memory, work)
-        if code != DONE:
-            return code
-        first = record.event_count[0]
-        note_events(model, laws, record, time + step, memory, work)
-        for place in range(first, record.event_count[0]):
-            record.event_impulse[place, 0] *= step
-            record.event_impulse[place, 1] *= step
-        if recorded:
-            # What acted until the next sample takes the place of what acted at the first instant.
-            note_forces(
-                record,
-                row,
-                memory.contacts.force,
-                memory.stop_torque,
-                memory.friction_torque,
-                memory,
-            )
-        if continuous:
-            for contact in range(count):
-                memory.contacts.force[contact, 0] = work.force[contact, 0]
-                memory.contacts.force[contact, 1] = work.force[contact, 1]
-        span[NOW] = k + 1
+    """Move on to the next sample, and note what happened on the way."""
+    code = sample(controller, control, model, ground, clock.time, memory, work)
+    if code != DONE:
+        return code
+    step = work.step
+    first = record.events
+    note_events(model, record, clock.time + step, memory, work)
+    for place in range(first, record.events):
+        record.event_impulse[place, 0] *= step
+        record.event_impulse[place, 1] *= step
+    if work.row >= 0:
+        # What acted until the next sample takes the place of what acted at the first instant.
+        note_forces(
+            record, work.row, memory.contacts.force, memory.stop_torque, memory.friction_torque,
+            memory,
+        )  # fmt: skip
+    if control.continuous == 1:
+        for contact in range(model.contact_link.shape[0]):
+            memory.contacts.force[contact, 0] = work.force[contact, 0]
+            memory.contacts.force[contact, 1] = work.force[contact, 1]
+    clock.time = clock.start + (clock.index + 1) * step
+    return DONE
 
 
-@lru_cache(maxsize=1)
-def compiled_advance() -> tuple[Any, float]:
-    """Compile the loop or load it from the cache; return it with the seconds that took."""
-    begin = perf_counter()
-    vector = types.float64[::1]
-    signature = types.int64(
-        CONTROLLER_TYPE,
-        MODEL_TYPE,
-        GroundModel.compiled_type(),
-        Laws.compiled_type(),
-        vector,
-        vector,
-        vector,
-        Memory.compiled_type(),
-        CompliantWorkspace.compiled_type(),
-        Record.compiled_type(),
-        vector,
-        types.int64[::1],
-    )
-    compiled = loop_for(signature, _advance)
-    return compiled, perf_counter() - begin
-
-
-class _CompliantEngine:
-    """Compliant ground under one simulation."""
-
-    def __init__(self, method: Compliant, setting: Setting) -> None:
-        if np.any(setting.ground.restitution > 0.0):
-            raise SimulationError(
-                "on compliant ground the restitution follows from the contact law; leave that of "
-                "the ground at zero and use HuntCrossley.from_sink or KelvinVoigt.from_sink"
-            )
-        check_steps(setting, "step", method.step)
-        check_room(setting, "step", method.step)
-        self._advance, self.compile_s = compiled_advance()
-        self._setting = setting
-        self.spare = guarded(())
-        self._work = compliant_workspace(setting.robot)
-        numbers = np.zeros(NUMBERS)
-        method.law.write(numbers)
-        method.friction.write(numbers)
-        stop_numbers = np.zeros(NUMBERS)
-        method.stop.write(stop_numbers)
-        self._laws = Laws(
-            normal=method.law.kind,
-            friction=method.friction.kind,
-            numbers=numbers,
-            stop=method.stop.kind,
-            stop_numbers=stop_numbers,
-        )
-        self.solver = f"{type(method.law).__name__}, {type(method.friction).__name__}"
-        self._control_every = 1
-        if setting.control_period is not None:
-            self._control_every = whole_steps("control_period", setting.control_period, method.step)
-        self._clock = np.array(
-            [0.0, method.step, setting.fallen_height, method.rtol, method.atol, method.step]
-        )
-        self._span = np.array(
-            [
-                0,
-                round(setting.duration / method.step),
-                0,
-                self._control_every,
-                setting.record_every,
-                0,
-            ]
-        )
-
-    def _spare_for(self, controller_memory: Floats) -> Floats:
-        if self.spare.size != controller_memory.size:
-            self.spare = guarded(controller_memory)
-        return self.spare
-
-    @property
-    def time(self) -> float:
-        return float(self._clock[START] + self._span[NOW] * self._clock[STEP])
-
-    @property
-    def rows_left(self) -> int:
-        return int(self._span[LAST] - self._span[NOW]) // self._setting.record_every + 1
-
-    def pause_after(self, steps: int | None) -> None:
-        self._span[PAUSE] = self._span[NOW] + (self._control_every if steps is None else steps)
-
-    def advance(
-        self,
-        controller: Any,
-        parameters: Floats,
-        controller_memory: Floats,
-        record: Record,
-    ) -> int:
-        setting = self._setting
-        continuous = setting.control_period is None and controller is not hold_torque
-        self._span[CONTINUOUS] = continuous
-        return int(
-            self._advance(
-                controller,
-                setting.robot.model,
-                setting.ground,
-                self._laws,
-                parameters,
-                controller_memory,
-                self._spare_for(controller_memory),
-                setting.memory,
-                self._work,
-                record,
-                self._clock,
-                self._span,
-            )
-        )
+Compliant.work = CompliantWorkspace
+Compliant.kernels = Kernels(begin, prepare, decide, report, move)

@@ -36,6 +36,7 @@ class CheckedController:
         self._tree = workspace(robot.nv)
         self._robot = robot
         self._torque = np.zeros(robot.nu)
+        self._memory = np.array(controller.memory, dtype=np.float64)
         self._arguments = (
             self._shown_bundle("model", robot.model),
             Workspace(
@@ -46,7 +47,7 @@ class CheckedController:
             ),
             self._shown_bundle("scratch", workspace(robot.nv), writable=True),
             self._shown("parameters", controller.parameters),
-            self._shown("memory", np.array(controller.memory, dtype=np.float64), writable=True),
+            self._shown("memory", self._memory, writable=True),
             self._shown("torque", self._torque, writable=True),
         )
 
@@ -69,6 +70,14 @@ class CheckedController:
                 *self._arguments,
             )
         return self._torque.copy()
+
+    def snapshot(self) -> NDArray[np.float64]:
+        """Return its memory."""
+        return self._memory.copy()
+
+    def restore(self, numbers: NDArray[np.float64]) -> None:
+        """Take up a memory."""
+        self._memory[:] = numbers
 
     def _shown(self, name: str, array: Any, *, writable: bool = False) -> Any:
         shown = np.asarray(array).view(_Shown)

@@ -10,13 +10,14 @@ import numpy as np
 from numba import types
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaError
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import compiled_for
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
 
@@ -38,7 +39,7 @@ class Contacts(Bundle):
     position: Floats = array("nc", "axes")
     normal: Floats = array("nc", "axes")
     gap: Floats = array("nc")
-    force: Floats = array("nc", "rows")
+    force: Floats = array("nc", "components")
 
 
 @runtime_checkable
@@ -47,6 +48,19 @@ class Controller(Protocol):
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
         """Return the joint torques (nu,), in N m, to hold until the next call."""
+        ...
+
+
+@runtime_checkable
+class Partaking(Protocol):
+    """A controller in Python whose memory can be kept with a simulation."""
+
+    def snapshot(self) -> ArrayLike:
+        """Return its memory as an array of numbers."""
+        ...
+
+    def restore(self, numbers: NDArray[np.float64]) -> None:
+        """Take up a memory that :meth:`snapshot` returned."""
         ...
 
 
@@ -182,3 +196,29 @@ def hold_torque(
     """Apply constant joint torques: zero-order hold of whatever decided them."""
     for i in range(torque.shape[0]):
         torque[i] = parameters[i]
+
+
+def compiled_form(
+    robot: Robot, controller: Controller | CompiledController | None
+) -> CompiledController | None:
+    """Return a controller in the form that runs inside the compiled loop, None if it has none.
+
+    Raises
+    ------
+    ControllerError
+        If it is no controller at all, or one that loops cannot call.
+    """
+    if controller is None:
+        return CompiledController(hold_torque, np.zeros(robot.nu), np.zeros(0))
+    if isinstance(controller, CompiledController):
+        return checked_kernel(controller)
+    make = getattr(controller, "compiled", None)
+    compiled = make() if callable(make) else None
+    if isinstance(compiled, CompiledController):
+        return checked_kernel(compiled)
+    if not callable(getattr(controller, "torque", None)):
+        raise ControllerError(
+            f"a controller needs a method torque(t, state, contacts), "
+            f"{type(controller).__name__} has none"
+        )
+    return None

@@ -7,65 +7,56 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.control import CHANGED, OVERRAN, TRUSTED, Control
 from heelstrike.sim.controller.guard import trespasses
-from heelstrike.sim.engine import Engine
-from heelstrike.sim.memory import CHANGED, CONDUCT, OVERRAN, TRUSTED, Memory
+from heelstrike.sim.memory import Memory
 
 
 class Watch:
-    """What a compiled controller was handed, to be looked at while it runs.
+    """What a controller was handed, to be looked at while it runs.
 
     Parameters
     ----------
     robot : Robot
         The robot, whose numbers are copied.
-    engine : Engine
+    control : Control
+        The controller's own numbers.
     memory : Memory
-        What simulates, and its memory.
-    parameters, controller_memory : float arrays
-        The controller's own; guarded.
+        Memory of the simulation.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        engine: Engine,
-        memory: Memory,
-        parameters: Floats,
-        controller_memory: Floats,
-    ) -> None:
+    def __init__(self, robot: Robot, control: Control, memory: Memory) -> None:
         self._robot = robot
-        self._engine = engine
-        self._memory = memory
+        self._control = control
         self._numbers = numbers_of(robot)
         self._arrays = {
             "torque": memory.torque,
-            "parameters": parameters,
-            "memory": controller_memory,
+            "parameters": control.parameters,
+            "memory": control.kept,
             "q": memory.q,
             "v": memory.v,
         }
         for name in ("contacts", "tree", "scratch"):
-            for field, array in getattr(memory, name).members().items():
-                self._arrays[f"{name}.{field}"] = array
+            for field, values in getattr(memory, name).members().items():
+                self._arrays[f"{name}.{field}"] = values
 
     def misdeed(self) -> str | None:
         """Say what the controller did that it may not, and undo what can be undone."""
-        if self._memory.tally[CONDUCT] == TRUSTED:
+        control = self._control
+        if control.conduct == TRUSTED and not control.in_python:
             return None
         changed = restored(self._robot, self._numbers)
         if changed:
             return f"changed the robot: {changed}"
-        arrays = [*self._arrays.items(), ("memory", self._engine.spare)]
-        places = [place for name, array in arrays for place in trespasses(name, array)]
+        arrays = [*self._arrays.items(), ("memory", control.spare)]
+        places = [place for name, values in arrays for place in trespasses(name, values)]
         if places:
             more = f" (and {len(places) - 1} more)" if len(places) > 1 else ""
             return f"wrote beyond its arrays, to {places[0]}{more}"
-        if self._memory.tally[CONDUCT] == OVERRAN:
+        if control.conduct == OVERRAN:
             return "wrote beyond its arrays"
-        if self._memory.tally[CONDUCT] == CHANGED:
+        if control.conduct == CHANGED:
             return "changed the state or the contacts it was shown, which are the simulation's"
         return None
 

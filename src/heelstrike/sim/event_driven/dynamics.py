@@ -23,12 +23,13 @@ from heelstrike.sim.contact_geometry import (
     solve_mass_matrix,
     weigh,
 )
-from heelstrike.sim.controller.asking import ask
+from heelstrike.sim.controller.asking import consult
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.event_driven.candidates import share_redundant
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
-from heelstrike.sim.event_driven.phase import CLOSED, DEFICIENT, SAMPLE_PERIOD, Phase
+from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
 from heelstrike.sim.recording import try_torque
@@ -267,11 +268,9 @@ def gather_closed(model: Model, memory: Memory, phase: Phase) -> int:
 @kernel
 def evaluate(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
     phase: Phase,
     time: float,
@@ -295,17 +294,12 @@ def evaluate(
     watch_geometry(model, contacts, memory.tree, phase, state)
     if not forces:
         return
-    if phase.clock[SAMPLE_PERIOD] == 0.0:
-        for i in range(kept.shape[0]):
-            spare[i] = kept[i]
-        ask(
-            controller, time, state[:nv], state[nv:], model, memory, parameters, spare,
-            memory.torque,
-        )  # fmt: skip
+    if control.continuous == 1:
+        consult(controller, control, time, state[:nv], state[nv:], model, memory, memory.torque)
         try_torque(model, state[:nv], state[nv:], memory.torque, memory)
     free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
     count = gather_closed(model, memory, phase)
-    phase.count[CLOSED] = count
+    phase.closed_count = count
     first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     for place in range(count):
         contact = memory.candidate[place]
@@ -323,7 +317,7 @@ def evaluate(
         for i in range(size):
             phase.system[i, size] = -memory.free[phase.row[i]]
         rank = solve_system(size, phase.system, phase.column, phase.unknown)
-        phase.count[DEFICIENT] = 1 if rank < size else 0
+        phase.deficient = 1 if rank < size else 0
         for i in range(size):
             memory.impulse[phase.row[i]] += phase.unknown[i]
             if phase.lean[i] != 0.0:
@@ -337,7 +331,7 @@ def evaluate(
         count, memory.candidate, phase, memory.friction, memory.delassus, memory.free,
         memory.impulse,
     )  # fmt: skip
-    if count > 0 and phase.count[DEFICIENT] == 1:
+    if count > 0 and phase.deficient == 1:
         share_redundant(count, memory, phase)
     for i in range(nv):
         slope[i] = state[nv + i]

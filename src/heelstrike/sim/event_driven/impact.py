@@ -5,7 +5,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contact_geometry import (
     add_impulse,
     assemble_delassus,
@@ -19,7 +19,7 @@ from heelstrike.sim.event_driven.dynamics import (
 )
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.modes import log_event, note_residual
-from heelstrike.sim.event_driven.phase import LAST_IMPACT, TIME, Phase
+from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory, Record
 from heelstrike.sim.status import EventKind
 
@@ -58,7 +58,7 @@ def heading(speed: float) -> int:
 
 @kernel
 def collide(
-    model: Model, memory: Memory, phase: Phase, order: Integers, state: Floats, nudge: float
+    model: Model, memory: Memory, phase: Phase, state: Floats, nudge: float
 ) -> tuple[bool, float]:
     """Let the points on the ground, and those that reach it now, change the velocities of `state`.
 
@@ -90,8 +90,8 @@ def collide(
     if count == 0:
         return True, 0.0
     assemble_delassus(model, memory, count)
-    status = solve_candidates(count, memory, phase.slide, False, order)
-    note_residual(memory.residual, memory.extreme)
+    status = solve_candidates(count, memory, phase.slide, False, phase.order)
+    note_residual(memory.residual, memory.tally)
     made = 0.0
     through = 0.0
     for row in range(2 * count):
@@ -120,7 +120,7 @@ def collide(
 
 @kernel
 def short_bounces(
-    model: Model, ground: GroundModel, memory: Memory, phase: Phase, order: Integers, state: Floats
+    model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
 ) -> bool:
     """Mark the points that would come down again too soon to follow; return whether there are any.
 
@@ -128,7 +128,7 @@ def short_bounces(
     series gives the time at which they end.
     """
     nv = model.parent.shape[0]
-    time = phase.clock[TIME]
+    time = phase.time
     evaluate_equations(model, state[:nv], state[nv:], memory)
     locate_contacts(model, ground, memory)
     free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
@@ -136,7 +136,7 @@ def short_bounces(
     for place in range(count):
         free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
     if count > 0:
-        solve_candidates(count, memory, phase.slide, True, order)
+        solve_candidates(count, memory, phase.slide, True, phase.order)
         add_impulse(model, memory, count, memory.rate)
     found = False
     for contact in range(phase.closed.shape[0]):
@@ -150,7 +150,7 @@ def short_bounces(
         if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
-        last = time - phase.clock[LAST_IMPACT]
+        last = time - phase.last_blow
         if memory.closed[contact] == 0:
             last = time - phase.last_impact[contact]
         ratio = bounce / last
@@ -163,9 +163,7 @@ def short_bounces(
 
 
 @kernel
-def strike(
-    model: Model, ground: GroundModel, memory: Memory, record: Record, phase: Phase, order: Integers
-) -> bool:
+def strike(model: Model, ground: GroundModel, memory: Memory, record: Record, phase: Phase) -> bool:
     """Let the points in ``phase.hit`` meet the ground now, and report it; return success.
 
     The equations of now have been evaluated. ``memory.closed`` and ``memory.slipping`` still hold
@@ -174,22 +172,22 @@ def strike(
     state, before = phase.begin, phase.end
     contacts = phase.closed.shape[0] - phase.dry_joint.shape[0]
     points = contacts - phase.stop_joint.shape[0]
-    time = phase.clock[TIME]
+    time = phase.time
     for i in range(state.shape[0]):
         before[i] = state[i]
     made = 0.0
     for attempt in range(2):
-        solved, made = collide(model, memory, phase, order, state, 0.0)
+        solved, made = collide(model, memory, phase, state, 0.0)
         if not solved:
             return False
-        if attempt == 1 or not short_bounces(model, ground, memory, phase, order, state):
+        if attempt == 1 or not short_bounces(model, ground, memory, phase, state):
             break
         for i in range(state.shape[0]):
             state[i] = before[i]
         for contact in range(contacts):
             phase.closed[contact] = memory.closed[contact]
             phase.slide[contact] = memory.slipping[contact]
-    phase.clock[LAST_IMPACT] = time
+    phase.last_blow = time
     largest = 0
     for contact in range(contacts):
         normal = phase.impulse[contact, 0]

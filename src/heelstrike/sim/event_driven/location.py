@@ -14,6 +14,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
     SLOPES,
@@ -24,17 +25,7 @@ from heelstrike.sim.event_driven.dormand_prince import (
     stage_point,
 )
 from heelstrike.sim.event_driven.dynamics import evaluate
-from heelstrike.sim.event_driven.phase import (
-    ABSOLUTE,
-    FINISHED,
-    FIRED,
-    LENGTH,
-    LONGEST,
-    RELATIVE,
-    STEP,
-    TIME,
-    Phase,
-)
+from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 
 NO_EVENT = 2.0
@@ -65,11 +56,9 @@ def shortest_step(time: float) -> float:
 @kernel
 def take_step(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
     phase: Phase,
     length: float,
@@ -79,20 +68,20 @@ def take_step(
     ``phase.slopes[0]`` must be the slope at the start. A step that is good enough gets its dense
     output; event functions and forces are left as they are at its end.
     """
-    time = phase.clock[TIME]
+    time = phase.time
     error = 0.0
     for stage in range(1, SLOPES):
         at_end = stage == STAGES
         state = phase.end if at_end else phase.trial
         stage_point(stage, length, phase.begin, phase.slopes, state)
         evaluate(
-            controller, model, ground, parameters, kept, spare, memory, phase,
+            controller, control, model, ground, memory, phase,
             time + NODES[stage] * length, state, phase.slopes[stage], True,
         )  # fmt: skip
         if at_end:
             error = error_norm(
-                length, phase.begin, phase.end, phase.slopes, phase.clock[RELATIVE],
-                phase.clock[ABSOLUTE],
+                length, phase.begin, phase.end, phase.slopes, phase.relative,
+                phase.absolute,
             )  # fmt: skip
             if not error <= 1.0:
                 return error
@@ -121,11 +110,9 @@ def noise(closed: int, slide: int, function: int, weight: float) -> float:
 @kernel
 def find_root(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
     phase: Phase,
     length: float,
@@ -155,8 +142,8 @@ def find_root(
             part = min(max(part, low + 0.4 * width), high - 0.4 * width)
         interpolate(part, phase.begin, phase.dense, phase.trial)
         evaluate(
-            controller, model, ground, parameters, kept, spare, memory, phase,
-            phase.clock[TIME] + part * length, phase.trial, phase.slopes[SLOPES - 1],
+            controller, control, model, ground, memory, phase,
+            phase.time + part * length, phase.trial, phase.slopes[SLOPES - 1],
             not geometric,
         )  # fmt: skip
         value = -phase.rate[function] if of_rate else phase.value[function]
@@ -173,11 +160,9 @@ def find_root(
 @kernel
 def first_event(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
     phase: Phase,
     length: float,
@@ -197,8 +182,8 @@ def first_event(
         if k < SAMPLES:
             interpolate(high, phase.begin, phase.dense, phase.trial)
             evaluate(
-                controller, model, ground, parameters, kept, spare, memory, phase,
-                phase.clock[TIME] + high * length, phase.trial, phase.slopes[SLOPES - 1], True,
+                controller, control, model, ground, memory, phase,
+                phase.time + high * length, phase.trial, phase.slopes[SLOPES - 1], True,
             )  # fmt: skip
             for i in range(functions):
                 phase.sample[i] = phase.value[i]
@@ -221,13 +206,13 @@ def first_event(
             ):
                 # An open point came down and went up again: how close was it?
                 end = find_root(
-                    controller, model, ground, parameters, kept, spare, memory, phase, length, i,
+                    controller, control, model, ground, memory, phase, length, i,
                     low, -phase.before_rate[i], high, -phase.sample_rate[i], True,
                 )  # fmt: skip
                 value = phase.value[i]
             if value < -noise(phase.closed[contact], phase.slide[contact], i, weight):
                 root = find_root(
-                    controller, model, ground, parameters, kept, spare, memory, phase, length, i,
+                    controller, control, model, ground, memory, phase, length, i,
                     low, phase.before[i], end, value, False,
                 )  # fmt: skip
                 if root < first - EVENT_TIME / length:
@@ -248,27 +233,24 @@ def first_event(
 @kernel
 def integrate(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
     phase: Phase,
     stop: float,
-    weight: float,
 ) -> bool:
     """Take one good step that ends at its first event, or at `stop` at the latest.
 
     ``phase.slopes[0]`` must be the slope now, and the event functions those of now. Returns false
     if the step would have to be too short.
     """
-    clock, count = phase.clock, phase.count
-    time = clock[TIME]
+    time = phase.time
+    weight = total_weight(model.mass, model.gravity)
     for i in range(phase.value.shape[0]):
         phase.before[i] = phase.value[i]
         phase.before_rate[i] = phase.rate[i]
-    wish = min(clock[STEP], clock[LONGEST])
+    wish = min(phase.next_length, phase.longest)
     length = wish
     rejected = False
     factor = 1.0
@@ -279,31 +261,25 @@ def integrate(
                 length = stop - time
             if length < shortest_step(time):
                 return False
-            error = take_step(
-                controller, model, ground, parameters, kept, spare, memory, phase, length
-            )
+            error = take_step(controller, control, model, ground, memory, phase, length)
             factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
             if error <= 1.0:
                 break
             length *= max(0.2, factor) if error < np.inf else 0.1
             rejected = True
         if rejected:
-            clock[STEP] = length * min(factor, 1.0)
+            phase.next_length = length * min(factor, 1.0)
         else:  # a step cut short by a stop says little about how long the next may be
-            clock[STEP] = max(min(wish, 10.0 * length), length * factor)
-        part = first_event(
-            controller, model, ground, parameters, kept, spare, memory, phase, length, weight
-        )
-        count[FIRED] = 0
+            phase.next_length = max(min(wish, 10.0 * length), length * factor)
+        part = first_event(controller, control, model, ground, memory, phase, length, weight)
+        phase.has_fired = 0
         if part == NO_EVENT:
             break
-        count[FIRED] = 1
+        phase.has_fired = 1
         length *= part
         # Repeat the step to end at the event, and correct its length by what is left there.
         for attempt in range(4):
-            error = take_step(
-                controller, model, ground, parameters, kept, spare, memory, phase, length
-            )
+            error = take_step(controller, control, model, ground, memory, phase, length)
             repeated = error <= 1.0
             if not repeated:
                 break
@@ -322,14 +298,14 @@ def integrate(
             length *= 0.5
             rejected = True
             evaluate(
-                controller, model, ground, parameters, kept, spare, memory, phase, time,
+                controller, control, model, ground, memory, phase, time,
                 phase.begin, phase.slopes[0], True,
             )  # fmt: skip
             for i in range(phase.value.shape[0]):
                 phase.before[i] = phase.value[i]
                 phase.before_rate[i] = phase.rate[i]
-    clock[LENGTH] = length
-    count[FINISHED] = 1
+    phase.length = length
+    phase.finished = 1
     return True
 
 

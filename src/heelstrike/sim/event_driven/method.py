@@ -10,37 +10,28 @@ next phase; at a touchdown the impact law (eq. 20-22) first decides the velociti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from time import perf_counter
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import types
 
-from heelstrike.compiler.compilation import kernel, loop_for
+from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
-from heelstrike.contact.solvers.search import try_solvers
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics.kernels import forward_kinematics, momentum
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
-from heelstrike.sim.controller.asking import ask
-from heelstrike.sim.controller.guard import guarded
-from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE, Contacts
-from heelstrike.sim.dry_friction import dry_force
-from heelstrike.sim.engine import (
-    BAD_CONTROLLER,
-    DIVERGED,
-    DONE,
-    FELL,
-    PAUSED,
-    RECORD_FULL,
-    SOLVER_FAILED,
-    Engine,
-    Setting,
-    solver_order,
+from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.clock import Clock
+from heelstrike.sim.contact_geometry import (
+    contact_velocity,
+    evaluate_equations,
+    locate_contacts,
+    observe,
 )
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import evaluate, project
@@ -55,48 +46,13 @@ from heelstrike.sim.event_driven.modes import (
     note_residual,
     report_modes,
 )
-from heelstrike.sim.event_driven.phase import (
-    ABSOLUTE,
-    BURST,
-    CLOSED,
-    END,
-    FALLEN,
-    FINISHED,
-    FIRED,
-    FORCED,
-    JAMMED,
-    LAST_EVENT,
-    LAST_IMPACT,
-    LAST_ROW,
-    LENGTH,
-    LET_PASS,
-    LONGEST,
-    NEXT_PUSH,
-    OUTPUT_PERIOD,
-    PAUSE,
-    PAUSE_STEP,
-    REASON,
-    RELATIVE,
-    ROW,
-    ROW_EVERY,
-    SAMPLE,
-    SAMPLE_PERIOD,
-    STARTED,
-    STEP,
-    TIME,
-    UNDECIDED,
-    Phase,
-    allocate_phase,
-)
-from heelstrike.sim.memory import (
-    PENETRATION,
-    STEPS,
-    Memory,
-    Record,
-)
+from heelstrike.sim.event_driven.phase import Phase, allocate_phase
+from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels
+from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record_size import check_room, check_steps
-from heelstrike.sim.recording import center_height, limit_torque, sound
+from heelstrike.sim.setting import Setting
 from heelstrike.sim.status import EventKind
 
 ZENO = int(EventKind.ZENO)
@@ -125,13 +81,8 @@ LAST_LOOK = 1e-4
 CLEARLY = 1e-7
 LOOKS = 24
 
-# What the controller did when it was asked.
-BAD = 0
-SAME = 1
-JUMPED = 2
-
-# Seconds between two calls of a Python controller that has no period of its own.
-PYTHON_PERIOD = 1e-3
+# Rows that an instant may add: one due before it, two of an event, one at the end.
+ROWS_OF_AN_INSTANT = 4
 
 # Places in the life of a simulation: the first contact modes are being decided; they have been.
 BEGUN = 1
@@ -144,7 +95,7 @@ NO_CONSISTENT_FORCE = 3
 
 
 @dataclass(frozen=True, kw_only=True)
-class EventDriven:
+class EventDriven(Method):
     """Adaptive high-order integration between events, which are found to 1e-12 s.
 
     Parameters
@@ -185,8 +136,8 @@ class EventDriven:
     solver: str = "lemke"
     swing_feet_pass: bool = False
 
-    # Impulses of impacts are in the run's events, not in the forces of its rows.
     impulses_in_events: ClassVar[bool] = True
+    python_period: ClassVar[float | None] = 1e-3
 
     def __post_init__(self) -> None:
         for name in ("rtol", "atol", "max_step", "output_period"):
@@ -197,16 +148,82 @@ class EventDriven:
             raise SimulationError(f"rtol = {self.rtol} is below what floating point can hold")
         solver_order(self.solver)
 
-    def engine(self, setting: Setting) -> Engine:
-        """Return this way through time, compiled and ready to run.
+    @property
+    def solves_with(self) -> str:
+        """Contact solver tried first."""
+        return self.solver
 
-        Raises
-        ------
-        SimulationError
-            If the robot begins in the ground, or with a joint beyond its range; if steps or rows
-            are too many to be counted or kept.
+    @property
+    def row_period(self) -> tuple[str, float]:
+        """Time between two rows: that of the output, or of the longest step."""
+        if self.output_period is None:
+            return "max_step", self.max_step  # there are more rows if steps get shorter
+        return "output_period", self.output_period
+
+    def new_work(self, robot: Robot) -> Phase:
+        """Allocate its memory."""
+        phase = allocate_phase(robot)
+        phase.order[:] = solver_order(self.solver)
+        phase.next_length = min(1e-3, self.max_step)
+        phase.output_period = self.output_period or 0.0
+        phase.longest = self.max_step
+        phase.relative, phase.absolute = self.rtol, self.atol
+        phase.next_push = np.inf
+        phase.last_event = phase.last_blow = phase.last_row = -np.inf
+        phase.let_pass = int(self.swing_feet_pass)
+        return phase
+
+    def room(self, robot: Robot) -> tuple[int, int]:
+        """Return how many rows and events an instant may add to the record.
+
+        These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        return _EventDrivenEngine(self, setting)
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * len(allocate_phase(robot).closed) + 8
+
+    def check(self, setting: Setting) -> None:
+        """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
+        robot, state = setting.robot, setting.state
+        at = contact_kinematics(robot, state.q, state.v, setting.ground)
+        inside = np.flatnonzero(at.gap < -ON_THE_GROUND)
+        stands = bool(np.any(np.abs(at.gap) <= ON_THE_GROUND))
+        if len(inside) and not (self.swing_feet_pass and stands):
+            deepest = int(inside[np.argmin(at.gap[inside])])
+            others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
+            needed = float(np.max(-at.gap[inside] / at.normal[inside, 1]))
+            raise SimulationError(
+                f"contact point {robot.contact_names[deepest]!r}{others} begins "
+                f"{-at.gap[deepest]:.3g} m deep in the ground. EventDriven knows no way out of it: "
+                f"raise the robot by {needed:.3g} m, begin on the ground that the state was made "
+                f"for, or use TimeStepping or Compliant, which push it out"
+            )
+        model = robot.model
+        beyond = np.maximum(model.lower - state.q, state.q - model.upper)
+        joint = int(np.argmax(beyond))
+        if beyond[joint] > ON_THE_GROUND:
+            raise SimulationError(
+                f"joint {robot.joint_names[joint]!r} begins at {state.q[joint]:.6g}, beyond its "
+                f"range of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven knows "
+                f"no way back: begin within the range, or use TimeStepping or Compliant"
+            )
+
+    def check_span(self, setting: Setting, duration: float) -> None:
+        """Refuse a time whose steps cannot be counted, or whose record does not fit into memory."""
+        check_steps(
+            setting, duration, "max_step", self.max_step, recorded=self.output_period is None
+        )
+        if setting.control_period is not None:
+            check_steps(setting, duration, "control_period", setting.control_period, recorded=False)
+        if self.output_period is not None:
+            check_steps(setting, duration, *self.row_period)
+        check_room(setting, duration, *self.row_period)
+
+    def rows_in(self, duration: float, record_every: int) -> int:
+        """Return about how many rows the record of a time has."""
+        return 1024 if self.output_period is None else super().rows_in(duration, record_every) + 64
+
+    def reason(self, work: Phase) -> str:
+        """Say why a simulation could not go on."""
+        return _REASONS.get(work.reason, "")
 
 
 @kernel
@@ -243,17 +260,14 @@ def copy_row(
 @kernel
 def write_row(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
-    record: Record,
     phase: Phase,
-    order: Integers,
     time: float,
     state: Floats,
+    record: Record,
 ) -> None:
     """Append a state, put on its constraints, with the certified contact forces in it."""
     contacts = memory.contacts
@@ -261,16 +275,16 @@ def write_row(
         phase.trial[i] = state[i]
     project(model, ground, memory, phase, phase.trial)
     evaluate(
-        controller, model, ground, parameters, kept, spare, memory, phase, time, phase.trial,
+        controller, control, model, ground, memory, phase, time, phase.trial,
         phase.slopes[SLOPES - 1], True,
     )  # fmt: skip
     for k in range(3):
         memory.residual[k] = 0.0
-    count = phase.count[CLOSED]
+    count = phase.closed_count
     if count > 0:
-        solve_candidates(count, memory, phase.slide, True, order)
-        note_residual(memory.residual, memory.extreme)
-    row = record.row_count[0]
+        solve_candidates(count, memory, phase.slide, True, phase.order)
+        note_residual(memory.residual, memory.tally)
+    row = record.rows
     copy_row(row, time, phase.trial, memory.torque, contacts, memory.residual, record)
     points = contacts.gap.shape[0]
     first = phase.closed.shape[0] - phase.dry_joint.shape[0]
@@ -279,7 +293,7 @@ def write_row(
     )  # fmt: skip
     for contact in range(points):
         if phase.passing[contact] == 0:
-            memory.extreme[PENETRATION] = max(memory.extreme[PENETRATION], -contacts.gap[contact])
+            memory.tally.penetration = max(memory.tally.penetration, -contacts.gap[contact])
     for place in range(count):
         contact = memory.candidate[place]
         if contact >= first:
@@ -298,11 +312,11 @@ def write_row(
             model.contact_link[contact], contacts.position[contact], contacts.normal[contact],
             memory.tree,
         )  # fmt: skip
-    record.row_count[0] = row + 1
-    phase.clock[LAST_ROW] = time
-    period = phase.clock[OUTPUT_PERIOD] * phase.count[ROW_EVERY]
-    if period > 0.0 and abs(phase.count[ROW] * period - time) <= 1e-12:
-        phase.count[ROW] += 1
+    record.rows = row + 1
+    phase.last_row = time
+    period = phase.output_period * phase.row_every
+    if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:
+        phase.next_row += 1
 
 
 @kernel
@@ -326,20 +340,14 @@ def insist(phase: Phase) -> None:
 
 
 @kernel
-def decide(
+def decide_modes(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
-    record: Record,
     phase: Phase,
-    order: Integers,
-    weight: float,
-    forced: bool,
-    jammed: bool,
+    record: Record,
 ) -> bool:
     """Decide the contact modes of the phase that begins now; return success.
 
@@ -350,7 +358,9 @@ def decide(
     point (`jammed`), the velocities jump without a collision (Painlevé's paradox). Where it has
     several, the points leave the ground if that is one of them.
     """
-    time = phase.clock[TIME]
+    time = phase.time
+    weight = total_weight(model.mass, model.gravity)
+    forced, jammed = phase.forced == 1, phase.jammed == 1
     contacts = phase.closed.shape[0]
     dry = contacts - phase.dry_joint.shape[0]
     points = model.contact_link.shape[0]
@@ -358,7 +368,7 @@ def decide(
     for _ in range(LOOKS):
         extrapolate(ahead, phase.begin, phase.slopes[0], phase.trial)
         evaluate(
-            controller, model, ground, parameters, kept, spare, memory, phase, time + ahead,
+            controller, control, model, ground, memory, phase, time + ahead,
             phase.trial, phase.slopes[1], True,
         )  # fmt: skip
         if forced:
@@ -369,13 +379,13 @@ def decide(
             if forced:
                 ahead *= 4.0
                 continue
-            if phase.count[BURST] >= INSISTENT:
+            if phase.burst >= INSISTENT:
                 insist(phase)
-                phase.count[BURST] += 1
+                phase.burst += 1
                 continue
-        count = phase.count[CLOSED]
+        count = phase.closed_count
         if not jammed and count > 0:
-            jammed = solve_candidates(count, memory, phase.slide, True, order) != SOLVED
+            jammed = solve_candidates(count, memory, phase.slide, True, phase.order) != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
                 continue
@@ -384,7 +394,7 @@ def decide(
             for contact in range(dry):
                 phase.hit[contact] = 0
                 phase.plastic[contact] = phase.closed[contact]
-            solved, _ = collide(model, memory, phase, order, phase.begin, NUDGE)
+            solved, _ = collide(model, memory, phase, phase.begin, NUDGE)
             for contact in range(dry):
                 phase.plastic[contact] = 0
                 if phase.impulse[contact, 0] > 0.0 and contact >= points:
@@ -418,7 +428,7 @@ def decide(
                 if memory.candidate[place] < dry:
                     memory.problem_mode[place] = OPEN
         if count > 0:
-            note_residual(memory.residual, memory.extreme)
+            note_residual(memory.residual, memory.tally)
         adopt_modes(count, memory.candidate, memory.problem_mode, memory.mode, phase)
         nv = model.parent.shape[0]
         forward_kinematics(model, phase.begin[:nv], memory.tree)
@@ -428,7 +438,7 @@ def decide(
             memory.tree.angle, phase,
         )  # fmt: skip
         project(model, ground, memory, phase, phase.begin)
-        report_modes(time, phase, memory, record, phase.count[STARTED] == BEGUN)
+        report_modes(time, phase, memory, record, phase.started == BEGUN)
         return True
     return False
 
@@ -439,7 +449,7 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
     for other in range(contacts.gap.shape[0]):
         ahead = contacts.position[other, 0] - contacts.position[contact, 0]
         if phase.closed[other] == 1 and direction * ahead > 0.0:
-            return phase.count[LET_PASS] == 1
+            return phase.let_pass == 1
     return False
 
 
@@ -484,7 +494,7 @@ def find_what_happened(
             if starting:
                 phase.group[contact] = contact
                 if contact < points and gap < -ON_THE_GROUND:
-                    phase.passing[contact] = phase.count[LET_PASS]
+                    phase.passing[contact] = phase.let_pass
                 first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
             if phase.passing[contact] == 1:
                 phase.passing[contact] = 0 if first else 1
@@ -518,52 +528,13 @@ def find_what_happened(
 
 
 @kernel
-def control(
-    controller: Any,
-    model: Model,
-    ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    memory: Memory,
-    phase: Phase,
-) -> int:
-    """Ask the controller, if it is due, and let pushes begin and end.
-
-    Returns BAD, SAME or JUMPED, which is what the forces did.
-    """
-    clock, count = phase.clock, phase.count
-    nv = model.parent.shape[0]
-    jumped, clock[NEXT_PUSH] = switch_at(memory.pushes, clock[TIME])
-    period = clock[SAMPLE_PERIOD]
-    if period > 0.0:
-        if clock[TIME] < count[SAMPLE] * period:
-            return JUMPED if jumped else SAME
-        count[SAMPLE] += 1
-    state = phase.begin
-    forward_kinematics(model, state[:nv], memory.tree)
-    link_velocities(model, state[nv:], memory.tree)
-    locate_contacts(model, ground, memory)
-    ask(
-        controller, clock[TIME], state[:nv], state[nv:], model, memory, parameters, kept,
-        memory.torque,
-    )  # fmt: skip
-    if not limit_torque(model, memory):
-        return BAD
-    for i in range(memory.torque.shape[0]):
-        change = abs(memory.torque[i] - phase.torque[i])
-        jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
-        phase.torque[i] = memory.torque[i]
-    return JUMPED if jumped else SAME
-
-
-@kernel
-def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
+def next_stop(phase: Phase, clock: Clock) -> float:
     """Time that the next step may not pass."""
-    stop = min(clock[END], clock[PAUSE], clock[NEXT_PUSH])
-    if clock[SAMPLE_PERIOD] > 0.0:
-        stop = min(stop, count[SAMPLE] * clock[SAMPLE_PERIOD])
-    for contact in range(accumulation.shape[0]):
-        stop = min(stop, accumulation[contact])
+    stop = min(clock.until, phase.next_push)
+    if clock.control_period > 0.0:
+        stop = min(stop, clock.calls * clock.control_period)
+    for contact in range(phase.accumulation.shape[0]):
+        stop = min(stop, phase.accumulation[contact])
     return stop
 
 
@@ -571,20 +542,19 @@ def next_stop(clock: Floats, count: Integers, accumulation: Floats) -> float:
 def end_bounces(memory: Memory, record: Record, phase: Phase) -> None:
     """Let the points rest whose accumulating impacts have come to an end by now."""
     for contact in range(phase.closed.shape[0]):
-        if phase.accumulation[contact] <= phase.clock[TIME]:
+        if phase.accumulation[contact] <= phase.time:
             if contact < memory.contacts.gap.shape[0]:
                 log_event(record, phase.accumulation[contact], ZENO, contact, 0.0, 0.0)
             phase.accumulation[contact] = np.inf
 
 
 @kernel
-def end_step(memory: Memory, record: Record, phase: Phase) -> None:
+def end_step(memory: Memory, record: Record, phase: Phase, clock: Clock) -> None:
     """Move time and state to the end of the finished step."""
-    clock = phase.clock
-    stop = next_stop(clock, phase.count, phase.accumulation)
-    clock[TIME] += clock[LENGTH]
-    if abs(clock[TIME] - stop) <= 4e-16 * max(abs(stop), 1e-3):
-        clock[TIME] = stop
+    stop = next_stop(phase, clock)
+    phase.time += phase.length
+    if abs(phase.time - stop) <= 4e-16 * max(abs(stop), 1e-3):
+        phase.time = stop
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
     points = memory.contacts.gap.shape[0]
@@ -592,311 +562,227 @@ def end_step(memory: Memory, record: Record, phase: Phase) -> None:
         memory.contacts.force[contact, 0] = phase.end_force[contact, 0]
         memory.contacts.force[contact, 1] = phase.end_force[contact, 1]
     end_bounces(memory, record, phase)
-    phase.count[FINISHED] = 0
-    memory.tally[STEPS] += 1
-    if phase.count[FIRED] == 1:
-        together = clock[TIME] - clock[LAST_EVENT] < INSTANT
-        phase.count[BURST] = phase.count[BURST] + 1 if together else 0
-        clock[LAST_EVENT] = clock[TIME]
+    phase.finished = 0
+    memory.tally.steps += 1
+    if phase.has_fired == 1:
+        together = phase.time - phase.last_event < INSTANT
+        phase.burst = phase.burst + 1 if together else 0
+        phase.last_event = phase.time
 
 
-def _advance(
+@kernel
+def write_rows_within(
     controller: Any,
+    control: Control,
     model: Model,
     ground: GroundModel,
-    parameters: Floats,
-    kept: Floats,
-    spare: Floats,
     memory: Memory,
-    record: Record,
     phase: Phase,
-    order: Integers,
-) -> int:
-    """Advance an event-driven simulation until it ends or something stops it.
+    record: Record,
+) -> bool:
+    """Append the rows due within the finished step; return whether there was room for all.
 
-    Parameters
-    ----------
-    kept, spare : (m,) float
-        Memory of the controller, and as much scratch for the calls that it shall forget.
+    An event at its end has rows of its own, one before it if velocities may jump.
     """
-    clock, count = phase.clock, phase.count
-    contacts = memory.contacts
-    link = model.contact_link
-    nv = model.parent.shape[0]
-    weight = total_weight(model.mass, model.gravity)
-    rows, events = record.row_count, record.event_count
-    row_room = record.time.shape[0] - 4
-    # In one instant: what each look of `decide` finds, and what else may happen to a contact.
-    event_room = record.event_time.shape[0] - (LOOKS + 6) * phase.closed.shape[0] - 8
-    period = clock[OUTPUT_PERIOD] * count[ROW_EVERY]
-    while True:
-        if rows[0] > row_room or events[0] > event_room:
-            return RECORD_FULL
-        starting = count[STARTED] == 0
-        event = starting
-        if count[FINISHED] == 1:
-            # The rows due within the finished step; an event at its end has rows of its own, one
-            # before it if velocities may jump.
-            last = clock[TIME] + clock[LENGTH]
+    period = phase.output_period * phase.row_every
+    last = phase.time + phase.length
+    touch = False
+    if phase.has_fired == 1:
+        last -= 1e-12
+        for contact in range(phase.closed.shape[0]):
+            touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+    due = period > 0.0 and phase.next_row * period <= last
+    while due or touch:
+        if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
+            return False
+        time = phase.time + phase.length
+        part = 1.0
+        if due:
+            time = phase.next_row * period
+            part = (time - phase.time) / phase.length
+        else:
             touch = False
-            if count[FIRED] == 1:
-                last -= 1e-12
-                for contact in range(phase.closed.shape[0]):
-                    touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
-            due = period > 0.0 and count[ROW] * period <= last
-            while due or touch:
-                if rows[0] > row_room:
-                    return RECORD_FULL
-                time = clock[TIME] + clock[LENGTH]
-                part = 1.0
-                if due:
-                    time = count[ROW] * period
-                    part = (time - clock[TIME]) / clock[LENGTH]
-                else:
-                    touch = False
-                interpolate(part, phase.begin, phase.dense, phase.slopes[SLOPES - 1])
-                write_row(
-                    controller, model, ground, parameters, kept, spare, memory, record, phase,
-                    order, time, phase.slopes[SLOPES - 1],
-                )  # fmt: skip
-                due = period > 0.0 and count[ROW] * period <= last
-            end_step(memory, record, phase)
-            project(model, ground, memory, phase, phase.begin)
-            event = count[FIRED] == 1
-            if count[BURST] > TOO_MANY:
-                count[REASON] = EVENTS_WITHOUT_END
-                return DIVERGED
-        elif starting:
-            for i in range(nv):
-                phase.begin[i] = memory.q[i]
-                phase.begin[nv + i] = memory.v[i]
-            begin_dry_joints(memory, phase)
-        if event:
-            evaluate(
-                controller, model, ground, parameters, kept, spare, memory, phase, clock[TIME],
-                phase.begin, phase.slopes[0], True,
-            )  # fmt: skip
-            momentum(model, memory.tree, phase.scratch[0])
-            impact, forced = find_what_happened(starting, phase.scratch[0, 0], model, memory, phase)
-            if impact:
-                if not strike(model, ground, memory, record, phase, order):
-                    count[REASON] = NO_CONSISTENT_FORCE
-                    return SOLVER_FAILED
-                # The controller shall know before the modes are decided under its torques.
-                for contact in range(link.shape[0]):
-                    if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
-                        contacts.force[contact, 0] = phase.impulse[contact, 0]
-                        contacts.force[contact, 1] = phase.impulse[contact, 1]
-            count[STARTED] = BEGUN if starting else WALKING
-            count[UNDECIDED] = 1
-            count[FORCED] = 1 if forced else 0
-        for i in range(nv):
-            memory.q[i] = phase.begin[i]
-            memory.v[i] = phase.begin[nv + i]
-        if not sound(memory):
-            return DIVERGED
-        if center_height(model, ground, memory) < clock[FALLEN]:
-            return FELL
-        if clock[TIME] < clock[END] and (
-            clock[TIME] >= clock[PAUSE] or memory.tally[STEPS] >= count[PAUSE_STEP]
-        ):
-            return PAUSED
-
-        asked = control(controller, model, ground, parameters, kept, memory, phase)
-        if asked == BAD:
-            return BAD_CONTROLLER
-        event = count[UNDECIDED] == 1
-        if (event or asked == JUMPED) and not decide(
-            controller, model, ground, parameters, kept, spare, memory, record, phase, order,
-            weight, count[FORCED] == 1, count[JAMMED] == 1,
-        ):  # fmt: skip
-            count[REASON] = NO_CONSISTENT_FORCE
-            return SOLVER_FAILED
-        count[UNDECIDED] = 0
-        count[FORCED] = 0
-        count[JAMMED] = 0
-        evaluate(
-            controller, model, ground, parameters, kept, spare, memory, phase, clock[TIME],
-            phase.begin, phase.slopes[0], True,
+        interpolate(part, phase.begin, phase.dense, phase.slopes[SLOPES - 1])
+        write_row(
+            controller, control, model, ground, memory, phase, time, phase.slopes[SLOPES - 1],
+            record,
         )  # fmt: skip
-        if event:
-            for contact in range(link.shape[0]):
-                contacts.force[contact, 0] = phase.force[contact, 0]
-                contacts.force[contact, 1] = phase.force[contact, 1]
-        over = clock[TIME] >= clock[END]
-        every_step = period == 0.0 and memory.tally[STEPS] % count[ROW_EVERY] == 0
-        if event or ((over or every_step) and clock[LAST_ROW] < clock[TIME]):
-            write_row(
-                controller, model, ground, parameters, kept, spare, memory, record, phase, order,
-                clock[TIME], phase.begin,
-            )  # fmt: skip
-        if over:
-            return DONE
-        stop = next_stop(clock, count, phase.accumulation)
-        if stop - clock[TIME] < shortest_step(clock[TIME]):
+        due = period > 0.0 and phase.next_row * period <= last
+    return True
+
+
+@kernel
+def meet_event(
+    starting: bool,
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    phase: Phase,
+    record: Record,
+) -> int:
+    """Deal with what ended the step: impacts change velocities, all else is left to be decided.
+
+    The equations of now have been evaluated.
+    """
+    contacts = memory.contacts
+    momentum(model, memory.tree, phase.scratch[0])
+    impact, forced = find_what_happened(starting, phase.scratch[0, 0], model, memory, phase)
+    if impact:
+        if not strike(model, ground, memory, record, phase):
+            phase.reason = NO_CONSISTENT_FORCE
+            return SOLVER_FAILED
+        # The controller shall know before the modes are decided under its torques.
+        for contact in range(contacts.gap.shape[0]):
+            if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
+                contacts.force[contact, 0] = phase.impulse[contact, 0]
+                contacts.force[contact, 1] = phase.impulse[contact, 1]
+    phase.started = BEGUN if starting else WALKING
+    phase.undecided = 1
+    phase.forced = 1 if forced else 0
+    return DONE
+
+
+@kernel
+def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> int:
+    """Find what the robot stands on when the simulation begins."""
+    nv = model.parent.shape[0]
+    for i in range(nv):
+        phase.begin[i] = memory.q[i]
+        phase.begin[nv + i] = memory.v[i]
+    begin_dry_joints(memory, phase)
+    evaluate_equations(model, memory.q, memory.v, memory)
+    locate_contacts(model, ground, memory)
+    code = meet_event(True, model, ground, memory, phase, record)
+    for i in range(nv):
+        memory.v[i] = phase.begin[nv + i]
+    return code
+
+
+@kernel
+def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:  # noqa: ARG001
+    """Kinematics, velocities and contact points of the state now."""
+    observe(model, ground, memory)
+
+
+@kernel
+def decide(
+    controller: Any,
+    control: Control,
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    phase: Phase,
+    record: Record,
+    clock: Clock,
+) -> int:
+    """Decide the contact modes if an event or a jump of forces left them open."""
+    contacts = memory.contacts
+    phase.row_every = clock.record_every
+    jumped, phase.next_push = switch_at(memory.pushes, phase.time)
+    for i in range(memory.torque.shape[0]):
+        change = abs(memory.torque[i] - phase.torque[i])
+        jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
+        phase.torque[i] = memory.torque[i]
+    phase.at_event = phase.undecided
+    if (phase.at_event == 1 or jumped) and not decide_modes(
+        controller, control, model, ground, memory, phase, record
+    ):
+        phase.reason = NO_CONSISTENT_FORCE
+        return SOLVER_FAILED
+    phase.undecided = 0
+    phase.forced = 0
+    phase.jammed = 0
+    evaluate(
+        controller, control, model, ground, memory, phase, phase.time, phase.begin,
+        phase.slopes[0], True,
+    )  # fmt: skip
+    if phase.at_event == 1:
+        for contact in range(contacts.gap.shape[0]):
+            contacts.force[contact, 0] = phase.force[contact, 0]
+            contacts.force[contact, 1] = phase.force[contact, 1]
+    return DONE
+
+
+@kernel
+def report(
+    controller: Any,
+    control: Control,
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    phase: Phase,
+    record: Record,
+    clock: Clock,
+) -> None:
+    """Append a row at events, at the end, and at every step if no period is asked for."""
+    every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
+    last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
+    if phase.undecided == 0 and (phase.at_event == 1 or last):
+        write_row(
+            controller, control, model, ground, memory, phase, phase.time, phase.begin, record
+        )
+
+
+@kernel
+def move(
+    controller: Any,
+    control: Control,
+    model: Model,
+    ground: GroundModel,
+    memory: Memory,
+    phase: Phase,
+    record: Record,
+    clock: Clock,
+) -> int:
+    """Take a step to the next event, at the longest to where something is due."""
+    nv = model.parent.shape[0]
+    if phase.finished == 0:
+        stop = next_stop(phase, clock)
+        if stop - phase.time < shortest_step(phase.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
-            clock[TIME] = stop
+            phase.time = stop
+            clock.time = stop
             end_bounces(memory, record, phase)
-            continue
-        if not integrate(
-            controller, model, ground, parameters, kept, spare, memory, phase, stop, weight
-        ):
+            return DONE
+        wish = min(phase.next_length, phase.longest)
+        if clock.forked == 0 and stop == clock.until and phase.time + 1.0001 * wish >= stop:
+            clock.forked = 1
+            return FORK
+        if not integrate(controller, control, model, ground, memory, phase, stop):
             # Forces that grow without bound before a sliding point end in a jump of velocity.
-            for contact in range(link.shape[0]):
+            for contact in range(memory.contacts.gap.shape[0]):
                 if phase.slide[contact] != 0:
-                    count[JAMMED] = 1
-                    count[UNDECIDED] = 1
-            count[BURST] += 1
-            if count[JAMMED] == 0 or count[BURST] > INSISTENT:
-                count[REASON] = STEP_TOO_SHORT
+                    phase.jammed = 1
+                    phase.undecided = 1
+            phase.burst += 1
+            if phase.jammed == 0 or phase.burst > INSISTENT:
+                phase.reason = STEP_TOO_SHORT
                 return DIVERGED
-            clock[STEP] = 1e-6
+            phase.next_length = 1e-6
+            return DONE
+    if not write_rows_within(controller, control, model, ground, memory, phase, record):
+        return RECORD_FULL
+    end_step(memory, record, phase, clock)
+    clock.time = phase.time
+    project(model, ground, memory, phase, phase.begin)
+    if phase.burst > TOO_MANY:
+        phase.reason = EVENTS_WITHOUT_END
+        return DIVERGED
+    code = DONE
+    if phase.has_fired == 1:
+        evaluate(
+            controller, control, model, ground, memory, phase, phase.time, phase.begin,
+            phase.slopes[0], True,
+        )  # fmt: skip
+        code = meet_event(False, model, ground, memory, phase, record)
+    for i in range(nv):
+        memory.q[i] = phase.begin[i]
+        memory.v[i] = phase.begin[nv + i]
+    return code
 
 
-@lru_cache(maxsize=1)
-def compiled_advance() -> tuple[Any, float]:
-    """Compile the loop or load it from the cache; return it with the seconds that took."""
-    begin = perf_counter()
-    vector = types.float64[::1]
-    signature = types.int64(
-        CONTROLLER_TYPE,
-        MODEL_TYPE,
-        GroundModel.compiled_type(),
-        vector,
-        vector,
-        vector,
-        Memory.compiled_type(),
-        Record.compiled_type(),
-        Phase.compiled_type(),
-        types.int64[::1],
-    )
-    try_solvers.begin()
-    compiled = loop_for(signature, _advance)
-    try_solvers.finish()
-    return compiled, perf_counter() - begin
-
-
-def _check_start(setting: Setting, swing_feet_pass: bool) -> None:
-    """Refuse a state in the ground or beyond a joint stop: no motion leads there or out of it."""
-    robot, memory = setting.robot, setting.memory
-    observe(robot.model, setting.ground, memory)
-    gap, normal = memory.contacts.gap, memory.contacts.normal
-    inside = np.flatnonzero(gap < -ON_THE_GROUND)
-    stands = bool(np.any(np.abs(gap) <= ON_THE_GROUND))
-    if len(inside) and not (swing_feet_pass and stands):
-        deepest = int(inside[np.argmin(gap[inside])])
-        others = f" (and {len(inside) - 1} more)" if len(inside) > 1 else ""
-        needed = float(np.max(-gap[inside] / normal[inside, 1]))
-        raise SimulationError(
-            f"contact point {robot.contact_names[deepest]!r}{others} begins "
-            f"{-gap[deepest]:.3g} m deep in the ground. EventDriven knows no way out of it: raise "
-            f"the robot by {needed:.3g} m, begin on the ground that the state was made for, or use "
-            f"TimeStepping or Compliant, which push it out"
-        )
-    model = robot.model
-    beyond = np.maximum(model.lower - memory.q, memory.q - model.upper)
-    joint = int(np.argmax(beyond))
-    if beyond[joint] > ON_THE_GROUND:
-        raise SimulationError(
-            f"joint {robot.joint_names[joint]!r} begins at {memory.q[joint]:.6g}, beyond its range "
-            f"of {model.lower[joint]:.6g} to {model.upper[joint]:.6g}. EventDriven knows no way "
-            f"back: begin within the range, or use TimeStepping or Compliant"
-        )
-
-
-class _EventDrivenEngine:
-    """Event-driven simulation at work."""
-
-    def __init__(self, method: EventDriven, setting: Setting) -> None:
-        check_steps(setting, "max_step", method.max_step, recorded=method.output_period is None)
-        if setting.control_period is not None:
-            check_steps(setting, "control_period", setting.control_period, recorded=False)
-        if method.output_period is None:
-            check_room(setting, "max_step", method.max_step)  # and more, if steps get shorter
-        else:
-            check_steps(setting, "output_period", method.output_period)
-            check_room(setting, "output_period", method.output_period)
-        _check_start(setting, method.swing_feet_pass)
-        self._advance, self.compile_s = compiled_advance()
-        self._setting = setting
-        self._phase = allocate_phase(setting.robot)
-        self.spare = guarded(())
-        self._order = solver_order(method.solver)
-        self._phase.order[:] = self._order
-        self.solver = method.solver
-        clock, count = self._phase.clock, self._phase.count
-        clock[STEP] = min(1e-3, method.max_step)
-        clock[END] = setting.duration
-        clock[PAUSE] = np.inf
-        clock[OUTPUT_PERIOD] = method.output_period or 0.0
-        clock[SAMPLE_PERIOD] = setting.control_period or 0.0
-        clock[LONGEST] = method.max_step
-        clock[NEXT_PUSH] = np.inf
-        clock[LAST_EVENT] = -np.inf
-        clock[LAST_IMPACT] = -np.inf
-        clock[LAST_ROW] = -np.inf
-        clock[RELATIVE] = method.rtol
-        clock[ABSOLUTE] = method.atol
-        clock[FALLEN] = setting.fallen_height
-        count[ROW_EVERY] = setting.record_every
-        count[LET_PASS] = int(method.swing_feet_pass)
-
-    def _spare_for(self, controller_memory: Floats) -> Floats:
-        if self.spare.size != controller_memory.size:
-            self.spare = guarded(controller_memory)
-        return self.spare
-
-    @property
-    def time(self) -> float:
-        return float(self._phase.clock[TIME])
-
-    @property
-    def rows_left(self) -> int:
-        clock, count = self._phase.clock, self._phase.count
-        period = clock[OUTPUT_PERIOD] * count[ROW_EVERY]
-        if period == 0.0:
-            return 1024
-        return int((clock[END] - clock[TIME]) / period) + 64
-
-    @property
-    def reason(self) -> str:
-        """Why the loop gave up, in a person's words; empty if it did not."""
-        return _REASONS.get(int(self._phase.count[REASON]), "")
-
-    def pause_after(self, steps: int | None) -> None:
-        clock, count = self._phase.clock, self._phase.count
-        clock[PAUSE] = np.inf
-        count[PAUSE_STEP] = np.iinfo(np.int64).max
-        if steps is None:
-            period = self._setting.control_period or PYTHON_PERIOD
-            clock[SAMPLE_PERIOD] = period
-            clock[PAUSE] = (int(count[SAMPLE]) + 1) * period
-        else:
-            count[PAUSE_STEP] = self._setting.memory.tally[STEPS] + steps
-
-    def advance(
-        self,
-        controller: Any,
-        parameters: Floats,
-        controller_memory: Floats,
-        record: Record,
-    ) -> int:
-        setting = self._setting
-        return int(
-            self._advance(
-                controller,
-                setting.robot.model,
-                setting.ground,
-                parameters,
-                controller_memory,
-                self._spare_for(controller_memory),
-                setting.memory,
-                record,
-                self._phase,
-                self._order,
-            )
-        )
-
+EventDriven.work = Phase
+EventDriven.kernels = Kernels(begin, prepare, decide, report, move)
 
 _REASONS = {
     STEP_TOO_SHORT: "the step became too short to move time on",

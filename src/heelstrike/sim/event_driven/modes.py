@@ -7,7 +7,7 @@ from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.event_driven.dynamics import tangential_place
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import COMPLEMENTARITY, CONE, NON_PENETRATION, Memory, Record
+from heelstrike.sim.memory import Memory, Record, Tally
 from heelstrike.sim.status import EventKind
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
@@ -28,21 +28,21 @@ def log_event(
     record: Record, time: float, kind: int, contact: int, normal: float, tangent: float
 ) -> None:
     """Append an event with its impulse."""
-    place = record.event_count[0]
+    place = record.events
     record.event_time[place] = time
     record.event_kind[place] = kind
     record.event_contact[place] = contact
     record.event_impulse[place, 0] = normal
     record.event_impulse[place, 1] = tangent
-    record.event_count[0] = place + 1
+    record.events = place + 1
 
 
 @kernel
-def note_residual(residual: Floats, extreme: Floats) -> None:
+def note_residual(residual: Floats, tally: Tally) -> None:
     """Keep the worst residuals of the run."""
-    extreme[COMPLEMENTARITY] = max(extreme[COMPLEMENTARITY], residual[0])
-    extreme[CONE] = max(extreme[CONE], residual[1])
-    extreme[NON_PENETRATION] = max(extreme[NON_PENETRATION], residual[2])
+    tally.complementarity = max(tally.complementarity, residual[0])
+    tally.cone = max(tally.cone, residual[1])
+    tally.non_penetration = max(tally.non_penetration, residual[2])
 
 
 @kernel

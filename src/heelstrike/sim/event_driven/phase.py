@@ -5,48 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.compiler.bundle import Bundle, array, cell
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
-# Places in ``Phase.clock``, in seconds unless something else is said.
-TIME = 0  # now
-STEP = 1  # length of the next step as far as accuracy allows
-LENGTH = 2  # length of the finished step whose rows are still to be written
-END = 3  # when the simulation ends
-PAUSE = 4  # when to pause
-OUTPUT_PERIOD = 5  # between two rows of the record; 0 for a row a step
-SAMPLE_PERIOD = 6  # between two calls of the controller; 0 for always
-LONGEST = 7  # longest step
-LAST_EVENT = 8  # when the modes changed last
-LAST_IMPACT = 9  # when the robot was hit last
-RELATIVE = 10
-ABSOLUTE = 11
-FALLEN = 12  # height of the centre of mass below which the robot has fallen, m
-LAST_ROW = 13  # time of the last row of the record
-NEXT_PUSH = 14  # when a push begins or ends next
-CLOCKS = 15
-
-# Places in ``Phase.count``.
-STARTED = 0  # whether the first contact modes are being, or have been, decided
-FINISHED = 1  # whether a step is finished but its rows and events are not dealt with
-FIRED = 2  # whether the finished step ends in an event
-CLOSED = 3  # closed contact points at the last evaluation
-DEFICIENT = 4  # whether the last evaluation found them ambiguous
-ROW = 5  # next row of the record, in output periods
-ROW_EVERY = 6  # steps between two rows
-SAMPLE = 7  # next call of the controller, in sample periods
-PAUSE_STEP = 8  # steps after which to pause
-BURST = 9  # events since time moved on
-REASON = 10  # why the loop gave up
-UNDECIDED = 11  # whether the contact modes are still to be decided
-FORCED = 12  # whether contact forces at their limits made it so
-JAMMED = 13  # whether it was forces that grow without bound
-LET_PASS = 14  # whether swing feet may scuff without effect
-COUNTS = 15
 
 
 class Phase(Bundle):
@@ -113,9 +77,36 @@ class Phase(Bundle):
         Stages of the step and coefficients of its dense output.
     torque : (nu,) float
         Torques at the end of the step, to see whether the controller jumps.
-    clock : (15,) float
-    count : (15,) int
-        Their places are module constants.
+    time : float
+        Now, s.
+    next_length, length, longest : float
+        Length of the next step as far as accuracy allows, of the finished one, and at most, s.
+    relative, absolute : float
+        Tolerances of a step.
+    output_period : float
+        Time between two rows of the record, zero for a row a step.
+    row_every, next_row : int
+        Periods, or steps, between two rows; next row, in periods.
+    last_row, next_push, last_event, last_blow : float
+        When the last row was, a push begins or ends next, the modes changed last, and the robot was
+        hit last, s.
+    burst : int
+        Events since time moved on.
+    started : int
+        Whether the first contact modes are being, or have been, decided.
+    finished, has_fired : int
+        Whether a step is finished but its rows and events are not dealt with; whether it ends in an
+        event.
+    at_event, undecided : int
+        Whether this instant is one of an event; whether the contact modes are still to be decided.
+    forced, jammed : int
+        Whether contact forces at their limits made it so; whether those that grow without bound.
+    closed_count, deficient : int
+        Closed contact points at the last evaluation; whether it found their forces ambiguous.
+    reason : int
+        Why the simulation could not go on.
+    let_pass : int
+        Whether swing feet may scuff without effect.
     """
 
     stop_joint: Integers = array("ns", of=int)
@@ -133,9 +124,9 @@ class Phase(Bundle):
     hit: Integers = array("contacts", of=int)
     plastic: Integers = array("contacts", of=int)
     passing: Integers = array("contacts", of=int)
-    force: Floats = array("contacts", "rows")
-    end_force: Floats = array("contacts", "rows")
-    impulse: Floats = array("contacts", "rows")
+    force: Floats = array("contacts", "components")
+    end_force: Floats = array("contacts", "components")
+    impulse: Floats = array("contacts", "components")
     last_impact: Floats = array("contacts")
     accumulation: Floats = array("contacts")
     row: Integers = array("2 contacts", of=int)
@@ -159,8 +150,31 @@ class Phase(Bundle):
     slopes: Floats = array("stages", "2 nv")
     dense: Floats = array("dense_rows", "2 nv")
     torque: Floats = array("nu")
-    clock: Floats = array("clocks")
-    count: Integers = array("counts", of=int)
+    time: float = cell(float)
+    next_length: float = cell(float)
+    length: float = cell(float)
+    longest: float = cell(float)
+    relative: float = cell(float)
+    absolute: float = cell(float)
+    output_period: float = cell(float)
+    row_every: int = cell(int)
+    next_row: int = cell(int)
+    last_row: float = cell(float)
+    next_push: float = cell(float)
+    last_event: float = cell(float)
+    last_blow: float = cell(float)
+    burst: int = cell(int)
+    started: int = cell(int)
+    finished: int = cell(int)
+    has_fired: int = cell(int)
+    at_event: int = cell(int)
+    undecided: int = cell(int)
+    forced: int = cell(int)
+    jammed: int = cell(int)
+    closed_count: int = cell(int)
+    deficient: int = cell(int)
+    reason: int = cell(int)
+    let_pass: int = cell(int)
 
 
 def allocate_phase(robot: Robot) -> Phase:
@@ -171,8 +185,8 @@ def allocate_phase(robot: Robot) -> Phase:
     dry = np.flatnonzero(model.dry_friction > 0.0)
     nc = robot.nc + len(lower) + len(upper) + len(dry)
     return Phase.allocate(
-        nv=nv, nu=nu, ns=len(lower) + len(upper), nd=len(dry), contacts=nc, axes=2, rows=2,
-        stages=SLOPES, dense_rows=DENSE_ROWS, clocks=CLOCKS, counts=COUNTS,
+        nv=nv, nu=nu, ns=len(lower) + len(upper), nd=len(dry), contacts=nc, axes=2, components=2,
+        stages=SLOPES, dense_rows=DENSE_ROWS,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),

@@ -163,18 +163,17 @@ def _ground(stored: _Stored) -> Ground:
     friction = stored.numbers("ground_friction", segments)
     restitution = stored.numbers("ground_restitution", segments)
     try:
-        return Ground(
-            friction=_one_if_equal(friction),
-            restitution=_one_if_equal(restitution),
-            slope=stored.number("ground_slope"),
-            profile=corners if stored.count("ground_has_profile") else None,
+        return Ground.of_numbers(
+            {
+                "corner": corners,
+                "friction": friction,
+                "restitution": restitution,
+                "slope": np.array(stored.number("ground_slope")),
+                "has_profile": np.array(stored.count("ground_has_profile")),
+            }
         )
     except HeelstrikeError as error:
         raise stored.damaged(str(error)) from error
-
-
-def _one_if_equal(values: NDArray[np.float64]) -> NDArray[np.float64] | float:
-    return float(values[0]) if len(values) and np.all(values == values[0]) else values
 
 
 def _events(stored: _Stored, robot: Robot) -> tuple[Event, ...]:

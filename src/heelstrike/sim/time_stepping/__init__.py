@@ -1,1 +1,5 @@
 """Fixed steps whose contact impulses decide the next velocity."""
+
+from heelstrike.sim.time_stepping.method import TimeStepping
+
+__all__ = ["TimeStepping"]

@@ -17,23 +17,22 @@ them with the new velocity at the end of each step.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numba import types
 
-from heelstrike.compiler.compilation import dissolved_kernel, kernel, loop_for
+from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.solvers.search import try_solvers
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.clock import Clock
 from heelstrike.sim.contact_geometry import (
     add_impulse,
     assemble_delassus,
@@ -45,36 +44,16 @@ from heelstrike.sim.contact_geometry import (
     weigh,
     write_unit_row,
 )
-from heelstrike.sim.controller.asking import ask
-from heelstrike.sim.controller.guard import guarded
-from heelstrike.sim.controller.interface import CONTROLLER_TYPE, MODEL_TYPE
+from heelstrike.sim.controller.control import Control
 from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
-from heelstrike.sim.engine import (
-    BAD_CONTROLLER,
-    DIVERGED,
-    DONE,
-    FELL,
-    PAUSED,
-    RECORD_FULL,
-    SOLVER_FAILED,
-    Engine,
-    Setting,
-    solver_order,
-    whole_steps,
-)
-from heelstrike.sim.memory import STEPS, Memory, Record
+from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels
+from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.point_contacts import point_velocities
 from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
-from heelstrike.sim.record_size import check_room, check_steps
-from heelstrike.sim.recording import (
-    center_height,
-    limit_torque,
-    note_events,
-    note_extremes,
-    note_row,
-    sound,
-)
+from heelstrike.sim.recording import note_events, note_extremes, note_row_when_due
+from heelstrike.sim.setting import Setting
 from heelstrike.sim.status import Scheme
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
@@ -92,8 +71,28 @@ FAR_STEPS = 20.0
 CLOSING_RATE = 20.0
 
 
+class Stepping(Bundle):
+    """What the kernels of time stepping read.
+
+    Attributes
+    ----------
+    step : float
+        Length of a step (s).
+    scheme : int
+    activation : float
+        Gap up to which a contact point takes part, for schemes that decide by it (m).
+    order : (solvers,) int
+        Contact solvers in the order in which they are tried.
+    """
+
+    step: float = number(float)
+    scheme: int = number(int)
+    activation: float = number(float)
+    order: Integers = array("solvers", of=int)
+
+
 @dataclass(frozen=True, kw_only=True)
-class TimeStepping:
+class TimeStepping(Method):
     """Fixed steps whose contact impulses decide the velocity at the end of the step.
 
     Parameters
@@ -140,20 +139,63 @@ class TimeStepping:
             ) from None
         solver_order(self.solver)
 
-    def engine(self, setting: Setting) -> Engine:
-        """Return this way through time, compiled and ready to run.
+    @property
+    def step_length(self) -> float:  # type: ignore[override]
+        """Length of every step."""
+        return self.step
 
-        Raises
-        ------
-        SimulationError
-            If the ground has restitution and the scheme knows plastic impacts only.
-        """
-        return _TimeSteppingEngine(self, setting)
+    @property
+    def row_period(self) -> tuple[str, float]:
+        """A row a step."""
+        return "step", self.step
+
+    @property
+    def solves_with(self) -> str:
+        """Contact solver tried first."""
+        return self.solver
+
+    def new_work(self, robot: Robot) -> Stepping:  # noqa: ARG002
+        """Return what its kernels read."""
+        return Stepping(
+            step=self.step,
+            scheme=int(self.scheme),
+            activation=self.activation,
+            order=solver_order(self.solver),
+        )
+
+    def room(self, robot: Robot) -> tuple[int, int]:
+        """Return how many rows and events a step may add to the record."""
+        return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names)
+
+    def check(self, setting: Setting) -> None:
+        """Refuse ground with restitution where the scheme knows plastic impacts only."""
+        if self.scheme is not Scheme.MOREAU_JEAN and np.any(
+            setting.ground.model().restitution > 0.0
+        ):
+            raise SimulationError(
+                f"{self.scheme.name} knows plastic impacts only, and this ground has "
+                f"restitution; use Scheme.MOREAU_JEAN"
+            )
 
 
 @dissolved_kernel
-def evaluate_state(model: Model, ground: GroundModel, memory: Memory) -> None:
+def begin(
+    model: Model,  # noqa: ARG001
+    ground: GroundModel,  # noqa: ARG001
+    memory: Memory,  # noqa: ARG001
+    work: Stepping,  # noqa: ARG001
+    record: Record,  # noqa: ARG001
+) -> int:
+    """Begin: there is nothing to prepare."""
+    return DONE
+
+
+@dissolved_kernel
+def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
+    if work.scheme == LINEARLY_IMPLICIT:
+        for i in range(memory.added.shape[0]):
+            memory.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
     evaluate_equations(model, memory.q, memory.v, memory)
     locate_contacts(model, ground, memory)
 
@@ -427,180 +469,65 @@ def solve_contacts(
     return status == SOLVED
 
 
-def _advance(
-    controller: Any,
+@dissolved_kernel
+def decide(
+    controller: Any,  # noqa: ARG001 - asked by the frame
+    control: Control,  # noqa: ARG001
     model: Model,
-    ground: GroundModel,
-    parameters: Floats,
-    controller_memory: Floats,
+    ground: GroundModel,  # noqa: ARG001
     memory: Memory,
+    work: Stepping,
     record: Record,
-    clock: Floats,
-    span: Integers,
-    order: Integers,
+    clock: Clock,
 ) -> int:
-    """Advance a simulation by time stepping until its span ends or something stops it.
-
-    Parameters
-    ----------
-    clock : (4,) float
-        Time of step 0, step length, height of the centre of mass below which it fell, and the
-        activation gap.
-    span : (6,) int
-        Step now, last step, step to pause before, steps between controller calls, steps between
-        rows, scheme. At the last step everything is decided and recorded, but time does not move
-        on.
-    """
-    start = clock[0]
-    step = clock[1]
-    fallen = clock[2]
-    last = span[1]
-    control_every = span[3]
-    record_every = span[4]
-    scheme = span[5]
-    nv = model.parent.shape[0]
-    for i in range(nv):
-        memory.added[i] = 0.0
-        if scheme == LINEARLY_IMPLICIT:
-            memory.added[i] = step * (memory.damping[i] + step * memory.stiffness[i])
-    while True:
-        if (
-            record.row_count[0] >= record.time.shape[0]
-            or record.event_count[0] + 2 * (model.contact_link.shape[0] + nv)
-            > record.event_time.shape[0]
-        ):
-            return RECORD_FULL
-        k = span[0]
-        if k == span[2]:
-            return PAUSED
-        time = start + k * step
-        if not sound(memory):
-            return DIVERGED
-        evaluate_state(model, ground, memory)
-        if k % control_every == 0:
-            ask(
-                controller,
-                time,
-                memory.q,
-                memory.v,
-                model,
-                memory,
-                parameters,
-                controller_memory,
-                memory.torque,
-            )
-            if not limit_torque(model, memory):
-                return BAD_CONTROLLER
-        free_velocity(model, step, scheme, memory)
-        push_robot(model, time, step, memory)
-        solved = solve_contacts(model, step, scheme, clock[3], order, memory)
-        note_extremes(model, memory)
-        note_events(model, record, time, step, memory)
-        if k % record_every == 0 or k == last:
-            note_row(record, time, memory)
-        if not solved:
-            return SOLVER_FAILED
-        if center_height(model, ground, memory) < fallen:
-            return FELL
-        if k == last:
-            return DONE
-        memory.tally[STEPS] += 1
-        for i in range(nv):
-            if scheme == PAPER_EXPLICIT:
-                memory.q[i] += step * memory.v[i]
-            elif scheme == MOREAU_JEAN:
-                memory.q[i] += 0.5 * step * (memory.v[i] + memory.next_v[i])
-            else:
-                memory.q[i] += step * memory.next_v[i]
-            memory.v[i] = memory.next_v[i]
-        span[0] = k + 1
+    """Find the velocity at the end of the step, and note what happens in it."""
+    free_velocity(model, work.step, work.scheme, memory)
+    push_robot(model, clock.time, work.step, memory)
+    solved = solve_contacts(model, work.step, work.scheme, work.activation, work.order, memory)
+    note_extremes(model, memory)
+    note_events(model, record, clock.time, work.step, memory)
+    return DONE if solved else SOLVER_FAILED
 
 
-@lru_cache(maxsize=1)
-def compiled_advance() -> tuple[Any, float]:
-    """Compile the loop or load it from the cache; return it with the seconds that took."""
-    begin = perf_counter()
-    vector = types.float64[::1]
-    integers = types.int64[::1]
-    signature = types.int64(
-        CONTROLLER_TYPE,
-        MODEL_TYPE,
-        GroundModel.compiled_type(),
-        vector,
-        vector,
-        Memory.compiled_type(),
-        Record.compiled_type(),
-        vector,
-        integers,
-        integers,
-    )
-    try_solvers.begin()
-    compiled = loop_for(signature, _advance)
-    try_solvers.finish()
-    return compiled, perf_counter() - begin
+@dissolved_kernel
+def report(
+    controller: Any,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
+    model: Model,  # noqa: ARG001
+    ground: GroundModel,  # noqa: ARG001
+    memory: Memory,
+    work: Stepping,  # noqa: ARG001
+    record: Record,
+    clock: Clock,
+) -> None:
+    """Append a row if one is due."""
+    note_row_when_due(record, memory, clock)
 
 
-class _TimeSteppingEngine:
-    """Time stepping of one simulation."""
+@dissolved_kernel
+def move(
+    controller: Any,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
+    model: Model,
+    ground: GroundModel,  # noqa: ARG001
+    memory: Memory,
+    work: Stepping,
+    record: Record,  # noqa: ARG001
+    clock: Clock,
+) -> int:
+    """Move on by a step."""
+    memory.tally.steps += 1
+    for i in range(model.parent.shape[0]):
+        if work.scheme == PAPER_EXPLICIT:
+            memory.q[i] += work.step * memory.v[i]
+        elif work.scheme == MOREAU_JEAN:
+            memory.q[i] += 0.5 * work.step * (memory.v[i] + memory.next_v[i])
+        else:
+            memory.q[i] += work.step * memory.next_v[i]
+        memory.v[i] = memory.next_v[i]
+    clock.time = clock.start + (clock.index + 1) * work.step
+    return DONE
 
-    def __init__(self, method: TimeStepping, setting: Setting) -> None:
-        check_steps(setting, "step", method.step)
-        check_room(setting, "step", method.step)
-        self._advance, self.compile_s = compiled_advance()
-        if method.scheme is not Scheme.MOREAU_JEAN and np.any(setting.ground.restitution > 0.0):
-            raise SimulationError(
-                f"{method.scheme.name} knows plastic impacts only, and this ground has "
-                f"restitution; use Scheme.MOREAU_JEAN"
-            )
-        self._setting = setting
-        self.solver = method.solver
-        self.spare = guarded(())
-        self._order = solver_order(method.solver)
-        self._control_every = 1
-        if setting.control_period is not None:
-            self._control_every = whole_steps("control_period", setting.control_period, method.step)
-        self._clock = np.array([0.0, method.step, setting.fallen_height, method.activation])
-        self._span = np.array(
-            [
-                0,
-                round(setting.duration / method.step),
-                0,
-                self._control_every,
-                setting.record_every,
-                int(method.scheme),
-            ]
-        )
 
-    @property
-    def time(self) -> float:
-        return float(self._clock[0] + self._span[0] * self._clock[1])
-
-    @property
-    def rows_left(self) -> int:
-        return int(self._span[1] - self._span[0]) // self._setting.record_every + 1
-
-    def pause_after(self, steps: int | None) -> None:
-        self._span[2] = self._span[0] + (self._control_every if steps is None else steps)
-
-    def advance(
-        self,
-        controller: Any,
-        parameters: Floats,
-        controller_memory: Floats,
-        record: Record,
-    ) -> int:
-        setting = self._setting
-        return int(
-            self._advance(
-                controller,
-                setting.robot.model,
-                setting.ground,
-                parameters,
-                controller_memory,
-                setting.memory,
-                record,
-                self._clock,
-                self._span,
-                self._order,
-            )
-        )
+TimeStepping.work = Stepping
+TimeStepping.kernels = Kernels(begin, prepare, decide, report, move)

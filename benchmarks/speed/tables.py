@@ -1,0 +1,190 @@
+"""The results as tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from table import Table, number
+
+from heelstrike.experiments.engines.packages import PACKAGES
+
+TITLES = {"heelstrike": "heelstrike", **{name: each.title for name, each in PACKAGES.items()}}
+
+
+def tables(parts: dict[str, Any]) -> Iterator[Table]:
+    """Yield the tables of the parts that were measured."""
+    for name, make in _MAKERS.items():
+        if name in parts:
+            yield from make(parts[name])
+
+
+def _steps(part: dict[str, Any]) -> Iterator[Table]:
+    engines: dict[str, str] = part["engines"]
+    rows = part["rows"]
+    body = []
+    for row in rows:
+        cells = [number(row.get("heelstrike_us"))]
+        for name in engines:
+            times = row.get("times_faster", {}).get(name)
+            beside = "" if times is None else f" ({number(times)} ×)"
+            cells.append(number(row.get(f"{name}_us")) + beside)
+        body.append([row["scenario"], *cells, row["controller"]])
+    yield Table(
+        f"µs a step of {1e3 * part['step_s']:g} ms, best of many, in turn (times as long as ours)",
+        ["scenario", "heelstrike", *engines.values(), "control"],
+        body,
+    )
+    sides = {"heelstrike": "heelstrike", **engines}
+    yield Table(
+        "active contacts, and the share of the weight that they carry",
+        ["scenario", *sides.values()],
+        [[row["scenario"], *(_validity(row, name) for name in sides)] for row in rows],
+    )
+    if any("pinocchio_part_us" in row or "pinocchio_part_invalid" in row for row in rows):
+        theirs = (
+            row.get("pinocchio_part_invalid") or number(row.get("pinocchio_part_us"))
+            for row in rows
+        )
+        yield Table(
+            "forward dynamics alone (no contacts, control, integration): a part of a step, in µs",
+            ["scenario", "Pinocchio, articulated bodies", "a whole step of heelstrike"],
+            [
+                [row["scenario"], its, number(row.get("heelstrike_us"))]
+                for row, its in zip(rows, theirs, strict=True)
+            ],
+        )
+
+
+def _validity(row: dict[str, Any], name: str) -> str:
+    """What makes a run valid, or why it does not count."""
+    refused = row.get("invalid") if name == "heelstrike" else row.get(f"{name}_invalid")
+    check = row.get(f"{name}_check")
+    if refused or check is None:
+        return f"does not count: {refused}" if refused else "–"
+    carried = check.get("weight_carried")
+    weight = "" if carried is None else f", {carried:.4f}"
+    return number(check["active_contacts"]) + weight
+
+
+def _precision(part: dict[str, Any]) -> Iterator[Table]:
+    body = [
+        [
+            point["series"],
+            point["knob"],
+            number(point["error_rad"], 2),
+            number(point["seconds"]),
+        ]
+        for point in part["points"]
+    ]
+    body += [[each["series"], each["knob"], each["reason"], "–"] for each in part["failures"]]
+    yield Table(
+        f"{part['scenario']}, {part['duration_s']:g} s: error in joint positions, and computing",
+        ["method", "setting", "error (rad)", "computing (s)"],
+        body,
+    )
+    goal = part["to_goal"]
+    body = []
+    for side, title in TITLES.items():
+        point = goal.get(side) or goal.get(f"{side}_best")
+        if point is None:
+            continue
+        how = f"{point['series']}, {point['knob']}"
+        if side not in goal:
+            how = f"not reached; nearest is {point['error_rad']:.1e} rad: {how}"
+        times = goal.get("times_less", {}).get(side)
+        body.append([title, how, number(point["seconds"]), "" if times is None else number(times)])
+    yield Table(
+        f"least computing to {part['goal_rad']:g} rad",
+        ["side", "how", "computing (s)", "times as long as ours"],
+        body,
+    )
+
+
+def _threads(part: dict[str, Any]) -> Iterator[Table]:
+    others = {row["threads"]: row for row in part.get("mujoco", [])}
+    body = []
+    for row in part["rows"]:
+        other = others.get(row["threads"], {})
+        body.append(
+            [
+                str(row["threads"]),
+                number(row["steps_per_s"] / 1e6),
+                number(row["speed_up"]),
+                number(other["steps_per_s"] / 1e6) if other else "–",
+                number(other.get("speed_up")),
+            ]
+        )
+    yield Table(
+        f"{part['runs']} walks of {part['duration_s']:g} s, {part['steps']} steps, "
+        f"{'identical' if part['same_for_all_threads'] else 'NOT THE SAME'} on all threads",
+        ["threads", "million steps a second", "speed-up", "MuJoCo", "its speed-up"],
+        body,
+    )
+
+
+def _scaling(part: dict[str, Any]) -> Iterator[Table]:
+    engines: dict[str, str] = part["engines"]
+    for name, title in (
+        ("joints", "µs a step of a chain of hinges"),
+        ("contacts", "µs a step of a plank on many points"),
+    ):
+        sides = {"heelstrike": "heelstrike", **engines}
+        if any("pinocchio_part_us" in row for row in part[name]):
+            sides["pinocchio_part"] = "part of a step: Pinocchio ABA"
+        body = []
+        for row in part[name]:
+            cells = [row.get(f"{side}_invalid") or number(row.get(f"{side}_us")) for side in sides]
+            body.append([str(row["size"]), *cells])
+        slopes, crossing = part[f"{name}_slope"], part[f"{name}_crossover"]
+        body.append(["grows with the power", *(number(slopes.get(side)) for side in sides)])
+        found = ["" if side not in engines else str(crossing[side] or "nowhere") for side in sides]
+        body.append(["faster than heelstrike from", *found])
+        yield Table(title, [name, *sides.values()], body)
+
+
+def _footprint(part: dict[str, Any]) -> Iterator[Table]:
+    body = [
+        ["import heelstrike", f"{part['import_s']:.3f} s"],
+        ["import to first step, compiled before", f"{part['warm_first_step_s']:.2f} s"],
+    ]
+    if "cold_first_step_s" in part:
+        cold = f"{part['cold_first_step_s']:.1f} s"
+        body.append(["import to first step, nothing compiled", cold])
+    for method, count in part["allocations_a_step"].items():
+        body.append([f"allocations a step, {method}", f"{count:g}"])
+    memory = part["memory"]
+    if memory["before_MiB"] is not None:
+        before, after = (f"{memory[f'{when}_MiB']:.0f} MiB" for when in ("before", "after"))
+        body.append([f"peak memory after {memory['short_s']:g} s of walking", before])
+        body.append([f"after {memory['long_s']:g} s more, as many rows", after])
+    yield Table("to begin, and to go on", ["what", "measured"], body)
+
+
+def _endurance(part: dict[str, Any]) -> Iterator[Table]:
+    body = [
+        [label, str(part[name])]
+        for name, label in (
+            ("failures", "contact problems without a solution"),
+            ("unfinished", "runs that ended otherwise than walking or falling"),
+            ("fell", "falls"),
+            ("fallbacks", "problems that needed another solver"),
+        )
+    ]
+    for name in ("complementarity", "cone", "non_penetration"):
+        body.append([f"{name.replace('_', '-')} residual", f"{part[name]:.1e}"])
+    body.append(["penetration", f"{part['penetration_m']:.1e} m"])
+    share = part["shortcuts"] / max(part["solves"], 1)
+    body.append(["answered by the modes of the step before, verified", f"{100 * share:.2f} %"])
+    title = f"{part['steps']} steps of {part['runs']} walks under random pushes"
+    yield Table(title, ["what", "worst"], body)
+
+
+_MAKERS = {
+    "steps": _steps,
+    "precision": _precision,
+    "threads": _threads,
+    "scaling": _scaling,
+    "footprint": _footprint,
+    "endurance": _endurance,
+}

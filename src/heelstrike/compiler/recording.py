@@ -1,0 +1,152 @@
+"""What a kernel does to its arguments, recorded on a tape."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heelstrike.compiler import tape
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.compilation import kernel, uncompiled
+from heelstrike.compiler.tape import Entry, Symbols, Tape, Value
+
+CONSTANT = "model"
+"""The argument that never changes. Where its numbers are 0, 1 or -1, they are so in every robot
+that shares the code."""
+
+
+@kernel
+def inverse_above(value: float, least: float) -> float:
+    """Inverse of a number if it is more than `least`, or else zero."""
+    return 1.0 / value if value > least else 0.0
+
+
+_RECORDED = {math.sin: tape.sine, math.cos: tape.cosine, inverse_above: tape.inverse_above}
+"""What takes the place of functions that kernels call; no other function may be asked for a
+number that is not known yet."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A kernel and the arguments to record it with.
+
+    Attributes
+    ----------
+    kernel : kernel
+        It may branch on integers, and on numbers of the model where they are 0, 1 or -1.
+    arguments : mapping of str to Bundle or array
+        Its arguments in order, with their true shapes.
+    scratch : sequence of str
+        Arrays, ``argument`` or ``argument.member``, whose contents nobody reads afterwards.
+    name : str, optional
+        Name of the function that is made of it; else the kernel's.
+    """
+
+    kernel: Callable[..., Any]
+    arguments: Mapping[str, Any]
+    scratch: tuple[str, ...] = ()
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            object.__setattr__(self, "name", self.kernel.__name__)
+
+    def description(self) -> bytes:
+        """What its recording depends on besides the source of its kernel."""
+        parts = [self.name, *self.scratch]
+        for name, value in self._members():
+            parts.append(name)
+            if not _is_floats(value):
+                parts.append(repr(np.asarray(value).tolist()))
+            elif name.split(".")[0] == CONSTANT:
+                parts.append(repr(np.where(_structural(value), value, 2.0).tolist()))
+            else:
+                parts.append(repr(value.shape))
+        return "\0".join(parts).encode()
+
+    def _members(self) -> Iterator[tuple[str, Any]]:
+        for name, argument in self.arguments.items():
+            if isinstance(argument, Bundle):
+                for member, value in argument.members().items():
+                    yield f"{name}.{member}", value
+            else:
+                yield name, argument
+
+
+class Recording:
+    """What the kernel of a program does to its arguments.
+
+    Parameters
+    ----------
+    program : Program
+        The kernel and its arguments.
+    known : mapping of str to array
+        Arrays of which some entries are known numbers, for example from an earlier recording.
+
+    Attributes
+    ----------
+    tape : Tape
+        The operations.
+    arrays : dict of str to array
+        What the kernel leaves in its arrays.
+    """
+
+    def __init__(self, program: Program, known: Mapping[str, Symbols] | None = None) -> None:
+        self.program = program
+        self.tape = Tape()
+        self.arrays: dict[str, Symbols] = {}
+        operands: list[Any] = []
+        for name, argument in program.arguments.items():
+            if isinstance(argument, Bundle):
+                members = {
+                    member: self._symbols(f"{name}.{member}", value, known or {})
+                    for member, value in argument.members().items()
+                }
+                operands.append(type(argument)(**members))
+            else:
+                operands.append(self._symbols(name, argument, known or {}))
+        uncompiled(program.kernel, replace=_RECORDED)(*operands)
+
+    def _symbols(self, name: str, value: Any, known: Mapping[str, Symbols]) -> Any:
+        if not _is_floats(value):
+            return value
+        array = self.tape.array(name, value.shape)
+        if name.split(".")[0] == CONSTANT:
+            structural = _structural(value)
+            array[structural] = value[structural].astype(float)
+        elif name in known:
+            for index, entry in enumerate(known[name].astype(object).flat):
+                if not isinstance(entry, Value):
+                    array.flat[index] = entry
+        self.arrays[name] = array
+        return array
+
+    def written(self) -> Iterator[tuple[str, int, Any]]:
+        """Array, index and value of every entry that the kernel writes for others to read."""
+        for name, array in self.arrays.items():
+            if name in self.program.scratch or name.split(".")[0] == CONSTANT:
+                continue
+            for index, entry in enumerate(array.flat):
+                unchanged = isinstance(entry, Entry) and (entry.array, entry.index) == (name, index)
+                if not unchanged:
+                    yield name, index, entry
+
+    def left(self) -> dict[str, Symbols]:
+        """What it leaves in its bundles: in places it is the same number always."""
+        return {
+            name: array
+            for name, array in self.arrays.items()
+            if "." in name and name.split(".")[0] != CONSTANT and name not in self.program.scratch
+        }
+
+
+def _structural(value: Any) -> Any:
+    return (value == 0.0) | (np.abs(value) == 1.0)
+
+
+def _is_floats(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype == np.float64

@@ -1,0 +1,94 @@
+"""The equations of motion of one robot as a page of C99."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from heelstrike.compiler.c_text import c_text
+from heelstrike.compiler.recording import Program, Recording
+from heelstrike.dynamics.kernels import (
+    bias_force,
+    forward_dynamics,
+    forward_kinematics,
+    link_velocities,
+    mass_matrix,
+)
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Floats, Model
+
+_HEAD = """Equations of motion of {name}, A(q) a + H(q, v) = force, written by heelstrike.
+
+SI units. Coordinates in the order
+{joints}.
+x points forward, z upward, angles turn about +y: a positive pitch leans forward.
+Matrices are stored row by row. Nothing is kept from call to call, and nothing is checked.
+Passive joint forces (dampers, springs) belong to `force`, as actuators and contacts do.
+The robot's numbers stand in tables; those that are 0, 1 or -1 are worked into the code as well."""
+
+
+def _kinematics(model: Model, q: Floats, tree: Workspace, angle: Floats, origin: Floats) -> None:
+    """Poses of the links: `angle` (rad) and `origin` (x, z of the link's frame, m) in the world."""
+    forward_kinematics(model, q, tree)
+    for i in range(model.nl):
+        angle[i] = tree.angle[i]
+        for k in range(model.axes):
+            origin[i, k] = tree.origin[i, k]
+
+
+def _mass_matrix(model: Model, q: Floats, tree: Workspace, matrix: Floats) -> None:
+    """Mass matrix A(q)."""
+    forward_kinematics(model, q, tree)
+    mass_matrix(model, tree, matrix)
+
+
+def _bias_force(model: Model, q: Floats, v: Floats, tree: Workspace, bias: Floats) -> None:
+    """Centrifugal, Coriolis and gravitational forces H(q, v)."""
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    bias_force(model, tree, bias)
+
+
+def _solve(
+    model: Model, q: Floats, v: Floats, force: Floats, tree: Workspace, matrix: Floats,
+    factor: Floats, acceleration: Floats,
+) -> None:  # fmt: skip
+    """Acceleration a under a generalised force: a = A(q)^-1 (force - H(q, v))."""
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    forward_dynamics(model, matrix, factor, force, tree, acceleration)
+
+
+def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
+    """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
+    tree = Workspace.allocate(**model.extents)
+    square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
+    scratch = (*(f"tree.{member}" for member in tree.members()), "factor")
+    poses = {"angle": np.zeros(model.nl), "origin": np.zeros((model.nl, model.axes))}
+    q, state = {"model": model, "q": vector}, {"model": model, "q": vector, "v": vector}
+    given: list[tuple[Callable[..., None], dict[str, Any], tuple[str, ...]]] = [
+        (_kinematics, q | {"tree": tree} | poses, scratch),
+        (_mass_matrix, q | {"tree": tree, "matrix": square}, scratch),
+        (_bias_force, state | {"tree": tree, "bias": vector}, scratch),
+        (
+            _solve,
+            state
+            | {"force": vector, "tree": tree, "matrix": square, "factor": square}
+            | {"acceleration": vector},
+            (*scratch, "matrix"),
+        ),
+    ]
+    known = {"tree.zero": vector}
+    return c_text(
+        [
+            Recording(Program(kernel, arguments, unread, kernel.__name__[1:]), known)
+            for kernel, arguments, unread in given
+        ],
+        [str(kernel.__doc__) for kernel, _, _ in given],
+        prefix=re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII),
+        head=_HEAD.format(name=name, joints=textwrap.fill(", ".join(joints), 96)),
+    )

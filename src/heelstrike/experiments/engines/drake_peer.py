@@ -1,0 +1,200 @@
+"""Drake's side of a comparison: a MultibodyPlant with point contact, run by its Simulator."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from typing import Any
+
+import numpy as np
+from pydrake import geometry, math, polynomial, trajectories
+from pydrake.multibody import plant as plants
+from pydrake.multibody import tree
+from pydrake.systems import analysis, framework, primitives
+
+from heelstrike.experiments.engines.links import links
+from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.robot import State
+
+FASTEST = "tamsi" if hasattr(plants.DiscreteContactApproximation, "kTamsi") else "lagged"
+"""Drake calls TAMSI deprecated; it is several times as fast as what is to take its place."""
+
+
+class DrakePeer(Peer):
+    """A scenario in Drake. Springs and dampers are elements of its plant, within its solver.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    step : float
+        Seconds.
+    approximation : str
+        Of contact in discrete steps: ``"tamsi"``, ``"sap"``, ``"similar"``, ``"lagged"``.
+    stiffness, dissipation : float or None
+        Of the contact points, in N/m and s/m; None for Drake's estimates.
+    stiction : float or None
+        Speed up to which friction sticks, in m/s; None for the default of 1e-4.
+    near_rigid : float or None
+        Where SAP takes a contact for rigid and softens it, in units of what the step resolves;
+        None for the default of 1.
+    """
+
+    settling = 1.0
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        step: float,
+        *,
+        approximation: str = FASTEST,
+        stiffness: float | None = None,
+        dissipation: float | None = None,
+        stiction: float | None = None,
+        near_rigid: float | None = None,
+    ) -> None:
+        super().__init__(scenario, step)
+        config = plants.MultibodyPlantConfig(
+            time_step=step,
+            contact_model="point",
+            discrete_contact_approximation=approximation,
+            use_sampled_output_ports=False,  # they cost time and nobody reads them
+        )
+        if stiction is not None:
+            config.stiction_tolerance = stiction
+        if near_rigid is not None:
+            config.sap_near_rigid_threshold = near_rigid
+        material = geometry.ProximityProperties()
+        geometry.AddContactMaterial(
+            properties=material,
+            friction=plants.CoulombFriction(scenario.friction, scenario.friction),
+            point_stiffness=stiffness,
+            dissipation=dissipation,
+        )
+        logging.getLogger("drake").setLevel(logging.ERROR)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the deprecated approximation
+            self._simulator, self._plant = _simulator(scenario, config, material)
+        self._context: Any = None
+        self._step = 0
+
+    def restart(self) -> None:
+        """Go back to `start`, at time 0."""
+        root = self._simulator.get_mutable_context()
+        root.SetTime(0.0)
+        self._context = self._plant.GetMyMutableContextFromRoot(root)
+        reference = self.scenario.robot.model.reference
+        self._plant.SetPositions(self._context, self.start.q - reference)
+        self._plant.SetVelocities(self._context, self.start.v)
+        self._simulator.Initialize()
+        self._step = 0
+
+    def advance(self, steps: int) -> None:
+        """Simulate some steps in one call."""
+        self._step += steps
+        self._simulator.AdvanceTo(self._step * self.step)
+
+    def state(self) -> State:
+        """Where it is now."""
+        position = self._plant.GetPositions(self._context)
+        velocity = self._plant.GetVelocities(self._context)
+        return State(position + self.scenario.robot.model.reference, np.array(velocity))
+
+    def touching(self) -> Touching:
+        """How it touches the ground now."""
+        found = self._plant.get_contact_results_output_port().Eval(self._context)
+        number = found.num_point_pair_contacts()
+        contacts = [found.point_pair_contact_info(i) for i in range(number)]
+        force = sum(abs(float(contact.contact_force()[2])) for contact in contacts)
+        depth = max((float(contact.point_pair().depth) for contact in contacts), default=0.0)
+        return Touching(number, force, depth)
+
+
+def _simulator(scenario: Scenario, config: Any, material: Any) -> tuple[Any, Any]:
+    model = scenario.robot.model
+    builder = framework.DiagramBuilder()
+    plant, scene = plants.AddMultibodyPlant(config, builder)
+    plant.mutable_gravity_field().set_gravity_vector([model.gravity[0], 0.0, model.gravity[1]])
+    bodies = _add_robot(plant, scenario, material)
+    plant.RegisterCollisionGeometry(
+        plant.world_body(), math.RigidTransform(), geometry.HalfSpace(), "ground", material
+    )
+    plant.Finalize()
+    # The points of two feet may be in the same place: they meet the ground only.
+    own = geometry.GeometrySet(
+        [shape for body in bodies for shape in plant.GetCollisionGeometriesForBody(body)]
+    )
+    scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
+    if scenario.robot.nu:
+        source = builder.AddSystem(_commands(scenario))
+        port = plant.get_actuation_input_port(tree.default_model_instance())
+        builder.Connect(source.get_output_port(), port)
+    return analysis.Simulator(builder.Build()), plant
+
+
+def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
+    """Add links, joints, contact points, actuators, springs and dampers; return the bodies."""
+    robot, feedback = scenario.robot, scenario.feedback
+    model = robot.model
+    pose = math.RigidTransform
+    damping = model.damping.copy()
+    if feedback is not None:
+        damping[model.actuator_joint] += feedback.kd
+    bodies: list[Any] = []
+    joints: list[Any] = []
+    for i, link in enumerate(links(robot)):
+        inertia = tree.SpatialInertia.Zero()
+        if link.mass or link.inertia:
+            about = tree.RotationalInertia(link.inertia, link.inertia, link.inertia)
+            inertia = tree.SpatialInertia.MakeFromCentralInertia(link.mass, link.center, about)
+        body = plant.AddRigidBody(link.name, inertia)
+        parent = bodies[link.parent] if link.parent >= 0 else plant.world_body()
+        frame = plant.AddFrame(
+            tree.FixedOffsetFrame(f"{link.name}_joint", parent.body_frame(), pose(link.place))
+        )
+        kind = tree.RevoluteJoint if link.hinge else tree.PrismaticJoint
+        joint = kind(
+            robot.joint_names[i],
+            frame,
+            body.body_frame(),
+            link.axis,
+            link.lower,
+            link.upper,
+            float(damping[i]),
+        )
+        bodies.append(body)
+        joints.append(plant.AddJoint(joint))
+        for number, (center, radius) in enumerate(link.points):
+            plant.RegisterCollisionGeometry(
+                body, pose(center), geometry.Sphere(radius), f"{link.name}_{number}", material
+            )
+    for i, driven in enumerate(model.actuator_joint):
+        actuator = plant.AddJointActuator(robot.actuator_names[i], joints[driven])
+        actuator.set_default_rotor_inertia(float(model.armature[driven]))
+        actuator.set_default_gear_ratio(1.0)
+        if feedback is not None:
+            spring = tree.RevoluteSpring if model.axis[driven, 0] else tree.PrismaticSpring
+            rest = float(-model.reference[driven])
+            plant.AddForceElement(spring(joints[driven], rest, float(feedback.kp[i])))
+    return bodies
+
+
+def _commands(scenario: Scenario) -> Any:
+    """Source of the commands of the actuators, as polynomials of time."""
+    feedback = scenario.feedback
+    if feedback is None:
+        return primitives.ConstantVectorSource(np.zeros(scenario.robot.nu))
+    if len(feedback.begins) == 1 and feedback.coefficients.shape[2] == 1:
+        return primitives.ConstantVectorSource(feedback.command([0.0])[0])
+    pieces = [
+        np.array([[polynomial.Polynomial(row)] for row in piece]) for piece in feedback.coefficients
+    ]
+    breaks = [*feedback.begins, max(2.0 * scenario.duration, 2.0 * feedback.begins[-1])]
+    return primitives.TrajectorySource(trajectories.PiecewisePolynomial(pieces, breaks))
+
+
+ENGINE = Engine(
+    label=f"Drake {FASTEST.upper() if FASTEST == 'tamsi' else FASTEST}",
+    note="in its own loop, AdvanceTo; springs and dampers in its plant, torques without limits",
+    peer=DrakePeer,
+)

@@ -1,0 +1,108 @@
+"""A planar robot as engines in space are told it, link by link, where files cannot say it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.experiments.engines.peer import InvalidRunError
+from heelstrike.robot import Robot
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link and the joint that it hangs on; vectors are (3,), in link axes.
+
+    Attributes
+    ----------
+    name : str
+    parent : int
+        -1 for the world.
+    hinge : bool
+        Whether its joint is a hinge; a slide otherwise.
+    axis, place : (3,) float
+        Axis of the joint, and where it is on the parent.
+    mass, inertia : float
+        Mass, and moment of inertia about the centre of mass (the same about all axes, of which
+        only y plays a part).
+    center : (3,) float
+        Centre of mass.
+    lower, upper, damping, armature : float
+        Of the joint, whose coordinate is zero in the reference position of the robot.
+    points : tuple of ((3,) float, float)
+        Centre and radius of the contact points.
+    """
+
+    name: str
+    parent: int
+    hinge: bool
+    axis: Floats
+    place: Floats
+    mass: float
+    center: Floats
+    inertia: float
+    lower: float
+    upper: float
+    damping: float
+    armature: float
+    points: tuple[tuple[Floats, float], ...]
+
+
+def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
+    """Links of a robot, each after its parent.
+
+    Parameters
+    ----------
+    robot : Robot
+    least_radius : float
+        Contact points get at least this radius (m), and touch the ground where they did.
+
+    Raises
+    ------
+    InvalidRunError
+        If the robot has what no engine here is told.
+    """
+    model = robot.model
+    for name in ("stiffness", "dry_friction"):
+        if np.any(getattr(model, name)):
+            raise InvalidRunError(f"{name} of joints is not handed over")
+
+    def points(link: int) -> tuple[tuple[Floats, float], ...]:
+        found = []
+        for i in np.flatnonzero(model.contact_link == link):
+            radius = max(float(model.contact_radius[i]), least_radius)
+            center = space(model.contact_position[i])
+            center[2] += radius - float(model.contact_radius[i])
+            found.append((center, radius))
+        return tuple(found)
+
+    return [
+        Link(
+            f"link{i}",
+            int(model.parent[i]),
+            bool(model.axis[i, 0]),
+            np.array([0.0, model.axis[i, 0], 0.0])
+            if model.axis[i, 0]
+            else space(model.axis[i, 1:]),
+            space(model.offset[i]),
+            float(model.mass[i]),
+            space(model.center_of_mass[i]),
+            float(model.inertia[i]),
+            float(model.lower[i] - model.reference[i]),
+            float(model.upper[i] - model.reference[i]),
+            float(model.damping[i]),
+            float(model.armature[i]),
+            points(i),
+        )
+        for i in range(robot.nv)
+    ]
+
+
+def space(vector: Any) -> Floats:
+    """Put a vector (x, z) of the plane into space."""
+    return np.array([float(vector[0]), 0.0, float(vector[1])])

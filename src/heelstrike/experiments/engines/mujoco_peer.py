@@ -1,0 +1,178 @@
+"""MuJoCo's side of a comparison: the same robot, contacts, law of control and step."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco import rollout
+from numpy.typing import NDArray
+
+from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.scenario import Scenario
+from heelstrike.robot import State
+
+Floats = NDArray[np.float64]
+
+KIND = mujoco.mjtState.mjSTATE_FULLPHYSICS
+
+
+class MuJoCoPeer(Peer):
+    """A scenario in MuJoCo, which reads the robot from its file and runs in its own `rollout`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    step : float
+        Seconds.
+    integrator : str
+        ``"euler"``, ``"implicitfast"``, ``"rk4"``, or another that it knows.
+    stiff : float or None
+        Time constant of the contacts in steps (MuJoCo wants at least 2) with the hardest impedance
+        it allows, elliptic cones and sharper friction; None for its defaults.
+    tolerance : float or None
+        Tolerance of its contact solver; None for the default.
+    """
+
+    settling = 3.0
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        step: float,
+        *,
+        integrator: str = "euler",
+        stiff: float | None = None,
+        tolerance: float | None = None,
+    ) -> None:
+        super().__init__(scenario, step)
+        spec = _spec(scenario)
+        spec.option.timestep = step
+        spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
+        if tolerance is not None:
+            spec.option.tolerance = tolerance
+            spec.option.iterations = 200
+        if stiff is not None:
+            spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+            spec.option.impratio = 10.0
+            for geom in spec.geoms:
+                geom.solref = stiff * step, 1.0
+                geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self._step = 0
+        self._make_room(self.steps)
+
+    def _make_room(self, steps: int) -> None:
+        """Make room for the states of so many steps, which `rollout` returns."""
+        self._states = np.zeros((1, steps, mujoco.mj_stateSize(self.model, KIND)))
+        self._none = np.zeros((1, steps, self.model.nsensordata))
+
+    def _packed(self, state: State) -> Floats:
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = state.q
+        self.data.qvel[:] = state.v
+        packed = np.zeros((1, mujoco.mj_stateSize(self.model, KIND)))
+        mujoco.mj_getState(self.model, self.data, packed[0], KIND)
+        return packed
+
+    def restart(self) -> None:
+        """Go back to `start`, at time 0."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = self.start.q
+        self.data.qvel[:] = self.start.v
+        self._step = 0
+
+    def advance(self, steps: int) -> None:
+        """Simulate some steps: several in one `rollout`."""
+        if steps == 1:
+            self.data.ctrl[:] = self.command(self._step)
+            mujoco.mj_step(self.model, self.data)
+        else:
+            now = np.zeros((1, self._states.shape[2]))
+            mujoco.mj_getState(self.model, self.data, now[0], KIND)
+            varying = len(self.commands) > 1
+            control = self.commands[self._step : self._step + steps] if varying else self.commands
+            if steps > self._states.shape[1]:
+                self._make_room(steps)
+            states = self._states[:, :steps]
+            rollout.rollout(
+                self.model,
+                self.data,
+                now,
+                control[None],
+                nstep=steps,
+                state=states,
+                sensordata=self._none[:, :steps],
+            )
+            mujoco.mj_setState(self.model, self.data, states[0, -1], KIND)
+        self._step += steps
+
+    def state(self) -> State:
+        """Where it is now."""
+        return State(self.data.qpos.copy(), self.data.qvel.copy())
+
+    def touching(self) -> Touching:
+        """How it touched the ground in the last step."""
+        force, total = np.zeros(6), 0.0
+        for i in range(self.data.ncon):
+            mujoco.mj_contactForce(self.model, self.data, i, force)
+            total += force[0]
+        depth = max((-contact.dist for contact in self.data.contact), default=0.0)
+        return Touching(self.data.ncon, total, depth)
+
+    def batch_work(self, starts: Sequence[State], threads: int) -> Callable[[], float]:
+        """Return what simulates from several states on threads and returns the seconds it took."""
+        states = np.concatenate([self._packed(start) for start in starts])
+        data = [mujoco.MjData(self.model) for _ in range(threads)]
+        out = np.zeros((len(starts), self.steps, states.shape[1]))
+        none = np.zeros((len(starts), self.steps, self.model.nsensordata))
+
+        def work() -> float:
+            begin = perf_counter()
+            rollout.rollout(
+                self.model,
+                data,
+                states,
+                self.commands[None],
+                nstep=self.steps,
+                state=out,
+                sensordata=none,
+                persistent_pool=True,
+            )
+            return perf_counter() - begin
+
+        return work
+
+
+def _spec(scenario: Scenario) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        file = scenario.robot.save(Path(folder) / "robot.xml")
+        spec = mujoco.MjSpec.from_file(str(file))
+    feedback, limits = scenario.feedback, scenario.robot.model
+    for i, actuator in enumerate(spec.actuators):
+        if feedback is not None:
+            actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+            actuator.biasprm[:3] = 0.0, -feedback.kp[i], -feedback.kd[i]
+        actuator.ctrllimited = 0
+        actuator.forcelimited = int(np.isfinite(limits.torque_upper[i]))
+        if actuator.forcelimited:
+            actuator.forcerange = limits.torque_lower[i], limits.torque_upper[i]
+    for geom in list(spec.geoms):
+        if not geom.contype and not geom.conaffinity:
+            spec.delete(geom)  # bones, which are only looked at
+        else:
+            geom.friction = scenario.friction, 0.0, 0.0
+    return spec
+
+
+ENGINE = Engine(
+    label="MuJoCo Euler",
+    note="in its own loop, rollout, with its controls handed over",
+    peer=MuJoCoPeer,
+)

@@ -1,0 +1,111 @@
+"""Which other engines there are, and which of them this machine can be asked to compare with."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from heelstrike.experiments.engines.peer import Engine
+
+
+@dataclass(frozen=True)
+class Package:
+    """Where an engine comes from.
+
+    Attributes
+    ----------
+    title : str
+        Its name.
+    module, distribution : str
+        What is imported, and what is installed.
+    adapter : str or None
+        Module of this package that asks it to simulate and has an `Engine` named ``ENGINE``; None
+        if there is none.
+    """
+
+    title: str
+    module: str
+    distribution: str
+    adapter: str | None
+
+
+PACKAGES = {
+    "mujoco": Package("MuJoCo", "mujoco", "mujoco", "mujoco_peer"),
+    "drake": Package("Drake", "pydrake", "drake", "drake_peer"),
+    "bullet": Package("Bullet", "pybullet", "pybullet", "bullet_peer"),
+    "dart": Package("DART", "dartpy", "dartpy", "dart_peer"),
+    "pinocchio": Package("Pinocchio", "pinocchio", "pin", "pinocchio_peer"),
+    "siconos": Package("Siconos", "siconos", "siconos", None),
+}
+PARTS_OF_STEPS = ("pinocchio",)
+"""Engines without a loop of their own: a part of a step is timed, never compared with a step."""
+
+NOT_INSTALLED = "not installed"
+
+
+def peers() -> dict[str, str]:
+    """Engines by name, each with its version or why it is not compared with."""
+    return {name: _state(package) for name, package in PACKAGES.items()}
+
+
+def _state(package: Package) -> str:
+    if importlib.util.find_spec(package.module) is None:
+        return NOT_INSTALLED
+    try:
+        found = version(package.distribution)
+    except PackageNotFoundError:
+        found = "unknown version"
+    if package.adapter is None:
+        return f"{found}, but there is no adapter for it"
+    try:
+        _adapter(package)
+    except Exception as error:  # whatever a broken installation raises
+        return f"{found}, but it cannot be loaded: {type(error).__name__}: {error}"
+    return found
+
+
+def compared(found: dict[str, str]) -> list[str]:
+    """Names of the peers that can be run.
+
+    Parameters
+    ----------
+    found : dict
+        What :func:`peers` returned.
+
+    Returns
+    -------
+    list of str
+        Their names.
+    """
+    return [
+        name
+        for name, state in found.items()
+        if PACKAGES[name].adapter and state != NOT_INSTALLED and ", but " not in state
+    ]
+
+
+def simulators(names: Sequence[str] | None = None) -> dict[str, Engine]:
+    """Load engines that simulate.
+
+    Parameters
+    ----------
+    names : sequence of str, optional
+        Names of engines that can be loaded, by default of all that can.
+
+    Returns
+    -------
+    dict
+        Engines by name, without those that have no loop of their own.
+    """
+    names = compared(peers()) if names is None else names
+    return {name: _adapter(PACKAGES[name]).ENGINE for name in names if name not in PARTS_OF_STEPS}
+
+
+def _adapter(package: Package) -> ModuleType:
+    return importlib.import_module(f"heelstrike.experiments.engines.{package.adapter}")

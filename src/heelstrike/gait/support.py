@@ -1,0 +1,207 @@
+"""The robot standing on one foot, in symbols: its whole motion from that of what it may choose.
+
+A flat foot is pinned to the ground, which turns the trunk's coordinates into functions of the
+actuated ones (paper eq. 28-35) and the contact wrench and torques into functions of the motion
+(eq. 36-37, inverse dynamics). On a point the ground exerts no moment, so the trunk's pitch stays a
+coordinate of its own next to those of the joints, and one equation of motion is left that no motor
+enters: its residual is the moment that the stance ankle would have to exert. A point foot with a
+radius rolls.
+
+Here the trunk's coordinates x, z, pitch are the first three; the first two move every point alike,
+so the systems with J_u are triangular.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.dynamics import kernels
+from heelstrike.dynamics.symbolic import TracedDynamics, traced
+from heelstrike.gait.sole import Sole, leg
+from heelstrike.robot.robot import Robot
+
+Symbols = NDArray[np.object_]
+
+
+class Support:
+    """Motion, torques and ground wrench of a robot on one foot.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot whose joints are all actuated.
+    sole : Sole
+        The stance foot; the middle of its sole, or its point of contact, is the origin.
+    position, velocity, acceleration : (n,) object arrays
+        Symbolic motion of the n = nv - `sole.held` coordinates that the foot leaves free.
+
+    Attributes
+    ----------
+    q, v : (nv,) object arrays
+        Whole position and velocity.
+    wrench : (sole.held,) object array
+        Force of the ground on the robot at the origin (x, z) and, on a flat foot, its moment about
+        +y there.
+    missing : (3 - sole.held,) object array
+        Moment (N m) missing in the equation of the trunk's pitch, on a point foot: zero in any
+        motion that the robot can make.
+    torque : (nv - 3,) object array
+        Actuator torques Γ at the joints, dampers and springs accounted for.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        sole: Sole,
+        position: Symbols,
+        velocity: Symbols,
+        acceleration: Symbols | None = None,
+    ) -> None:
+        self.robot = robot
+        self.sole = sole
+        self._dynamics = TracedDynamics(robot, _posture(robot, sole, position))
+        self._origin: Symbols = np.zeros(2, dtype=object)
+        self._origin = self.place(sole)
+        self._jacobian = self.jacobian(sole)
+        self.q = self._dynamics.q.copy()
+        # The dynamics above is evaluated with the trunk at its reference place, which keeps its
+        # coordinates out of the expressions; what is told to the outside is shifted.
+        for k in range(2):
+            self.q[k] = self.q[k] - self._origin[k] / robot.model.axis[k, k + 1]
+        self.v = pinned(self._jacobian, velocity, np.zeros(sole.held))
+        self._dynamics.v = self.v
+        traced(kernels.link_velocities)(robot.model, self.v, self._dynamics.work)
+        if acceleration is not None:
+            self._solve_forces(acceleration)
+
+    def _solve_forces(self, acceleration: Symbols) -> None:
+        dynamics, sole = self._dynamics, self.sole
+        # The centre of a disc that rolls on level ground does not accelerate by itself.
+        center = dynamics.point_position(sole.link, sole.point)
+        drift = dynamics.point_bias_acceleration(sole.link, center)[: sole.held]
+        a = pinned(self._jacobian, acceleration, -drift)
+        force = dynamics.inverse_dynamics(a) - dynamics.passive_force()
+        self.wrench, rest = reaction(self._jacobian, force)
+        self.missing, self.torque = np.split(rest, [3 - sole.held])
+
+    @property
+    def rolled(self) -> Any:
+        """How far the point of contact is ahead of where it is when the foot is not turned."""
+        return self.sole.radius * self.angle(self.sole)
+
+    def place(self, sole: Sole) -> Symbols:
+        """World position of the middle of a level sole or of the lowest point of a disc."""
+        center = self._dynamics.point_position(sole.link, sole.point)
+        bottom: Symbols = center - np.array([0.0, sole.radius]) - self._origin
+        return bottom
+
+    def jacobian(self, sole: Sole) -> Symbols:
+        """Jacobian rows (x, z and, of a flat foot, rotation) of that place, (held, nv)."""
+        place = self.place(sole) + self._origin
+        rows: Symbols = self._dynamics.point_jacobian(sole.link, place)[: sole.held]
+        return rows
+
+    def angle(self, sole: Sole) -> Any:
+        """Rotation of a foot about +y."""
+        return self._dynamics.work.angle[sole.link]
+
+    def height(self, contact: int) -> Any:
+        """Height of the lowest point of a contact disc."""
+        _, center = self._disc(contact)
+        return center[1] - self._origin[1] - self.robot.model.contact_radius[contact]
+
+    def rise(self, contact: int, v: Symbols) -> Any:
+        """Vertical velocity of a contact disc when the robot moves with velocity `v`, (nv,)."""
+        return self._dynamics.point_jacobian(*self._disc(contact))[1] @ v
+
+    def _disc(self, contact: int) -> tuple[int, Symbols]:
+        """Link of a contact disc, and its centre."""
+        model = self.robot.model
+        link = int(model.contact_link[contact])
+        return link, self._dynamics.point_position(link, model.contact_position[contact])
+
+    def mass_matrix(self) -> Symbols:
+        """Mass matrix A(q), (nv, nv)."""
+        return self._dynamics.mass_matrix()
+
+
+class Impact:
+    """The plastic impact at touchdown (paper eq. 20-22 with restitution zero).
+
+    The landing foot comes to rest, a flat one flat on the ground, while the other foot leaves
+    without an impulse. With v⁺ prescribed by "the landing foot rests", eq. 22 becomes an inverse
+    problem of the same form as that of the forces in single support: the momentum A (v⁺ − v⁻) that
+    no joint can supply is the impulse of the ground, and what is left over must vanish.
+
+    Parameters
+    ----------
+    before : Support
+        The robot on its old stance foot at the instant of touchdown, moving.
+    landing : Sole
+        The foot that lands.
+    velocity : (n,) object array
+        Velocities after the impact of the coordinates that the foot leaves free.
+
+    Attributes
+    ----------
+    v : (nv,) object array
+        Velocity of all coordinates after the impact, with the landing foot at rest.
+    impulse : (landing.held,) object array
+        Impulse of the ground on the robot where the foot lands (x, z: N s; moment about +y: N m s).
+    rest : (n,) object array
+        Impulses that the free coordinates would need besides (N m s): all zero for the velocity
+        that satisfies eq. 22.
+    """
+
+    def __init__(self, before: Support, landing: Sole, velocity: Symbols) -> None:
+        jacobian = before.jacobian(landing)
+        self.v = pinned(jacobian, velocity, np.zeros(landing.held))
+        momentum = before.mass_matrix() @ (self.v - before.v)
+        self.impulse, self.rest = reaction(jacobian, momentum)
+
+
+def foot_angle(robot: Robot, sole: Sole, q: Symbols) -> Any:
+    """Rotation about +y that the joints between trunk and foot make up."""
+    model = robot.model
+    return sum(model.axis[link, 0] * (q[link] - model.reference[link]) for link in leg(robot, sole))
+
+
+def _posture(robot: Robot, sole: Sole, position: Symbols) -> Symbols:
+    """Coordinates with the trunk at its reference place, pitched so that a flat foot is flat."""
+    model = robot.model
+    q = np.array([*model.reference[: sole.held], *position], dtype=object)
+    if sole.held == 3:
+        missing = sole.angle - foot_angle(robot, sole, q)
+        q[2] = model.reference[2] + missing / model.axis[2, 0]
+    return q
+
+
+def pinned(jacobian: Symbols, free: Symbols, target: NDArray[Any]) -> Symbols:
+    """Complete velocities (or accelerations) so that J v = target (paper eq. 32-34).
+
+    `jacobian` is (held, nv) with rows (x, z) or (x, z, rotation), `free` (nv - held,), `target`
+    (held,).
+    """
+    x, z, *turn = target - jacobian[:, len(jacobian) :] @ free
+    pitch = [missing / jacobian[2, 2] for missing in turn]
+    for angle in pitch:
+        x, z = x - jacobian[0, 2] * angle, z - jacobian[1, 2] * angle
+    return np.array([x / jacobian[0, 0], z / jacobian[1, 1], *pitch, *free], dtype=object)
+
+
+def reaction(jacobian: Symbols, force: Symbols) -> tuple[Symbols, Symbols]:
+    """Wrench F on the pinned foot with J_uᵀ F = f_u, and f_a − J_aᵀ F (paper eq. 36, 37).
+
+    J_u are the columns of the `held` coordinates of the trunk that follow from the others.
+    """
+    held = len(jacobian)
+    x, z = force[0] / jacobian[0, 0], force[1] / jacobian[1, 1]
+    moment = [
+        (turn - jacobian[0, 2] * x - jacobian[1, 2] * z) / jacobian[2, 2] for turn in force[2:held]
+    ]
+    wrench = np.array([x, z, *moment], dtype=object)
+    rest: Symbols = force[held:] - jacobian[:, held:].T @ wrench
+    return wrench, rest

@@ -1,0 +1,178 @@
+"""The frame of every simulation: one loop, in which a method supplies what differs.
+
+An instant is prepared, the controller asked, the instant decided and reported; then the simulation
+moves on to the next::
+
+    prepare   kinematics and contacts of the state now, into the memory
+    ask       the controller, if it is due
+    decide    what acts from now on: forces, contact modes, impulses
+    report    rows and events, into the record
+    move      to the next instant
+
+The loop comes back undecided, before the controller is asked, so that whatever is set meanwhile
+acts at once and a simulation can be stopped, kept and taken up again at any step.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from time import perf_counter
+from typing import Any
+
+from numba import types
+
+from heelstrike.compiler.compilation import loop_for
+from heelstrike.contact.ground import GroundModel
+from heelstrike.contact.solvers.search import try_solvers
+from heelstrike.robot.model import Model
+from heelstrike.sim.clock import Clock
+from heelstrike.sim.controller.asking import ask
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.interface import CONTROLLER_TYPE
+from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.recording import center_height, limit_torque, sound
+
+
+class Outcome(enum.IntEnum):
+    """Why a loop came back."""
+
+    DONE = 0
+    """The time it was to reach is reached, or the instant finished."""
+    PAUSED = 1
+    ASKING = 2
+    """A controller in Python is due."""
+    RECORD_FULL = 3
+    FELL = 4
+    DIVERGED = 5
+    SOLVER_FAILED = 6
+    BAD_CONTROLLER = 7
+    FORK = 8
+    """From here on the end of the simulation shapes its steps."""
+    RAISED = 9
+
+
+DONE = int(Outcome.DONE)
+PAUSED = int(Outcome.PAUSED)
+ASKING = int(Outcome.ASKING)
+RECORD_FULL = int(Outcome.RECORD_FULL)
+FELL = int(Outcome.FELL)
+DIVERGED = int(Outcome.DIVERGED)
+SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
+BAD_CONTROLLER = int(Outcome.BAD_CONTROLLER)
+FORK = int(Outcome.FORK)
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """What a method supplies to the frame; ``work`` is the bundle of the method.
+
+    Attributes
+    ----------
+    begin : kernel
+        ``begin(model, ground, memory, work, record)``: prepare the first instant; returns ``DONE``
+        or what is in the way.
+    prepare : kernel
+        ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of the
+        state in ``memory.q`` and ``memory.v``.
+    decide : kernel
+        ``decide(controller, control, model, ground, memory, work, record, clock)``: decide what
+        acts from now on; returns ``DONE`` or what is in the way.
+    report : kernel
+        ``report(controller, control, model, ground, memory, work, record, clock)``: append to the
+        record what is due of this instant.
+    move : kernel
+        ``move(controller, control, model, ground, memory, work, record, clock)``: bring state and
+        ``clock.time`` to the next instant; returns ``DONE`` or what is in the way. After
+        ``RECORD_FULL`` or ``FORK`` it is called again.
+    """
+
+    begin: Callable[..., int]
+    prepare: Callable[..., None]
+    decide: Callable[..., int]
+    report: Callable[..., None]
+    move: Callable[..., int]
+
+
+def frame(kernels: Kernels) -> Callable[..., int]:
+    """Return the loop of a method."""
+    begin, prepare, decide = kernels.begin, kernels.prepare, kernels.decide
+    report, move = kernels.report, kernels.move
+
+    def advance(
+        controller: Any,
+        control: Control,
+        model: Model,
+        ground: GroundModel,
+        memory: Memory,
+        work: Any,
+        record: Record,
+        clock: Clock,
+    ) -> int:
+        """Advance a simulation until its time is up or something stops it; return what."""
+        while True:
+            if (
+                record.rows + clock.row_margin > record.time.shape[0]
+                or record.events + clock.event_margin > record.event_time.shape[0]
+            ):
+                return RECORD_FULL
+            if clock.begun == 0:
+                code = begin(model, ground, memory, work, record)
+                if code != DONE:
+                    return code
+                clock.begun = 1
+            if clock.moving == 0:
+                if clock.finishing == 0:
+                    if clock.time >= clock.until:
+                        return DONE
+                    if clock.index >= clock.pause:
+                        return PAUSED
+                if not sound(memory):
+                    return DIVERGED
+                prepare(model, ground, memory, work)
+                due = clock.time >= clock.calls * clock.control_period
+                if clock.control_every > 0:
+                    due = clock.index % clock.control_every == 0
+                if due:
+                    if control.in_python == 0:
+                        ask(
+                            controller, control, clock.time, memory.q, memory.v, model, memory,
+                            memory.torque,
+                        )  # fmt: skip
+                    elif clock.answered == 0:
+                        return ASKING
+                    clock.answered = 0
+                    clock.calls += 1
+                    if not limit_torque(model, memory):
+                        return BAD_CONTROLLER
+                code = decide(controller, control, model, ground, memory, work, record, clock)
+                if code in (DONE, SOLVER_FAILED):
+                    report(controller, control, model, ground, memory, work, record, clock)
+                if code != DONE:
+                    return code
+                if center_height(model, ground, memory) < clock.fallen_height:
+                    return FELL
+                if clock.finishing == 1:
+                    return DONE
+                clock.moving = 1
+            code = move(controller, control, model, ground, memory, work, record, clock)
+            if code != DONE:
+                return code
+            clock.moving = 0
+            clock.index += 1
+
+    return advance
+
+
+@lru_cache
+def compiled_loop(kernels: Kernels, work: Any) -> tuple[Any, float]:
+    """Compile the loop of a method, or load it; return it with the seconds that took."""
+    begin = perf_counter()
+    kinds = (Control, Model, GroundModel, Memory, work, Record, Clock)
+    signature = types.int64(CONTROLLER_TYPE, *(kind.compiled_type() for kind in kinds))
+    try_solvers.begin()
+    compiled = loop_for(signature, frame(kernels))
+    try_solvers.finish()
+    return compiled, perf_counter() - begin

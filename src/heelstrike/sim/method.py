@@ -1,0 +1,130 @@
+"""What a way through time is: the contract that a new one fulfils.
+
+A method is a frozen dataclass of its settings. It says what it cannot do (:meth:`Method.check`),
+makes the bundle that it works with (:meth:`Method.new_work`) and names the kernels that the frame
+(:mod:`heelstrike.sim.frame`) calls at every instant. Everything else - the loop, the calls of the
+controller, pushes, the record, stopping, keeping and continuing - is the same for all.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any, ClassVar
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.contact.modes import Solver
+from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Integers
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.clock import Clock
+from heelstrike.sim.frame import Kernels
+from heelstrike.sim.record_size import check_room, check_steps
+from heelstrike.sim.setting import Setting
+
+
+class Method(ABC):
+    """A way through time: :class:`~heelstrike.TimeStepping` and its like.
+
+    A new one is a frozen dataclass with the class attributes `kernels` and `work`, and the methods
+    below that have no body here. Its numbers live in its work, where kernels read them.
+    """
+
+    kernels: ClassVar[Kernels]
+    """What it supplies to the frame."""
+
+    work: ClassVar[Any]
+    """Its own bundle: settings that kernels read, and all that it remembers."""
+
+    impulses_in_events: ClassVar[bool] = False
+    """Whether impulses of impacts are in the events of a run, not in the forces of its rows."""
+
+    python_period: ClassVar[float | None] = None
+    """Seconds between two calls of a Python controller without a period of its own; None for
+    every step."""
+
+    step_length: float | None = None
+    """Seconds from one instant to the next, if all steps are of one length."""
+
+    @property
+    @abstractmethod
+    def solves_with(self) -> str:
+        """What finds its contact forces: a solver, or the contact law."""
+
+    @abstractmethod
+    def new_work(self, robot: Robot) -> Bundle:
+        """Allocate its bundle for a robot."""
+
+    @abstractmethod
+    def room(self, robot: Robot) -> tuple[int, int]:
+        """Return how many rows and events one instant may add to the record."""
+
+    @property
+    @abstractmethod
+    def row_period(self) -> tuple[str, float]:
+        """Setting that says how often there is a row, and its value in seconds."""
+
+    def check(self, setting: Setting) -> None:  # noqa: B027 - most can do everything
+        """Refuse what this method cannot simulate.
+
+        Raises
+        ------
+        SimulationError
+            That says what, and what to do instead.
+        """
+
+    def check_span(self, setting: Setting, duration: float) -> None:
+        """Refuse a time whose steps cannot be counted, or whose record does not fit into memory.
+
+        Raises
+        ------
+        SimulationError
+            With what would fit.
+        """
+        check_steps(setting, duration, *self.row_period)
+        check_room(setting, duration, *self.row_period)
+
+    def set_clock(self, setting: Setting, clock: Clock) -> None:
+        """Say how often the controller is called, in steps of one length or in seconds."""
+        if self.step_length is None:
+            clock.control_period = setting.control_period or 0.0
+        elif setting.control_period is None:
+            clock.control_every = 1
+        else:
+            clock.control_every = whole_steps(
+                "control_period", setting.control_period, self.step_length
+            )
+
+    def instant(self, clock: Clock, time: float) -> float:
+        """Return the instant of the method that is nearest to a time."""
+        if self.step_length is None:
+            return time
+        return clock.start + round((time - clock.start) / self.step_length) * self.step_length
+
+    def rows_in(self, duration: float, record_every: int) -> int:
+        """Return about how many rows the record of a time has."""
+        return int(min(duration / (self.row_period[1] * record_every), 2.0**62)) + 2
+
+    def reason(self, work: Any) -> str:  # noqa: ARG002 - for those who know more
+        """Say why a simulation could not go on; nothing if there is no more to say."""
+        return ""
+
+
+def solver_order(name: str) -> Integers:
+    """Codes of the contact solvers in the order in which they are tried, `name` first."""
+    order = (Solver.LEMKE, Solver.FISCHER_BURMEISTER, Solver.GAUSS_SEIDEL)
+    for first in order:
+        if first.value == name:
+            rest = [solver for solver in order if solver is not first]
+            return np.array([solver.code for solver in (first, *rest)], dtype=np.int64)
+    names = ", ".join(solver.value for solver in order)
+    raise SimulationError(f"unknown contact solver {name!r}; choose one of {names}")
+
+
+def whole_steps(name: str, value: float, step: float) -> int:
+    """Return how many steps make up a time, which must be a whole number of them."""
+    steps = round(value / step)
+    if steps < 1 or abs(steps * step - value) > 1e-6 * step:
+        raise SimulationError(f"{name} = {value} s must be a whole number of steps of {step} s")
+    return steps

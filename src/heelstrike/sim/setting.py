@@ -1,0 +1,152 @@
+"""What is to be simulated, checked before anything is."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Required, TypedDict
+
+import numpy as np
+
+from heelstrike.contact.ground import Ground
+from heelstrike.dynamics.momenta import center_of_mass
+from heelstrike.errors import SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.push import Push
+from heelstrike.sim.snapshot import Snapshot
+
+if TYPE_CHECKING:
+    from heelstrike.sim.method import Method
+
+# The loops count in 64 bits.
+MOST_EVERY = 2**62
+
+# A walking robot has fallen when its centre of mass is below this fraction of its first height.
+FALL_FRACTION = 0.5
+
+
+class Setup(TypedDict, total=False):
+    """Arguments of a simulation beside robot and controller; see :class:`heelstrike.Simulation`."""
+
+    state: Required[State | Snapshot]
+    method: Method | None
+    ground: Ground | None
+    control_period: float | None
+    record_every: int
+    stop_when_fallen: bool | None
+    pushes: Sequence[Push] | Push
+    checked: bool
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What is to be simulated.
+
+    Attributes
+    ----------
+    robot : Robot
+    state : State
+        Where the robot begins.
+    ground : Ground
+    control_period : float or None
+        Seconds between two calls of the controller; None for as often as the method can.
+    record_every : int
+        Steps between two rows of the record.
+    fallen_height : float
+        Height of the centre of mass above the ground (m) below which the robot has fallen.
+    pushes : tuple of Push
+    checked : bool
+        Whether compiled controllers run in Python, every index looked at.
+    """
+
+    robot: Robot
+    state: State
+    ground: Ground
+    control_period: float | None
+    record_every: int
+    fallen_height: float
+    pushes: tuple[Push, ...]
+    checked: bool
+
+
+def checked_setting(
+    robot: Robot,
+    state: State,
+    *,
+    ground: Ground | None = None,
+    control_period: float | None = None,
+    record_every: int = 1,
+    stop_when_fallen: bool | None = None,
+    pushes: Sequence[Push] | Push = (),
+    checked: bool = False,
+) -> Setting:
+    """Check what is to be simulated.
+
+    Raises
+    ------
+    SimulationError
+        If something is not usable.
+    """
+    ground = Ground() if ground is None else ground
+    if not isinstance(ground, Ground):
+        raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
+    _check_state(robot, state)
+    if control_period is not None and not 0.0 < control_period < np.inf:
+        raise SimulationError(f"control_period must be a positive number, got {control_period}")
+    if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
+        raise SimulationError(f"record_every must be a whole number ≥ 1, got {record_every!r}")
+    if stop_when_fallen is None:
+        stop_when_fallen = robot.floating and len(robot.feet) > 1
+    fallen_height = -np.inf
+    if stop_when_fallen:
+        x, z = center_of_mass(robot, state.q)
+        fallen_height = FALL_FRACTION * (z - float(ground.height(x)))
+    return Setting(
+        robot=robot,
+        state=state,
+        ground=ground,
+        control_period=control_period,
+        record_every=int(record_every),
+        fallen_height=fallen_height,
+        pushes=checked_pushes(robot, pushes),
+        checked=checked,
+    )
+
+
+def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:
+    """Return some pushes that act on links of the robot, or refuse them."""
+    if isinstance(pushes, Push):
+        pushes = (pushes,)
+    for push in pushes:
+        if not isinstance(push, Push):
+            raise SimulationError(f"pushes must be Push(...), got {push!r}")
+        push.place(robot)
+    return tuple(pushes)
+
+
+def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, str]:
+    """Say what a snapshot is one of: a simulation that is the same in this can take it up."""
+    digest = hashlib.sha256()
+    for name, value in setting.robot.model.members().items():
+        digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
+    return {
+        "robot": f"{setting.robot.name} {digest.hexdigest()[:16]}",
+        "method": repr(method),
+        "controller": controller + (", checked" if setting.checked else ""),
+        "control_period": str(setting.control_period),
+        "record_every": str(setting.record_every),
+    }
+
+
+def _check_state(robot: Robot, state: State) -> None:
+    for name, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
+        if vector.shape != (size,):
+            raise SimulationError(
+                f"state.{name} must have {size} entries for robot {robot.name!r}, "
+                f"got shape {vector.shape}"
+            )
+        if not np.all(np.isfinite(vector)):
+            joint = robot.joint_names[int(np.flatnonzero(~np.isfinite(vector))[0])]
+            raise SimulationError(f"state.{name} of joint {joint!r} is not finite")

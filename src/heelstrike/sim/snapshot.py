@@ -1,0 +1,107 @@
+"""A simulation at one instant, exactly, to be taken up again."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.errors import SimulationError
+from heelstrike.robot.state import State
+from heelstrike.whole_file import write_whole
+
+_IDENTITY = "identity"
+_FORMAT = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Everything that the further course of a simulation hangs on.
+
+    Made by :meth:`heelstrike.Simulation.snapshot`, taken up by
+    :meth:`heelstrike.Simulation.restore` or as the `state` of a new simulation.
+
+    Attributes
+    ----------
+    arrays : dict of str to array
+        State, time, memory of the controller, contact modes and all else, by name.
+    identity : mapping of str to str
+        Robot, method and controller it was taken of; it fits no other.
+    """
+
+    arrays: dict[str, NDArray[Any]]
+    identity: Mapping[str, str]
+
+    @property
+    def time(self) -> float:
+        """When it was taken, in s."""
+        return float(self.arrays["time"])
+
+    @property
+    def state(self) -> State:
+        """Position and velocity of the robot."""
+        return State(self.arrays["memory.q"], self.arrays["memory.v"])
+
+    def part(self, name: str) -> dict[str, NDArray[Any]]:
+        """Return the arrays whose names begin so, without that beginning."""
+        begin = f"{name}."
+        return {
+            key.removeprefix(begin): value
+            for key, value in self.arrays.items()
+            if key.startswith(begin)
+        }
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write it to a file of arrays, by custom ``.npz``; nothing in it can be executed.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; an existing one is replaced. It appears whole or not at all.
+
+        Raises
+        ------
+        WriteError
+            If it cannot be written.
+        """
+        image = io.BytesIO()
+        identity = json.dumps({"format": _FORMAT, **self.identity})
+        np.savez(image, allow_pickle=False, **{_IDENTITY: np.array(identity), **self.arrays})
+        return write_whole(path, image.getbuffer())
+
+
+def load_snapshot(path: str | os.PathLike[str]) -> Snapshot:
+    """Read a snapshot that was saved with :meth:`Snapshot.save`.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+
+    Raises
+    ------
+    SimulationError
+        If there is no such file, or it is none of a simulation, or damaged.
+    """
+    try:
+        with np.load(Path(path), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        identity = json.loads(str(arrays.pop(_IDENTITY)))
+        layout = identity.pop("format")
+    except OSError as error:
+        raise SimulationError(f"{path}: cannot be read ({error.strerror or error})") from error
+    except (ValueError, KeyError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+        raise SimulationError(f"{path}: not a snapshot of a simulation, or damaged") from error
+    if layout != _FORMAT:
+        raise SimulationError(
+            f"{path}: written in layout {layout}, this version of heelstrike reads {_FORMAT}"
+        )
+    return Snapshot(arrays, identity)
