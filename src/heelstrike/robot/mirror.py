@@ -70,22 +70,20 @@ class Mirror:
         offset: Floats = self.reference - self.sign * self.reference[self.joint]
         return offset
 
-    def position(self, q: Any, reference: Floats | None = None) -> Any:
+    def position(self, q: Any) -> Any:
         """Mirror positions.
 
         Parameters
         ----------
         q : (..., nq) array
             Positions, in m and rad.
-        reference : (nq,) float, optional
-            Another reference than the robot's.
 
         Returns
         -------
         (..., nq) array
             Those of the mirror image.
         """
-        about = self.reference if reference is None else reference
+        about = self.reference
         return self.sign * (self._exchanged(q) - about[self.joint]) + about
 
     def velocity(self, v: Any) -> Any:
