@@ -23,38 +23,20 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.solvers.search import contact_workspace
-from heelstrike.contact.workspace import SHORTCUTS
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.dynamics import bias_force, mass_matrix, point_jacobian
 
 BATCHES = 20
 
 
 @kernel
-def solve_many(
-    repeats: int,
-    count: int,
-    delassus: Any,
-    free: Any,
-    friction: Any,
-    order: Any,
-    first: Any,
-    mode: Any,
-    impulse: Any,
-    velocity: Any,
-    residual: Any,
-    work: Any,
-) -> int:
+def solve_many(repeats: int, problem: Any, order: Any, first: Any, work: Any, answer: Any) -> int:
     """Solve one problem ``repeats`` times from the same first modes; return the failures."""
     failures = 0
     for _ in range(repeats):
-        for i in range(count):
-            mode[i] = first[i]
-        failures += (
-            solve_contact_kernel(
-                count, delassus, free, friction, order, mode, impulse, velocity, residual, work
-            )
-            != 0
-        )
+        for i in range(problem.count):
+            answer.mode[i] = first[i]
+        failures += solve_contact_kernel(problem, order, work, answer) != 0
     return failures
 
 
@@ -93,8 +75,7 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
     count = problems[0][1].size // 2
     friction = np.full(count, 0.75)
     work = contact_workspace(count)
-    impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
-    mode = np.zeros(count, np.int64)
+    answer = ContactAnswer.allocate(nc=count)
     cold = np.full(count, OPEN, np.int64)
     figures: dict[str, dict[str, float]] = {}
     for name in ("lemke", "fischer_burmeister", "gauss_seidel", "warm"):
@@ -102,18 +83,20 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
         times = []
         shortcuts = 0
         for delassus, free in problems:
-            arguments = (count, delassus, free, friction, order)
-            solve_contact_kernel(*arguments, mode, impulse, velocity, residual, work)
-            first = mode.copy() if name == "warm" else cold
-            rest = (first, mode, impulse, velocity, residual, work)
-            if solve_many(1, *arguments, *rest) != 0:
-                raise RuntimeError(f"{name} failed on a standing problem: {residual}")
-            work.counters[SHORTCUTS] = 0
-            solve_many(repeats, *arguments, *rest)
-            shortcuts += int(work.counters[SHORTCUTS])
+            problem = ContactProblem.allocate(
+                nc=count, count=count, delassus=delassus, free=free, friction=friction
+            )
+            solve_contact_kernel(problem, order, work, answer)
+            first = answer.mode.copy() if name == "warm" else cold
+            rest = (problem, order, first, work, answer)
+            if solve_many(1, *rest) != 0:
+                raise RuntimeError(f"{name} failed on a standing problem: {answer.residual}")
+            work.tally.shortcuts = 0
+            solve_many(repeats, *rest)
+            shortcuts += work.tally.shortcuts
 
-            def batch(arguments: Any = arguments, rest: Any = rest) -> float:
-                return timed(solve_many, repeats, *arguments, *rest)[1]
+            def batch(rest: Any = rest) -> float:
+                return timed(solve_many, repeats, *rest)[1]
 
             times.append(best_of({"": batch}, seconds=0.0, least=BATCHES)[""] / repeats * 1e6)
         figures[name] = {

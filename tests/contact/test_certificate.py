@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 from heelstrike.contact import SolveStatus, solve_contact, solve_lcp
 from heelstrike.contact.certificate import certify, velocity_error
 from heelstrike.contact.solvers.search import contact_workspace
-from heelstrike.contact.workspace import FLOOR, ROUNDING, SETTINGS, SKEWED, SLOPE
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 
 SOLVERS = ["lemke", "fischer_burmeister", "gauss_seidel"]
 BLOCK = 0.5 * np.eye(2)
@@ -50,14 +50,14 @@ def verdict(
     G, b, x = (np.array(values, dtype=float) for values in (delassus, free, impulse))
     mu = np.array(friction, dtype=float)
     work = contact_workspace(mu.size)
-    work.vectors[SLOPE, : mu.size] = slope
-    work.vectors[SETTINGS, FLOOR] = floor
-    work.vectors[SETTINGS, SKEWED] = float(skewed)
-    velocity, found = np.zeros(b.size), np.zeros(3)
-    worst = certify(mu.size, G, b, mu, x, velocity, found, work)
-    error = velocity_error(worst, mu, work)
-    rounding = work.vectors[SETTINGS, ROUNDING]
-    return Verdict(*found, worst, rounding, velocity, error)
+    work.yardstick.slope[: mu.size] = slope
+    work.settings.floor = floor
+    work.settings.skewed = skewed
+    problem = ContactProblem.allocate(nc=mu.size, count=mu.size, delassus=G, free=b, friction=mu)
+    answer = ContactAnswer.allocate(nc=mu.size, impulse=x)
+    worst = certify(problem, work.settings, work.yardstick, answer)
+    error = velocity_error(worst, mu, work.yardstick)
+    return Verdict(*answer.residual, worst, work.yardstick.rounding, answer.velocity, error)
 
 
 class TestWrongAnswers:

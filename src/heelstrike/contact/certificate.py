@@ -23,20 +23,17 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
+from heelstrike.contact.sets import LINE, opening, room
 from heelstrike.contact.workspace import (
-    EFFORT,
-    FLOOR,
-    REST,
-    REST_TOLERANCE,
-    ROOT,
-    ROUNDING,
-    SETTINGS,
-    SKEWED,
-    SLOPE,
-    UNIT,
-    ContactWorkspace,
+    ContactAnswer,
+    ContactProblem,
     Floats,
+    Settings,
+    Yardstick,
 )
+
+REST_TOLERANCE = 1e-10
+"""Velocities below this, relative to the data and to what cancels in them, count as zero."""
 
 VISIBLE = 1e-12
 """Rounding of more than this, relative, is not left in the velocities."""
@@ -114,35 +111,30 @@ class Certificate:
 
 @kernel
 def certify(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    impulse: Floats,
-    velocity: Floats,
-    residual: Floats,
-    work: ContactWorkspace,
+    problem: ContactProblem, settings: Settings, yardstick: Yardstick, answer: ContactAnswer
 ) -> float:
     """Compute the velocity an impulse gives and the residuals; return the largest of them.
 
     The residuals are complementarity, cone and non-penetration, scaled as in :class:`Certificate`;
-    what is returned includes rounding. ``SLOPE`` is not zero where a contact is prescribed to
-    slide; its friction then lies on the given edge and its tangential velocity is not constrained.
+    what is returned includes rounding. ``yardstick.slope`` is not zero where a contact is
+    prescribed to slide; its friction then lies on the given edge and its tangential velocity is not
+    constrained.
 
-    Writes ``velocity``, ``residual``, and in the workspace ``ROOT`` of every row, ``ROUNDING``,
-    ``EFFORT``, ``UNIT`` and ``REST``.
+    Writes ``velocity`` and ``residual`` of the answer, and the rest of the yardstick.
     """
-    settings, root, slope = work.vectors[SETTINGS], work.vectors[ROOT], work.vectors[SLOPE]
-    unit = weigh(count, delassus, free, impulse, work)
-    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + settings[EFFORT])
+    count = problem.count
+    impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
+    root, slope = yardstick.root, yardstick.slope
+    weigh(problem, settings, impulse, yardstick)
+    unit = yardstick.unit
+    rounding = (2.0 * count + 2.0) * UNIT_ROUNDOFF * (1.0 + yardstick.effort)
     sharply = rounding > VISIBLE
     if not sharply:
-        sum_velocities(count, delassus, free, impulse, velocity)
+        sum_velocities(problem, impulse, velocity)
     else:
-        rounding = sum_velocities_sharply(count, delassus, free, impulse, velocity, unit, work)
-    settings[ROUNDING] = rounding
-    settings[UNIT] = unit
-    settings[REST] = REST_TOLERANCE * unit * (1.0 + settings[EFFORT])
+        rounding = sum_velocities_sharply(problem, impulse, yardstick, velocity)
+    yardstick.rounding = rounding
+    yardstick.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
 
     complementarity = 0.0
@@ -154,9 +146,9 @@ def certify(
         tangent = normal + 1
         normal_impulse = impulse[normal]
         tangent_impulse = impulse[tangent]
-        limit = friction[contact] * normal_impulse
-        beyond = product_error(friction[contact], normal_impulse, limit) if sharply else 0.0
-        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (limit + beyond)
+        # What friction lacks to either edge.
+        upper, lower = room(problem, contact, normal_impulse, tangent_impulse, sharply)
+        nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (upper + lower)
 
         speed = relative_speed(velocity[normal], root[normal], inverse)
         force_scale = root[normal] * inverse
@@ -165,18 +157,20 @@ def certify(
         else:  # it moves nothing
             force = 1.0 if normal_impulse > 0.0 else (-1.0 if normal_impulse < 0.0 else 0.0)
         non_penetration = max(non_penetration, -speed)
-        cone = max(cone, -force)
-        complementarity = max(complementarity, min(speed, force))
+        if problem.set[contact] == LINE:
+            non_penetration = max(non_penetration, speed)
+        else:
+            cone = max(cone, -force)
+            complementarity = max(complementarity, min(speed, force))
 
+        friction = opening(problem, contact)
         if root[tangent] > 0.0:
             force_scale = root[tangent] * inverse
-        elif friction[contact] > 0.0 and force_scale > 0.0:
-            force_scale /= friction[contact]
+        elif friction > 0.0 and force_scale > 0.0:
+            force_scale /= friction
         else:
-            both = abs(limit) + abs(tangent_impulse)
+            both = abs(friction * normal_impulse) + abs(tangent_impulse)
             force_scale = 1.0 / both if both > 0.0 else 0.0
-        upper = (limit - tangent_impulse) + beyond  # what friction lacks to either edge
-        lower = (limit + tangent_impulse) + beyond
         if slope[contact] != 0.0:
             cone = max(cone, abs(upper if slope[contact] > 0.0 else lower) * force_scale)
             continue
@@ -185,7 +179,7 @@ def certify(
         complementarity = max(complementarity, min(speed, lower * force_scale))
         complementarity = max(complementarity, min(-speed, upper * force_scale))
     # Impulses without any cause in the data count as much as numbers that are none.
-    if nothing != 0.0 or not settings[EFFORT] + rounding < math.inf:
+    if nothing != 0.0 or not yardstick.effort + rounding < math.inf:
         non_penetration = math.inf
     residual[0] = complementarity
     residual[1] = cone
@@ -195,24 +189,25 @@ def certify(
 
 @kernel
 def weigh(
-    count: int, delassus: Floats, free: Floats, impulse: Floats, work: ContactWorkspace
-) -> float:
-    """Return the size of the data, beta; write the weights of the rows and the effort."""
-    settings, root = work.vectors[SETTINGS], work.vectors[ROOT]
-    unit = settings[FLOOR]
+    problem: ContactProblem, settings: Settings, impulse: Floats, yardstick: Yardstick
+) -> None:
+    """Write the weights of the rows, the size of the data, beta, and the effort."""
+    delassus, root = problem.delassus, yardstick.root
+    unit = settings.floor
+    skewed = settings.skewed != 0
     effort = 0.0
-    for i in range(2 * count):
+    for i in range(2 * problem.count):
         weight = delassus[i, i]
-        if settings[SKEWED] != 0.0:
-            weight = general_weight(2 * count, i, delassus)
+        if skewed:
+            weight = general_weight(2 * problem.count, i, delassus)
         root[i] = math.sqrt(weight) if weight > 0.0 else 0.0
         if weight > 0.0:
-            unit = max(unit, abs(free[i]) / root[i])
+            unit = max(unit, abs(problem.free[i]) / root[i])
         effort += root[i] * abs(impulse[i])
     if effort > 0.0:
         effort = effort / unit if unit > 0.0 else math.inf
-    settings[EFFORT] = effort
-    return unit
+    yardstick.effort = effort
+    yardstick.unit = unit
 
 
 @kernel
@@ -239,10 +234,9 @@ def relative_speed(velocity: float, root: float, inverse: float) -> float:
 
 
 @kernel
-def sum_velocities(
-    count: int, delassus: Floats, free: Floats, impulse: Floats, velocity: Floats
-) -> None:
+def sum_velocities(problem: ContactProblem, impulse: Floats, velocity: Floats) -> None:
     """Write ``velocity = G impulse + free``."""
+    count, delassus, free = problem.count, problem.delassus, problem.free
     for i in range(2 * count):
         # Friction is summed apart from the normal impulses: the sums run side by side.
         by_normal = free[i]
@@ -255,20 +249,15 @@ def sum_velocities(
 
 @kernel
 def sum_velocities_sharply(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    impulse: Floats,
-    velocity: Floats,
-    unit: float,
-    work: ContactWorkspace,
+    problem: ContactProblem, impulse: Floats, yardstick: Yardstick, velocity: Floats
 ) -> float:
     """Write ``velocity = G impulse + free`` in twice the precision; return what rounding is left.
 
-    What is left is relative to the data's velocities. ``EFFORT`` becomes the largest sum of
-    magnitudes of any row, in the same unit.
+    What is left is relative to the data's velocities. ``yardstick.effort`` becomes the
+    largest sum of magnitudes of any row, in the same unit.
     """
-    settings, root = work.vectors[SETTINGS], work.vectors[ROOT]
+    count, delassus, free = problem.count, problem.delassus, problem.free
+    root, unit = yardstick.root, yardstick.unit
     terms = 2.0 * count + 1.0
     effort = 0.0
     rounding = 0.0
@@ -294,12 +283,12 @@ def sum_velocities_sharply(
             rounding = max(rounding, left / size)
         elif not magnitude < math.inf:
             rounding = math.inf
-    if settings[EFFORT] < math.inf:
-        settings[EFFORT] = effort
+    if yardstick.effort < math.inf:
+        yardstick.effort = effort
     return rounding
 
 
-def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Floats:
+def velocity_error(worst: float, friction: Floats, yardstick: Yardstick) -> Floats:
     """How far the velocities just certified may be from a solution's; see :class:`Certificate`.
 
     To make the answer exact, let every residual vanish. Velocities that are no larger than the
@@ -314,7 +303,7 @@ def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Fl
         Largest residual, rounding included.
     friction : (nc,) float
         Friction coefficients.
-    work : ContactWorkspace
+    yardstick : Yardstick
         As :func:`certify` left it.
 
     Returns
@@ -322,11 +311,11 @@ def velocity_error(worst: float, friction: Floats, work: ContactWorkspace) -> Fl
     (nc, 2) float
         In the unit of the free velocity.
     """
-    root = work.vectors[ROOT, : 2 * friction.size]
+    root = yardstick.root[: 2 * friction.size]
     lever = np.zeros(friction.size)
     np.divide(friction * root[1::2], root[::2], out=lever, where=root[::2] > 0.0)
     if not worst < 1.0:
         return np.full((friction.size, 2), math.inf)
     moved = worst * (1.0 + np.sum(2.0 + lever))
-    bound: Floats = (moved * work.vectors[SETTINGS, UNIT] * root).reshape(friction.size, 2)
+    bound: Floats = (moved * yardstick.unit * root).reshape(friction.size, 2)
     return bound

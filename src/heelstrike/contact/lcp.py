@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.modes import OPEN, Solver
-from heelstrike.contact.problem import check_accuracy, run_solvers, solver_order
+from heelstrike.contact.problem import check_accuracy, check_finite, run_solvers, solver_order
 from heelstrike.contact.workspace import Floats
 from heelstrike.errors import ContactProblemError
 
@@ -94,12 +94,7 @@ def solve_lcp(
             f"M has shape {matrix.shape} and q has shape {constant.shape}; they must be (n, n) "
             "and (n,)"
         )
-    for name, values in (("M", matrix), ("q", constant)):
-        if not np.all(np.isfinite(values)):
-            where = np.argwhere(~np.isfinite(values))[0]
-            raise ContactProblemError(
-                f"{name}{where.tolist()} is {values[tuple(where)]}; all entries must be finite"
-            )
+    check_finite(M=matrix, q=constant)
     count = constant.size
     delassus = np.zeros((2 * count, 2 * count))
     delassus[::2, ::2] = matrix

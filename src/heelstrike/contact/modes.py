@@ -7,24 +7,11 @@ from __future__ import annotations
 
 import enum
 
-OPEN = 0
-STICK = 1
-SLIP_FORWARD = 2
-SLIP_BACKWARD = 3
-SLIDING_FORWARD = 4
-SLIDING_BACKWARD = 5
+OPEN, STICK, SLIP_FORWARD, SLIP_BACKWARD, SLIDING_FORWARD, SLIDING_BACKWARD = range(6)
 
-LEMKE = 0
-FISCHER_BURMEISTER = 1
-GAUSS_SEIDEL = 2
-WARM_START = 3
-COMBINATIONS = 4
+LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL, WARM_START, COMBINATIONS = range(5)
 
-SOLVED = 0
-RAY = 1
-ITERATION_LIMIT = 2
-UNCERTIFIED = 3
-UNDECIDABLE = 4
+SOLVED, RAY, ITERATION_LIMIT, UNCERTIFIED, UNDECIDABLE = range(5)
 
 
 class ContactMode(enum.IntEnum):
@@ -49,6 +36,8 @@ class ContactMode(enum.IntEnum):
 class Solver(enum.Enum):
     """The ways to solve a contact problem; the values are the names that options accept.
 
+    Kernels know them by their places in this list.
+
     The last two cannot be asked for: ``WARM_START`` stands for modes that were guessed right, and
     ``COMBINATIONS`` is the last resort after the others.
     """
@@ -62,7 +51,7 @@ class Solver(enum.Enum):
     @property
     def code(self) -> int:
         """Return the integer by which kernels know this solver."""
-        return _SOLVER_CODES[self]
+        return list(Solver).index(self)
 
     @classmethod
     def from_code(cls, code: int) -> Solver:
@@ -78,17 +67,7 @@ class Solver(enum.Enum):
         Solver
             The solver.
         """
-        return _SOLVERS_BY_CODE[int(code)]
-
-
-_SOLVER_CODES = {
-    Solver.LEMKE: LEMKE,
-    Solver.FISCHER_BURMEISTER: FISCHER_BURMEISTER,
-    Solver.GAUSS_SEIDEL: GAUSS_SEIDEL,
-    Solver.WARM_START: WARM_START,
-    Solver.COMBINATIONS: COMBINATIONS,
-}
-_SOLVERS_BY_CODE = {code: solver for solver, code in _SOLVER_CODES.items()}
+        return list(cls)[int(code)]
 
 
 class SolveStatus(enum.IntEnum):

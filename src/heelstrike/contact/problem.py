@@ -7,6 +7,7 @@ impulse with ``w = G lambda + b`` and, at every contact, ``0 <= w_n _|_ lambda_n
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,19 +18,10 @@ from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
 from heelstrike.contact.solvers.repetition import repeat
-from heelstrike.contact.solvers.search import CLEAN, contact_workspace
+from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import (
-    FLOOR,
-    ITERATIONS,
-    LAST_FALLBACKS,
-    ROUNDING,
-    SETTINGS,
-    SHORTCUTS,
-    SKEWED,
-    SLOPE,
-    SOLVES,
-    SUCCEEDED,
-    TOLERANCE,
+    ContactAnswer,
+    ContactProblem,
     ContactWorkspace,
     Floats,
     Integers,
@@ -39,66 +31,38 @@ from heelstrike.errors import ContactProblemError
 
 @kernel
 def solve_contact_kernel(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    order: Integers,
-    mode: Integers,
-    impulse: Floats,
-    velocity: Floats,
-    residual: Floats,
-    work: ContactWorkspace,
+    problem: ContactProblem, order: Integers, work: ContactWorkspace, answer: ContactAnswer
 ) -> int:
     """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
 
-    The modes in ``mode`` are tried first. Unless their certificate is clean, the solvers in
+    The modes of the answer are tried first. Unless their certificate is clean, the solvers in
     ``order`` are called in turn until one is certified and clean; an answer that is certified
     but not clean stands if those after it do no better, and does not count as a fallback.
 
     Parameters
     ----------
-    count : int
-        Number of contacts; the leading blocks of the arrays are used.
-    delassus : (2 count, 2 count) float64
-        Delassus matrix, symmetric, components ordered n0 t0 n1 t1 ...
-    free : (2 count,) float64
-        Free velocity (or acceleration), the free term b.
-    friction : (count,) float64
-        Friction coefficient of each contact; zero for a joint stop.
+    problem : ContactProblem
     order : (any,) int64
         Solver codes to try in turn (:class:`~heelstrike.contact.modes.Solver`).
-    mode : (count,) int64
-        In: guessed modes (``SLIDING_FORWARD`` and ``SLIDING_BACKWARD`` are prescriptions, not
-        guesses). Out: the modes found, told by the velocity; a contact prescribed to slide keeps
-        its mode or becomes ``OPEN``.
-    impulse, velocity : (2 count,) float64
-        Out: the solution, or after a failure the candidate with the smallest residuals; always
-        finite if the data are.
-    residual : (3,) float64
-        Out: complementarity, cone and non-penetration, relative (see ``Certificate``).
     work : ContactWorkspace
-        Buffers; ``counters`` is updated, row ``SETTINGS`` of ``vectors`` is read.
+        Buffers; ``tally`` is updated, ``settings`` are read.
+    answer : ContactAnswer
+        In: guessed modes (``SLIDING_FORWARD`` and ``SLIDING_BACKWARD`` are prescriptions, not
+        guesses). Out: the solution, or after a failure the candidate with the smallest residuals,
+        always finite if the data are; modes are told by the velocity, and a contact prescribed to
+        slide keeps its mode or becomes ``OPEN``.
     """
-    counters, vectors = work.counters, work.vectors
-    counters[SOLVES] += 1
-    counters[ITERATIONS] = 0
-    counters[LAST_FALLBACKS] = 0
-    counters[SUCCEEDED] = WARM_START
-    clean = min(vectors[SETTINGS, TOLERANCE], CLEAN)
-    for contact in range(count):
-        vectors[SLOPE, contact] = 0.0
-    if vectors[SETTINGS, SKEWED] == 0.0 and repeat(
-        count, delassus, free, friction, mode, impulse, velocity, residual, clean, work
-    ):
-        counters[SHORTCUTS] += 1
+    tally, settings, yardstick = work.tally, work.settings, work.yardstick
+    tally.solves += 1
+    tally.iterations = 0
+    tally.last_fallbacks = 0
+    tally.solver = WARM_START
+    for contact in range(problem.count):
+        yardstick.slope[contact] = 0.0
+    if settings.skewed == 0 and repeat(problem, settings, work.sticking, yardstick, answer):
+        tally.shortcuts += 1
         return SOLVED
-    return int(
-        call_at(
-            work.solvers[0],
-            (count, delassus, free, friction, order, mode, impulse, velocity, residual, work),
-        )
-    )
+    return int(call_at(work.solvers[0], (problem, order, work, answer)))
 
 
 @dataclass(frozen=True)
@@ -123,6 +87,11 @@ class ContactSolution:
     mode: tuple[ContactMode, ...]
     certificate: Certificate
 
+
+KEPT_CONTACTS = 16
+"""Problems of up to so many contacts are solved in memory that is kept."""
+
+_kept = threading.local()
 
 DEFAULT_ORDER = (Solver.LEMKE, Solver.FISCHER_BURMEISTER, Solver.GAUSS_SEIDEL)
 """The order in which solvers are tried; a chosen solver moves to the front."""
@@ -243,19 +212,19 @@ def run_solvers(
     count = friction.size
     matrix, matrix_shift = _near_one(delassus, even=True)
     offset, offset_shift = _near_one(free)
-    work = contact_workspace(count)
-    work.vectors[SETTINGS, TOLERANCE] = tolerance
-    work.vectors[SETTINGS, FLOOR] = np.ldexp(floor, offset_shift - matrix_shift // 2)
-    work.vectors[SETTINGS, SKEWED] = 0.0 if semidefinite else 1.0
-    impulse, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
-    status = SolveStatus(
-        solve_contact_kernel(
-            count, matrix, offset, friction, order, mode, impulse, velocity, residual, work
-        )
+    work = _memory(count)
+    work.settings.tolerance = tolerance
+    work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
+    work.settings.skewed = 0 if semidefinite else 1
+    problem = ContactProblem.allocate(
+        nc=count, count=count, delassus=matrix, free=offset, friction=friction
     )
+    answer = ContactAnswer.allocate(nc=count, mode=mode)
+    status = SolveStatus(solve_contact_kernel(problem, order, work, answer))
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.
-    worst = certify(count, matrix, offset, friction, impulse, velocity, residual, work)
-    error = velocity_error(worst, friction, work)
+    worst = certify(problem, work.settings, work.yardstick, answer)
+    error = velocity_error(worst, friction, work.yardstick)
+    impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
     with np.errstate(over="ignore"):
         impulse = np.ldexp(impulse, matrix_shift - offset_shift)
         velocity = np.ldexp(velocity, -offset_shift)
@@ -266,17 +235,27 @@ def run_solvers(
         status = SolveStatus.UNDECIDABLE
     certificate = Certificate(
         status=status,
-        solver=Solver.from_code(work.counters[SUCCEEDED]),
-        iterations=int(work.counters[ITERATIONS]),
-        fallbacks=int(work.counters[LAST_FALLBACKS]),
+        solver=Solver.from_code(work.tally.solver),
+        iterations=work.tally.iterations,
+        fallbacks=work.tally.last_fallbacks,
         complementarity=float(residual[0]),
         cone=float(residual[1]),
         non_penetration=float(residual[2]),
-        rounding=float(work.vectors[SETTINGS, ROUNDING]),
+        rounding=work.yardstick.rounding,
         tolerance=float(tolerance),
         velocity_error=error,
     )
     return impulse, velocity, certificate
+
+
+def _memory(count: int) -> ContactWorkspace:
+    """Return memory to solve in; that of few contacts is kept, one for each thread."""
+    if count > KEPT_CONTACTS:
+        return contact_workspace(count)
+    if not hasattr(_kept, "memory"):
+        _kept.memory = contact_workspace(KEPT_CONTACTS)
+    memory: ContactWorkspace = _kept.memory
+    return memory
 
 
 def _near_one(values: Floats, *, even: bool = False) -> tuple[Floats, int]:
@@ -309,6 +288,21 @@ def check_accuracy(tolerance: float, floor: float) -> None:
         raise ContactProblemError(f"tolerance must be between 0 and 1; got {tolerance}")
     if not 0.0 <= floor < np.inf:
         raise ContactProblemError(f"floor must be a number ≥ 0; got {floor}")
+
+
+def check_finite(**arrays: Floats) -> None:
+    """Refuse infinite entries and such that are no numbers.
+
+    Raises
+    ------
+    ContactProblemError
+        With the name of the array and the place of the entry.
+    """
+    for name, values in arrays.items():
+        for where in np.argwhere(~np.isfinite(values)):
+            raise ContactProblemError(
+                f"{name}{where.tolist()} is {values[tuple(where)]}; all entries must be finite"
+            )
 
 
 def _solver(solver: str | Solver) -> Solver:
@@ -350,12 +344,7 @@ def _checked(
             f"friction has shape {coefficient.shape}; give one number, or one for each of the "
             f"{count} contacts"
         )
-    for name, values in (("delassus", matrix), ("free", offset), ("friction", coefficient)):
-        if not np.all(np.isfinite(values)):
-            where = np.argwhere(~np.isfinite(values))[0]
-            raise ContactProblemError(
-                f"{name}{where.tolist()} is {values[tuple(where)]}; all entries must be finite"
-            )
+    check_finite(delassus=matrix, free=offset, friction=coefficient)
     if np.any(coefficient < 0.0):
         contact = int(np.argmin(coefficient))
         raise ContactProblemError(
@@ -377,4 +366,4 @@ def _checked(
             f"delassus is not symmetric: entry [{row}, {column}] is {matrix[row, column]}, but "
             f"[{column}, {row}] is {matrix[column, row]}"
         )
-    return matrix, offset, coefficient
+    return matrix.reshape(2 * count, 2 * count), offset, coefficient

@@ -1,134 +1,344 @@
-"""The memory of the contact solvers, allocated once and reused by every solve."""
+"""The contact problem, its answer, and the memory of the solvers, reused by every solve.
+
+Rows of a problem go contact by contact, normal before tangent: n0 t0 n1 t1 ... Of these the solvers
+make *unknowns*, the rows that can carry an impulse, scaled; and for given modes *equations*, the
+unknowns whose velocity vanishes.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array
-from heelstrike.contact.solvers.elimination import LARGEST, elimination_programs
+from heelstrike.compiler.bundle import Bundle, array, cell, part
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# Places in ``ContactWorkspace.counters``. The first three describe the last solve, the others
-# accumulate over all solves until the caller clears them.
-ITERATIONS = 0
-SUCCEEDED = 1
-LAST_FALLBACKS = 2
-SOLVES = 3
-FALLBACKS = 4
-FAILURES = 5
-SHORTCUTS = 6
-COUNTERS = 8
 
-# Places in row ``SETTINGS`` of ``ContactWorkspace.vectors``.
-TOLERANCE = 0
-SKEWED = 1
-FLOOR = 2
-ROUNDING = 3  # written by the certificate: what rounding may hide from it
-EFFORT = 4  # written by the certificate: the velocities that cancel, in units of the data's
-UNIT = 5  # written by the certificate: the size of the data
-REST = 6  # written by the certificate: velocities below this times ``ROOT`` count as zero
-
-# Rows of ``ContactWorkspace.labels``, by what they are indexed with.
-NORMAL = 0  # contact: its normal unknown
-TANGENT = 1  # contact: its tangential unknown, -1 for none
-PRESCRIBED = 2  # contact: the mode the caller prescribes, OPEN for none
-TRIAL_MODE = 3  # contact: the mode under trial
-SOURCE = 4  # unknown: its row in the original data
-EQUATION = 5  # equation of the trial: the unknown it belongs to
-PIVOT_ROW = 6  # equation: the tableau row that holds its unknown, -1 for none
-ROW_LABEL = 7  # tableau row: the variable it holds
-COLUMN_LABEL = 8  # tableau column: the variable it holds
-PLACE = 9  # variable: its row, or minus its column
-ORDER = 10  # place in the elimination: the equation that has it
-SPAN = 11  # the same: how many columns its row of the factor has
-BASE_MODE = 12  # contact: the mode in the combination that is varied
-LABELS = 13
-
-# Rows of ``ContactWorkspace.vectors``, by what they are indexed with.
-CONE = 0  # contact: friction coefficient of the scaled problem
-SLOPE = 1  # contact: tangential over normal impulse where sliding is prescribed, else zero
-SCALE = 2  # unknown: impulse per unit of it
-OFFSET = 3  # unknown: scaled free velocity
-LEAN = 4  # equation: tangential over normal impulse at a slipping contact, else zero
-WEIGHT = 5  # equation: length of the impulse per unit of its unknown
-POINT = 6  # equation: its unknown, in units of impulse
-IMPULSE = 7  # row of the data: the impulse under trial
-VELOCITY = 8  # row of the data: the velocity it gives
-RESIDUAL = 9  # the three residuals of the trial
-ITERATE = 10  # unknown: iterate of an iterative solver
-STEP = 11  # unknown or equation: a correction
-SPEED = 12  # unknown or equation: scaled velocity
-EQUATIONS = 13  # unknown: what the iterate leaves of the equations
-PROGRESS = 14  # an iterative solver's own numbers
-ROOT = 15  # row of the data: root of its diagonal, velocity per unit of scaled impulse
-SETTINGS = 16  # TOLERANCE and SKEWED, which the caller may choose, and what goes with them
-SHARERS = 17  # equation: how many rows share it
-BEFORE = 18  # equation: its unknown before the last refinement
-VECTORS = 19
-
-REST_TOLERANCE = 1e-10
-"""Velocities below this, relative to the data and to what cancels in them, count as zero."""
-
-# Matrices of ``ContactWorkspace.squares``.
-MATRIX = 0  # the scaled problem
-BASIS = 1  # free directions of the equations, one a row
-EDGES = 2  # cone edges in terms of the basis; velocities that the basis causes
-DUAL = 3  # dictionary of the least-norm split
-SQUARES = 4
-
-
-class ContactWorkspace(Bundle):
-    """Buffers of the contact kernels for up to ``capacity`` contacts (d = 2).
+class ContactProblem(Bundle):
+    """A contact problem of up to nc contacts.
 
     Attributes
     ----------
-    counters : (8,) int64
-        ``ITERATIONS``, ``SUCCEEDED`` (solver code) and ``LAST_FALLBACKS`` of the last solve;
-        ``SOLVES``, ``FALLBACKS``, ``FAILURES`` and ``SHORTCUTS`` (solves answered by the
-        warm-started modes) accumulated over all solves. The names are module constants.
-    labels, vectors, squares : int64, float64, float64
-        Lists and matrices of the solvers; the module's constants name them. Row ``SETTINGS`` of
-        ``vectors`` is the caller's: ``TOLERANCE`` is the largest residual that is certified,
-        1e-9 unless changed; ``SKEWED`` is not zero if the matrix may be asymmetric, as in a
-        general complementarity problem; ``FLOOR`` is the smallest size of the data that
-        residuals are set against, zero unless changed.
-    tableau : float64
-        The dictionary that is pivoted.
-    solvers : (1,) int64
-        Address of the machine code that tries the solvers in turn, shared by all workspaces.
-    eliminations : (any,) int64
-        Addresses of the programs that solve small systems, by size; zero where there is none.
-    lower_half : float64
-        The matrix of a small system.
+    count : int
+        Number of contacts; the leading blocks of the arrays are used.
+    delassus : (2 nc, 2 nc) float
+        Delassus matrix, symmetric.
+    free : (2 nc,) float
+        Free velocity (or acceleration), the free term b.
+    friction : (nc,) float
+        Friction coefficient of each contact.
+    set : (nc,) int
+        Where its impulses may lie; see :mod:`heelstrike.contact.sets`.
     """
 
-    counters: Integers = array("counters", of=int)
-    labels: Integers = array("labels", "places", of=int)
-    vectors: Floats = array("vectors", "entries")
-    squares: Floats = array("squares", "unknowns", "width")
-    tableau: Floats = array("pairs", "pairs + 2")
-    solvers: Integers = array(1, of=int, address=True)
-    eliminations: Integers = array("sizes", of=int, address=True)
+    count: int = cell(int)
+    delassus: Floats = array("2 nc", "2 nc")
+    free: Floats = array("2 nc")
+    friction: Floats = array("nc")
+    set: Integers = array("nc", of=int)
+
+
+class ContactAnswer(Bundle):
+    """What contacts do, and the impulses that make them.
+
+    Attributes
+    ----------
+    mode : (nc,) int
+        Contact modes.
+    impulse, velocity : (2 nc,) float
+    residual : (3,) float
+        Complementarity, cone and penetration, relative (see ``Certificate``).
+    """
+
+    mode: Integers = array("nc", of=int)
+    impulse: Floats = array("2 nc")
+    velocity: Floats = array("2 nc")
+    residual: Floats = array(3)
+
+
+class Settings(Bundle):
+    """What the caller may choose.
+
+    Attributes
+    ----------
+    tolerance : float
+        Largest residual that is certified, 1e-9 unless changed.
+    floor : float
+        Smallest size of the data that residuals are set against, zero unless changed.
+    skewed : int
+        Not zero if the matrix may be asymmetric, as in a general complementarity problem.
+    """
+
+    tolerance: float = cell(float)
+    floor: float = cell(float)
+    skewed: int = cell(int)
+
+
+class Tally(Bundle):
+    """Counts: the first three of the last solve, the others of all until the caller clears them.
+
+    Attributes
+    ----------
+    iterations, solver, last_fallbacks : int
+        Iterations of all solvers; code of the one that succeeded; how many failed before it.
+    solves, shortcuts, fallbacks, failures : int
+        ``shortcuts`` are the solves answered by the modes that were guessed.
+    """
+
+    iterations: int = cell(int)
+    solver: int = cell(int)
+    last_fallbacks: int = cell(int)
+    solves: int = cell(int)
+    shortcuts: int = cell(int)
+    fallbacks: int = cell(int)
+    failures: int = cell(int)
+
+
+class Yardstick(Bundle):
+    """What a certificate measures with, and found out about rounding.
+
+    Attributes
+    ----------
+    slope : (nc,) float
+        Tangential over normal impulse where sliding is prescribed, else zero.
+    root : (2 nc,) float
+        Root of the diagonal of each row: velocity per unit of scaled impulse.
+    unit : float
+        Size of the data.
+    effort : float
+        The velocities that cancel, in units of the data's.
+    rounding : float
+        What rounding may hide from it.
+    rest : float
+        Velocities below this times ``root`` count as zero.
+    """
+
+    slope: Floats = array("nc")
+    root: Floats = array("2 nc")
+    unit: float = cell(float)
+    effort: float = cell(float)
+    rounding: float = cell(float)
+    rest: float = cell(float)
+
+
+class StickingRows(Bundle):
+    """The rows that shall have no velocity, where all contacts stick or are open.
+
+    Attributes
+    ----------
+    row : (2 nc,) int
+        Row of the problem of each equation.
+    equation : (2 nc,) int
+        Equation of each row of the problem, -1 for none.
+    sharers : (2 nc,) float
+        How many rows share each equation.
+    pulled : (nc,) int
+        Whether each contact would have pulled in an attempt before.
+    x, pivot : (2 nc,) float
+        Solution; pivots, and a right side.
+    order : (2 nc,) int
+        The equation that has each place in the elimination.
+    span : (2 nc,) int
+        How many columns the row of the factor in each place has.
+    factor, square : (2 nc, 2 nc) float
+    lower_half : (any,) float
+        Matrix of a small system.
+    spare : (2 nc,) float
+        Solution in the order of the elimination.
+    programs : (any,) int
+        Addresses of the programs that solve small systems, by size; zero where there is none.
+    """
+
+    row: Integers = array("2 nc", of=int)
+    equation: Integers = array("2 nc", of=int)
+    sharers: Floats = array("2 nc")
+    pulled: Integers = array("nc", of=int)
+    x: Floats = array("2 nc")
+    pivot: Floats = array("2 nc")
+    order: Integers = array("2 nc", of=int)
+    span: Integers = array("2 nc", of=int)
+    factor: Floats = array("2 nc", "2 nc")
+    square: Floats = array("2 nc", "2 nc")
     lower_half: Floats = array("half")
+    spare: Floats = array("2 nc")
+    programs: Integers = array("sizes", of=int, address=True)
 
 
-def allocate_contact_workspace(capacity: int, solvers: Integers) -> ContactWorkspace:
-    """Allocate the buffers; see :func:`~heelstrike.contact.solvers.search.contact_workspace`."""
-    contacts = max(int(capacity), 1)
-    unknowns = 2 * contacts
-    pairs = 4 * contacts
-    vectors = np.zeros((VECTORS, max(unknowns, 8)))
-    vectors[SETTINGS, TOLERANCE] = 1e-9
-    return ContactWorkspace(
-        counters=np.zeros(COUNTERS, np.int64),
-        labels=np.zeros((LABELS, 2 * pairs + 2), np.int64),
-        vectors=vectors,
-        squares=np.zeros((SQUARES, unknowns, unknowns + 2)),
-        tableau=np.zeros((pairs, pairs + 2)),
-        solvers=solvers,
-        eliminations=elimination_programs(),
-        lower_half=np.zeros(LARGEST * (LARGEST + 1) // 2),
-    )
+class ReducedProblem(Bundle):
+    """The scaled problem that the solvers work on.
+
+    Attributes
+    ----------
+    unknowns : int
+    normal, tangent : (nc,) int
+        Unknowns of each contact; the tangential one is -1 where there is none.
+    prescribed : (nc,) int
+        The mode the caller prescribes, ``OPEN`` for none.
+    set : (nc,) int
+        Where the impulses of each contact may lie.
+    cone : (nc,) float
+        Friction coefficient of the scaled problem.
+    source : (2 nc,) int
+        Row of the problem of each unknown.
+    scale, offset : (2 nc,) float
+        Impulse per unit of each unknown; scaled free velocity.
+    matrix : (2 nc, 2 nc) float
+    """
+
+    unknowns: int = cell(int)
+    normal: Integers = array("nc", of=int)
+    tangent: Integers = array("nc", of=int)
+    prescribed: Integers = array("nc", of=int)
+    set: Integers = array("nc", of=int)
+    cone: Floats = array("nc")
+    source: Integers = array("2 nc", of=int)
+    scale: Floats = array("2 nc")
+    offset: Floats = array("2 nc")
+    matrix: Floats = array("2 nc", "2 nc")
+
+
+class Dictionary(Bundle):
+    """Basic variables in terms of the others, with whose names go to and fro.
+
+    Attributes
+    ----------
+    tableau : (pairs, pairs + 2) float
+        Constant and coefficients of each basic variable.
+    row_label, column_label : (pairs,), (pairs + 2,) int
+        The variable that each row and column holds.
+    place : (2 pairs + 1,) int
+        Row of each variable, or minus its column.
+    """
+
+    tableau: Floats = array("pairs", "pairs + 2")
+    row_label: Integers = array("pairs", of=int)
+    column_label: Integers = array("pairs + 2", of=int)
+    place: Integers = array("2 pairs + 1", of=int)
+
+
+class Equations(Bundle):
+    """The equations of the modes under trial, their solution, and along what it is free.
+
+    Attributes
+    ----------
+    size : int
+        Number of equations.
+    unknown : (2 nc,) int
+        The unknown that each belongs to.
+    lean : (2 nc,) float
+        Tangential over normal impulse at a slipping contact, else zero.
+    weight : (2 nc,) float
+        Length of the impulse per unit of its unknown.
+    point, before : (2 nc,) float
+        Its unknown, in units of impulse; the same before the last refinement.
+    tableau : (2 nc, 2 nc + 1) float
+        Constant and coefficients, which elimination turns into the solution.
+    pivot_row : (2 nc,) int
+        The row that holds the unknown of each equation, -1 for none: it is free.
+    taken : (2 nc,) int
+        Whether each row has been pivoted on.
+    basis : (2 nc, 2 nc) float
+        Free directions, one a row.
+    moves : (2 nc,) int
+        Whether each free direction changes a velocity.
+    image : (2 nc, 2 nc) float
+        The velocities it causes.
+    edge : (2 nc, 2 nc + 2) float
+        Edges of the cones in terms of the free directions.
+    step : (2 nc,) float
+        A step along them; also scaled velocities.
+    dual : Dictionary
+        Of the least-norm split.
+    """
+
+    size: int = cell(int)
+    unknown: Integers = array("2 nc", of=int)
+    lean: Floats = array("2 nc")
+    weight: Floats = array("2 nc")
+    point: Floats = array("2 nc")
+    before: Floats = array("2 nc")
+    tableau: Floats = array("2 nc", "2 nc + 1")
+    pivot_row: Integers = array("2 nc", of=int)
+    taken: Integers = array("2 nc", of=int)
+    basis: Floats = array("2 nc", "2 nc")
+    moves: Integers = array("2 nc", of=int)
+    image: Floats = array("2 nc", "2 nc")
+    edge: Floats = array("2 nc", "2 nc + 2")
+    step: Floats = array("2 nc")
+    dual: Dictionary = part(Dictionary)
+
+
+class Iteration(Bundle):
+    """An iterate of the reduced problem.
+
+    Attributes
+    ----------
+    number : int
+        Iterations so far.
+    x, speed : (2 nc,) float
+        Unknowns and their scaled velocities.
+    value, slope : (2 nc,), (2 nc, 2 nc) float
+        What is left of the equations, and their Jacobian.
+    step, square : (2 nc,), (2 nc, 2 nc) float
+        Newton's step, and the matrix it is solved with.
+    """
+
+    number: int = cell(int)
+    x: Floats = array("2 nc")
+    speed: Floats = array("2 nc")
+    value: Floats = array("2 nc")
+    slope: Floats = array("2 nc", "2 nc")
+    step: Floats = array("2 nc")
+    square: Floats = array("2 nc", "2 nc")
+
+
+class Combinations(Bundle):
+    """How far the combinations of modes have been tried.
+
+    Attributes
+    ----------
+    base : (nc,) int
+        Modes of the combination that is varied.
+    place : int
+        Number of the next combination, or of the next change of the base.
+    tried, starts : int
+        Combinations tried; bases started from.
+    least : float
+        Residual of the base.
+    """
+
+    base: Integers = array("nc", of=int)
+    place: int = cell(int)
+    tried: int = cell(int)
+    starts: int = cell(int)
+    least: float = cell(float)
+
+
+class ContactWorkspace(Bundle):
+    """Buffers of the contact kernels for up to nc contacts (d = 2).
+
+    Attributes
+    ----------
+    settings, tally : Settings, Tally
+        What the caller may choose and read.
+    yardstick, sticking, reduced, equations, lemke, iteration, combinations
+        Memory of the certificate and of each way to solve.
+    trial : ContactAnswer
+        Modes under trial, and their answer.
+    solvers : (1,) int64
+        Address of the machine code that tries the solvers in turn, shared by all workspaces.
+    """
+
+    settings: Settings = part(Settings)
+    tally: Tally = part(Tally)
+    yardstick: Yardstick = part(Yardstick)
+    sticking: StickingRows = part(StickingRows)
+    reduced: ReducedProblem = part(ReducedProblem)
+    equations: Equations = part(Equations)
+    lemke: Dictionary = part(Dictionary)
+    iteration: Iteration = part(Iteration)
+    combinations: Combinations = part(Combinations)
+    trial: ContactAnswer = part(ContactAnswer)
+    solvers: Integers = array(1, of=int, address=True)

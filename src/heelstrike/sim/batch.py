@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
@@ -526,12 +525,14 @@ class _Crew:
         self._message[index] = ending.message
         if ending.status is RunStatus.INTERRUPTED:
             self._message[index] += self._why
-        tally, counters = memory.tally, memory.solver.counters
+        tally, solver = memory.tally, memory.solver.tally
         self._tally[index] = tally.steps, tally.saturations
         self._extreme[index] = (
             tally.penetration, tally.complementarity, tally.cone, tally.non_penetration,
         )  # fmt: skip
-        self._counters[index] = counters[[SOLVES, SHORTCUTS, FALLBACKS, FAILURES]]
+        self._counters[index] = (
+            solver.solves, solver.shortcuts, solver.fallbacks, solver.failures,
+        )  # fmt: skip
         self._runs[index] = ending.run
         self._events[index] = ending.events
         return ending.record

@@ -16,6 +16,7 @@ with one certificate.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.sets import press
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contact_geometry import write_unit_row
 from heelstrike.sim.memory import Memory
@@ -33,19 +34,10 @@ def select_dry_joints(model: Model, count: int, memory: Memory) -> int:
         joint = memory.dry_joint[place]
         write_unit_row(memory, joint, 2 * count + 1, 1.0)
         memory.free[2 * count + 1] = memory.next_v[joint]
-        memory.problem_friction[count] = 1.0
         memory.problem_mode[count] = memory.dry_mode[place]
         memory.candidate[count] = first + place
         count += 1
     return count
-
-
-@kernel
-def press_dry_joint(place: int, limit: float, delassus: Floats, free: Floats) -> None:
-    """Give the candidate at `place` the normal row whose force, or impulse, is `limit`."""
-    weight = delassus[2 * place + 1, 2 * place + 1]
-    delassus[2 * place, 2 * place] = weight
-    free[2 * place] = -weight * limit
 
 
 @kernel
@@ -54,7 +46,7 @@ def press_dry_joints(model: Model, step: float, count: int, memory: Memory) -> N
     number = memory.dry_joint.shape[0]
     for place in range(number):
         limit = step * model.dry_friction[memory.dry_joint[place]]
-        press_dry_joint(count - number + place, limit, memory.delassus, memory.free)
+        press(memory.problem, count - number + place, limit)
 
 
 @kernel

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.contact.solvers.search import contact_workspace
-from heelstrike.contact.workspace import ContactWorkspace
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.workspace import Workspace, workspace
 from heelstrike.robot.robot import Robot
@@ -86,6 +86,8 @@ class Memory(Bundle):
         Whether each contact point is on the ground, and whether it slips.
     stop_torque : (nv,) float
         Generalised force of the joint stops in the last solve.
+    stop_mode : (nv, 2) int
+        Contact mode of each joint's lower and upper stop in the last solve.
     stopped : (nv,) int
         Whether each joint pressed against a stop.
     dry_joint : (nd,) int
@@ -113,6 +115,10 @@ class Memory(Bundle):
     problem_mode : (capacity,) int
     residual : (3,) float
         Residuals of the certificate of the last solve.
+    problem, usual_problem : ContactProblem
+        The same, as the solvers take it; and with the matrix of the usual points.
+    answer : ContactAnswer
+        Its solution.
     programs : (5,) int
         Addresses of straight-line code, zero for none; see :mod:`heelstrike.sim.programs`.
     every_point, usual_points : (nc,), (k,) int
@@ -155,6 +161,7 @@ class Memory(Bundle):
     closed: Integers = array("capacity", of=int)
     slipping: Integers = array("capacity", of=int)
     stop_torque: Floats = array("nv")
+    stop_mode: Integers = array("nv", 2, of=int)
     stopped: Integers = array("nv", of=int)
     dry_joint: Integers = array("nd", of=int)
     friction_torque: Floats = array("nv")
@@ -174,6 +181,9 @@ class Memory(Bundle):
     residual: Floats = array(3)
     programs: Integers = array("programs", of=int, address=True)
     every_point: Integers = array("nc", of=int)
+    problem: ContactProblem = part(ContactProblem)
+    usual_problem: ContactProblem = part(ContactProblem)
+    answer: ContactAnswer = part(ContactAnswer)
     usual_points: Integers = array("usual", of=int)
     usual_place: Integers = array("nc", of=int)
     point_rows: Floats = array("2 usual", "nv")
@@ -194,6 +204,13 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     usual = usual_points(robot)
     place = np.full(nc, -1)
     place[usual] = np.arange(len(usual))
+    problem = ContactProblem.allocate(nc=capacity)
+    usual_problem = ContactProblem.allocate(
+        nc=len(usual),
+        free=problem.free[: 2 * len(usual)],
+        friction=problem.friction[: len(usual)],
+    )
+    answer = ContactAnswer.allocate(nc=capacity)
     return Memory.allocate(
         nl=nv, nq=robot.nq, nv=nv, nu=nu, nc=nc, nd=len(dry), capacity=capacity, usual=len(usual),
         axes=2, components=2,
@@ -206,6 +223,17 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
         dry_joint=dry.astype(np.int64),
         resting=np.full(len(dry), -1, dtype=np.int64),
+        problem=problem,
+        usual_problem=usual_problem,
+        answer=answer,
+        delassus=problem.delassus,
+        free=problem.free,
+        problem_friction=problem.friction,
+        point_delassus=usual_problem.delassus,
+        problem_mode=answer.mode,
+        impulse=answer.impulse,
+        velocity=answer.velocity,
+        residual=answer.residual,
         programs=straight_line_programs(robot.model, usual),
         every_point=np.arange(nc),
         usual_points=usual,

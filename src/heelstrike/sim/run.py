@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.contact.workspace import FAILURES, FALLBACKS, SHORTCUTS, SOLVES
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.memory import Memory, Record
@@ -287,7 +286,7 @@ _MEMBERS = {
 
 def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
     """Return counts and worst values of a simulation, as fields of a run."""
-    tally, counters = memory.tally, memory.solver.counters
+    tally, solver = memory.tally, memory.solver.tally
     return {
         "certificates": Certificates(
             penetration=tally.penetration,
@@ -297,10 +296,10 @@ def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
         ),
         "solver": SolverCount(
             name=solves_with,
-            solves=int(counters[SOLVES]),
-            shortcuts=int(counters[SHORTCUTS]),
-            fallbacks=int(counters[FALLBACKS]),
-            failures=int(counters[FAILURES]),
+            solves=solver.solves,
+            shortcuts=solver.shortcuts,
+            fallbacks=solver.fallbacks,
+            failures=solver.failures,
         ),
         "steps": tally.steps,
         "saturations": tally.saturations,

@@ -12,24 +12,40 @@ from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, STICK
 from heelstrike.contact.solvers import combinations as modes_in_turn
 from heelstrike.contact.solvers.combinations import MOST
 from heelstrike.contact.solvers.search import contact_workspace, nearly_singular
-from heelstrike.contact.workspace import BASE_MODE, SCALE, SOURCE, TANGENT, TRIAL_MODE
+from heelstrike.contact.workspace import ContactProblem, ContactWorkspace, Integers
 
-begin = uncompiled(modes_in_turn.begin_combinations)
-following = uncompiled(modes_in_turn.next_combination)
-note = uncompiled(modes_in_turn.note_residual)
+begin_combinations = uncompiled(modes_in_turn.begin_combinations)
+next_combination = uncompiled(modes_in_turn.next_combination)
+note_residual = uncompiled(modes_in_turn.note_residual)
 
 ALL = range(OPEN, SLIP_BACKWARD + 1)
 
 
-def workspace(count: int, *, smooth: tuple[int, ...] = ()) -> object:
+def workspace(count: int, *, smooth: tuple[int, ...] = ()) -> ContactWorkspace:
     work = contact_workspace(count)
     for contact in range(count):
-        work.labels[TANGENT, contact] = -1 if contact in smooth else 2 * contact + 1
+        work.reduced.tangent[contact] = -1 if contact in smooth else 2 * contact + 1
     return work
 
 
-def trial(count: int, work: object) -> tuple[int, ...]:
-    return tuple(int(mode) for mode in work.labels[TRIAL_MODE, :count])  # type: ignore[attr-defined]
+def begin(count: int, best: Integers, residual: float, work: ContactWorkspace) -> None:
+    begin_combinations(count, best, residual, work.combinations)
+
+
+def following(count: int, work: ContactWorkspace) -> bool:
+    return bool(
+        next_combination(
+            count, work.reduced.tangent, work.tally, work.combinations, work.trial.mode
+        )
+    )
+
+
+def note(count: int, residual: float, work: ContactWorkspace) -> None:
+    note_residual(count, residual, work.trial.mode, work.combinations)
+
+
+def trial(count: int, work: ContactWorkspace) -> tuple[int, ...]:
+    return tuple(int(mode) for mode in work.trial.mode[:count])
 
 
 def test_few_contacts_get_every_combination_once() -> None:
@@ -66,7 +82,7 @@ def test_many_contacts_change_by_two_at_first() -> None:
     assert first == neighbours(base)
     assert len(first) == 1 + 6 * 3 + 15 * 9
     assert following(count, work)
-    elsewhere = tuple(int(mode) for mode in work.labels[BASE_MODE, :count])  # type: ignore[attr-defined]
+    elsewhere = tuple(int(mode) for mode in work.combinations.base[:count])
     assert elsewhere != base
     assert trial(count, work) in neighbours(elsewhere)
     left = 0
@@ -84,9 +100,9 @@ def test_the_better_becomes_the_base() -> None:
     better = trial(count, work)
     assert better != base
     note(count, 1.0, work)  # as good is not better
-    assert tuple(work.labels[BASE_MODE, :count]) == base  # type: ignore[attr-defined]
+    assert tuple(work.combinations.base[:count]) == base
     note(count, 0.5, work)
-    assert tuple(work.labels[BASE_MODE, :count]) == better  # type: ignore[attr-defined]
+    assert tuple(work.combinations.base[:count]) == better
     following(count, work)
     assert trial(count, work) in neighbours(better)
 
@@ -110,12 +126,14 @@ SINE = float(np.sin(0.3))
 )
 def test_what_rounding_decides(matrix: object, size: float, doubtful: bool) -> None:
     delassus = np.array(matrix)
-    work = contact_workspace(2)
-    number = len(delassus)
+    reduced = contact_workspace(2).reduced
+    reduced.unknowns = number = len(delassus)
     unit = 2.0 ** np.round(np.log2(size))
-    work.labels[SOURCE, :number] = np.arange(number)
-    work.vectors[SCALE, :number] = 1.0 / np.sqrt(unit * np.diag(delassus))
-    assert uncompiled(nearly_singular)(number, unit * delassus, work) == doubtful
+    reduced.source[:number] = np.arange(number)
+    reduced.scale[:number] = 1.0 / np.sqrt(unit * np.diag(delassus))
+    problem = ContactProblem.allocate(nc=2)
+    problem.delassus[:number, :number] = unit * delassus
+    assert uncompiled(nearly_singular)(problem, reduced) == doubtful
 
 
 def test_contacts_without_friction_never_slip() -> None:

@@ -16,7 +16,7 @@ from heelstrike.contact.solvers.elimination import (
     elimination_programs,
 )
 from heelstrike.contact.solvers.search import contact_workspace
-from heelstrike.contact.workspace import SHORTCUTS
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.robot.model import Floats
 
 
@@ -62,16 +62,14 @@ def test_sticking_contacts_are_solved_alike_with_and_without_programs(freedom: i
         free = -delassus @ impulse
         answers = []
         for programs in (elimination_programs(), np.zeros(1, np.int64)):
-            made = contact_workspace(count)
-            work = type(made)(**made.members() | {"eliminations": programs})
-            mode = np.full(count, STICK, np.int64)
-            found, velocity, residual = np.zeros(2 * count), np.zeros(2 * count), np.zeros(3)
-            status = solve_contact_kernel(
-                count, delassus, free, np.full(count, 3.0), solver_order("lemke"), mode, found,
-                velocity, residual, work,
-            )  # fmt: skip
-            assert status == SOLVED
-            answers.append((found, work.counters[SHORTCUTS]))
+            work = contact_workspace(count)
+            work = work.replaced(sticking=work.sticking.replaced(programs=programs))
+            problem = ContactProblem.allocate(
+                nc=count, count=count, delassus=delassus, free=free, friction=np.full(count, 3.0)
+            )
+            answer = ContactAnswer.allocate(nc=count, mode=np.full(count, STICK, np.int64))
+            assert solve_contact_kernel(problem, solver_order("lemke"), work, answer) == SOLVED
+            answers.append((answer.impulse, work.tally.shortcuts))
         (found, quick), (other, slow) = answers
         assert quick == slow
         shortcuts += int(quick)

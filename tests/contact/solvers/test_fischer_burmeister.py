@@ -8,18 +8,7 @@ import pytest
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.solvers import fischer_burmeister as fb
 from heelstrike.contact.solvers.search import contact_workspace
-from heelstrike.contact.workspace import (
-    CONE,
-    EQUATIONS,
-    ITERATE,
-    MATRIX,
-    NORMAL,
-    OFFSET,
-    SPEED,
-    STEP,
-    TANGENT,
-    ContactWorkspace,
-)
+from heelstrike.contact.workspace import ContactWorkspace
 
 equations = uncompiled(fb.equations)
 newton_step = uncompiled(fb.newton_step)
@@ -32,19 +21,20 @@ def problem(seed: int, reach: float = 1.0) -> ContactWorkspace:
     draw = np.random.default_rng(seed)
     rows = draw.normal(size=(5, 6))
     work = contact_workspace(3)
-    work.squares[MATRIX, :5, :5] = rows @ rows.T
-    work.vectors[OFFSET, :5] = draw.normal(size=5)
-    work.vectors[ITERATE, :5] = reach * draw.normal(size=5)
-    work.labels[NORMAL, :3] = [0, 2, 3]
-    work.labels[TANGENT, :3] = [1, -1, 4]
-    work.vectors[CONE, :3] = [0.6, 0.0, 1.3]
+    work.reduced.unknowns = 5
+    work.reduced.matrix[:5, :5] = rows @ rows.T
+    work.reduced.offset[:5] = draw.normal(size=5)
+    work.iteration.x[:5] = reach * draw.normal(size=5)
+    work.reduced.normal[:3] = [0, 2, 3]
+    work.reduced.tangent[:3] = [1, -1, 4]
+    work.reduced.cone[:3] = [0.6, 0.0, 1.3]
     return work
 
 
 def values(work: ContactWorkspace, at: np.ndarray) -> np.ndarray:
-    work.vectors[ITERATE, :5] = at
-    equations(3, 5, SIZE, work)
-    return work.vectors[EQUATIONS, :5].copy()
+    work.iteration.x[:5] = at
+    equations(3, SIZE, work.reduced, work.iteration)
+    return work.iteration.value[:5].copy()
 
 
 def phi(a: float, b: float) -> float:
@@ -55,10 +45,10 @@ def phi(a: float, b: float) -> float:
 @pytest.mark.parametrize("seed", range(4))
 def test_equations_as_they_are_written(seed: int, reach: float) -> None:
     work = problem(seed, reach)
-    x = work.vectors[ITERATE, :5].copy()
-    y = work.squares[MATRIX, :5, :5] @ x + work.vectors[OFFSET, :5] / SIZE
-    merit = equations(3, 5, SIZE, work)
-    np.testing.assert_allclose(work.vectors[SPEED, :5], y, rtol=1e-12)
+    x = work.iteration.x[:5].copy()
+    y = work.reduced.matrix[:5, :5] @ x + work.reduced.offset[:5] / SIZE
+    merit = equations(3, SIZE, work.reduced, work.iteration)
+    np.testing.assert_allclose(work.iteration.speed[:5], y, rtol=1e-12)
 
     def friction(normal: int, tangent: int, cone: float) -> float:
         edge = cone * max(x[normal], 0.0)
@@ -68,7 +58,7 @@ def test_equations_as_they_are_written(seed: int, reach: float) -> None:
         phi(x[0], y[0]), friction(0, 1, 0.6), phi(x[2], y[2]), phi(x[3], y[3]), friction(3, 4, 1.3)
     ]  # fmt: skip
     scale = np.abs(np.concatenate([x, y])).max()
-    np.testing.assert_allclose(work.vectors[EQUATIONS, :5], expected, atol=1e-13 * scale)
+    np.testing.assert_allclose(work.iteration.value[:5], expected, atol=1e-13 * scale)
     assert merit == pytest.approx(0.5 * np.dot(expected, expected), rel=1e-10)
 
 
@@ -77,9 +67,9 @@ def test_equations_as_they_are_written(seed: int, reach: float) -> None:
 def test_their_derivatives(seed: int, reach: float) -> None:
     """Against central differences; random points are not on the kinks."""
     work = problem(seed, reach)
-    at = work.vectors[ITERATE, :5].copy()
+    at = work.iteration.x[:5].copy()
     values(work, at)
-    found = work.tableau[:5, :5].copy()
+    found = work.iteration.slope[:5, :5].copy()
     h = 1e-6 * reach
     steps = h * np.eye(5)
     expected = np.array([(values(work, at + d) - values(work, at - d)) / (2.0 * h) for d in steps])
@@ -89,9 +79,9 @@ def test_their_derivatives(seed: int, reach: float) -> None:
 @pytest.mark.parametrize("damping", [1e-12, 0.3])
 def test_newton_step(damping: float) -> None:
     work = problem(1)
-    equations(3, 5, SIZE, work)
-    slope, value = work.tableau[:5, :5].copy(), work.vectors[EQUATIONS, :5].copy()
-    newton_step(5, damping, work)
+    equations(3, SIZE, work.reduced, work.iteration)
+    slope, value = work.iteration.slope[:5, :5].copy(), work.iteration.value[:5].copy()
+    newton_step(5, damping, work.iteration)
     normal = slope.T @ slope + damping * np.eye(5)
     expected = np.linalg.solve(normal, -slope.T @ value)
-    np.testing.assert_allclose(work.vectors[STEP, :5], expected, rtol=1e-7)
+    np.testing.assert_allclose(work.iteration.step[:5], expected, rtol=1e-7)

@@ -9,24 +9,22 @@ from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
 from heelstrike.contact.solvers.gauss_seidel import solve_block
 from heelstrike.contact.solvers.search import contact_workspace
-from heelstrike.contact.workspace import CONE, ITERATE, MATRIX, NORMAL, OFFSET, TANGENT
 
 
 def solved(
     delassus: np.ndarray, free: np.ndarray, friction: float | None
 ) -> tuple[int, np.ndarray, np.ndarray]:
     """Mode, impulse and velocity of one contact beside a second one that pushes with (1, 0.5)."""
-    work = contact_workspace(2)
-    size = len(delassus)
-    work.squares[MATRIX, :size, :size] = delassus
-    work.vectors[OFFSET, :size] = free
-    work.labels[NORMAL, 0] = 0
-    work.labels[TANGENT, 0] = -1 if friction is None else 1
-    work.vectors[CONE, 0] = 0.0 if friction is None else friction
+    reduced = contact_workspace(2).reduced
+    reduced.unknowns = size = len(delassus)
+    reduced.matrix[:size, :size] = delassus
+    reduced.offset[:size] = free
+    reduced.normal[0] = 0
+    reduced.tangent[0] = -1 if friction is None else 1
+    reduced.cone[0] = 0.0 if friction is None else friction
     own = 1 if friction is None else 2
-    work.vectors[ITERATE, :size] = [*[7.0, -3.0][:own], 1.0, 0.5]  # the old answer is forgotten
-    mode = uncompiled(solve_block)(0, size, work)
-    impulse = work.vectors[ITERATE, :size].copy()
+    impulse = np.array([*[7.0, -3.0][:own], 1.0, 0.5])  # the old answer is forgotten
+    mode = uncompiled(solve_block)(0, reduced, impulse)
     np.testing.assert_array_equal(impulse[own:], [1.0, 0.5])
     return mode, impulse[:own], (delassus @ impulse + free)[:own]
 

@@ -14,50 +14,19 @@ import math
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.sets import LINE, projected
 from heelstrike.contact.solvers.least_norm import split
-from heelstrike.contact.solvers.pivoting import pivot
 from heelstrike.contact.workspace import (
-    BEFORE,
-    EFFORT,
-    EQUATION,
-    IMPULSE,
-    LEAN,
-    NORMAL,
-    OFFSET,
-    PIVOT_ROW,
-    POINT,
-    RESIDUAL,
-    REST,
-    ROOT,
-    ROUNDING,
-    ROW_LABEL,
-    SCALE,
-    SETTINGS,
-    SKEWED,
-    SLOPE,
-    SOURCE,
-    SPEED,
-    TANGENT,
-    TRIAL_MODE,
-    VELOCITY,
-    WEIGHT,
+    ContactAnswer,
+    ContactProblem,
     ContactWorkspace,
+    Equations,
     Floats,
     Integers,
+    ReducedProblem,
+    Yardstick,
 )
-
-RANK_TOLERANCE = 1e-12
-"""Pivots of the unit-diagonal matrix below this count as zero."""
-
-GOOD_PIVOT = 0.03
-"""Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
-matrix is stable in any order, and only its rank needs the large pivots first."""
-
-SINGULAR = 2e-15
-"""Pivots of the unit-diagonal matrix below this are rounding."""
-
-CONSISTENT = 1e-12
-"""Equations that are left with less than this, relative to the largest, are met."""
+from heelstrike.dynamics.dense import eliminate
 
 SHARP = 1e-13
 """Residuals above this are worth a step of iterative refinement."""
@@ -70,20 +39,26 @@ REFINEMENTS = 5
 
 
 @kernel
-def assemble(count: int, delassus: Floats, friction: Floats, work: ContactWorkspace) -> int:
-    """Write the equations of the modes under trial into the tableau; return their number.
+def assemble(
+    problem: ContactProblem,
+    mode: Integers,
+    slope: Floats,
+    reduced: ReducedProblem,
+    equations: Equations,
+) -> None:
+    """Write the equations of some modes.
 
     At a slipping contact the tangential impulse leans on the normal one and has no equation.
     """
-    mode, equation = work.labels[TRIAL_MODE], work.labels[EQUATION]
-    normal, tangent, source = work.labels[NORMAL], work.labels[TANGENT], work.labels[SOURCE]
-    slope, lean, weight = work.vectors[SLOPE], work.vectors[LEAN], work.vectors[WEIGHT]
-    scale, offset, tableau = work.vectors[SCALE], work.vectors[OFFSET], work.tableau
+    delassus, friction = problem.delassus, problem.friction
+    tangent, source, scale = reduced.tangent, reduced.source, reduced.scale
+    equation, tableau = equations.unknown, equations.tableau
+    lean, weight = equations.lean, equations.weight
     size = 0
-    for contact in range(count):
+    for contact in range(problem.count):
         if mode[contact] == OPEN:
             continue
-        first = normal[contact]
+        first = reduced.normal[contact]
         equation[size] = first
         weight[size] = scale[first]
         lean[size] = slope[contact]
@@ -103,201 +78,144 @@ def assemble(count: int, delassus: Floats, friction: Floats, work: ContactWorksp
     for i in range(size):
         row = source[equation[i]]
         row_scale = scale[equation[i]]
-        tableau[i, 0] = offset[equation[i]]
+        tableau[i, 0] = reduced.offset[equation[i]]
         for j in range(size):
             column = source[equation[j]]
             entry = delassus[row, column]
             if lean[j] != 0.0:
                 entry += lean[j] * delassus[row, column + 1]
             tableau[i, j + 1] = row_scale * entry * scale[equation[j]]
-    return size
+    equations.size = size
 
 
 @kernel
-def eliminate(size: int, symmetric: bool, work: ContactWorkspace) -> int:
-    """Solve the equations in the tableau as far as their rank allows; return their nullity.
-
-    The solution with the free unknowns at zero goes to ``POINT``; ``PIVOT_ROW`` tells which
-    unknowns stayed free. Symmetric equations pivot on a large diagonal element, others on the
-    largest element of all.
-    """
-    pivot_row, taken = work.labels[PIVOT_ROW], work.labels[ROW_LABEL]
-    weight, point, tableau = work.vectors[WEIGHT], work.vectors[POINT], work.tableau
-    speeds = 0.0
-    for i in range(size):
-        pivot_row[i] = -1
-        taken[i] = 0
-        speeds = max(speeds, abs(tableau[i, 0]))
-    nullity = size
-    smallest = RANK_TOLERANCE
-    while nullity > 0:
-        largest = smallest
-        row = size
-        column = size
-        for i in range(size):
-            if taken[i] != 0:
-                continue
-            if symmetric:
-                if tableau[i, i + 1] > largest:
-                    largest = tableau[i, i + 1]
-                    row = i
-                    column = i
-                    if largest > GOOD_PIVOT:
-                        break
-                continue
-            for j in range(size):
-                if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
-                    largest = abs(tableau[i, j + 1])
-                    row = i
-                    column = j
-        if row < size:
-            pivot(tableau, size, size + 1, row, column + 1)
-            taken[row] = 1
-            pivot_row[column] = row
-            nullity -= 1
-            continue
-        # What is left is singular. If it is not consistent, it was not quite singular.
-        left = 0.0
-        for i in range(size):
-            if taken[i] == 0:
-                left = max(left, abs(tableau[i, 0]))
-        if smallest == SINGULAR or left <= CONSISTENT * speeds:
-            break
-        smallest = SINGULAR
-    for j in range(size):
-        point[j] = weight[j] * tableau[pivot_row[j], 0] if pivot_row[j] >= 0 else 0.0
-    return nullity
-
-
-@kernel
-def expand(count: int, friction: Floats, work: ContactWorkspace) -> None:
-    """Write ``POINT`` out as an impulse inside the cones, exactly.
+def expand(
+    problem: ContactProblem, point: Floats, slope: Floats, tangent: Integers, answer: ContactAnswer
+) -> None:
+    """Write the point out as an impulse inside the cones, exactly.
 
     The point is in units of impulse; along a slipping contact it measures the whole impulse.
     """
-    mode, tangent, slope = work.labels[TRIAL_MODE], work.labels[TANGENT], work.vectors[SLOPE]
-    point, impulse = work.vectors[POINT], work.vectors[IMPULSE]
+    mode, impulse = answer.mode, answer.impulse
     place = 0
-    for contact in range(count):
+    for contact in range(problem.count):
         row = 2 * contact
         impulse[row] = 0.0
         impulse[row + 1] = 0.0
         if mode[contact] == OPEN:
             continue
-        along = max(point[place], 0.0)
-        limit = friction[contact]
+        sticks = tangent[contact] >= 0 and mode[contact] == STICK
+        across = point[place + 1] if sticks else 0.0
+        along, across = projected(problem, contact, point[place], across)
         place += 1
-        if tangent[contact] >= 0 and mode[contact] == STICK:
-            limit *= along
+        if sticks:
             impulse[row] = along
-            impulse[row + 1] = min(max(point[place], -limit), limit)
+            impulse[row + 1] = across
             place += 1
             continue
         across = slope[contact]
         if tangent[contact] >= 0:
+            limit = problem.friction[contact]
             across = -limit if mode[contact] == SLIP_FORWARD else limit
         impulse[row] = along / math.sqrt(1.0 + across * across)
         impulse[row + 1] = across * impulse[row]
 
 
 @kernel
-def evaluate(
-    count: int, delassus: Floats, free: Floats, friction: Floats, work: ContactWorkspace
-) -> float:
-    """Find the impulse of the modes in ``TRIAL_MODE`` and return its largest residual.
+def evaluate(problem: ContactProblem, work: ContactWorkspace) -> float:
+    """Find the impulse of the modes under trial and return its largest residual.
 
-    The impulse, its velocity and residuals are left in the workspace. Where rounding shows,
-    iterative refinement sharpens them as long as it helps.
+    Where rounding shows, iterative refinement sharpens the answer as long as it helps.
     """
-    point, before, lean = work.vectors[POINT], work.vectors[BEFORE], work.vectors[LEAN]
-    settings = work.vectors[SETTINGS]
-    size = assemble(count, delassus, friction, work)
-    symmetric = settings[SKEWED] == 0.0
-    for j in range(size):
-        symmetric = symmetric and lean[j] == 0.0
-    singular = eliminate(size, symmetric, work) > 0
+    equations, reduced, yardstick = work.equations, work.reduced, work.yardstick
+    trial, point, before = work.trial, equations.point, equations.before
+    for contact in range(problem.count):
+        if problem.set[contact] == LINE:
+            trial.mode[contact] = STICK
+    assemble(problem, trial.mode, yardstick.slope, reduced, equations)
+    symmetric = work.settings.skewed == 0
+    for j in range(equations.size):
+        symmetric = symmetric and equations.lean[j] == 0.0
+    singular = (
+        eliminate(
+            equations.size, symmetric, equations.tableau, equations.pivot_row, equations.taken
+        )
+        > 0
+    )
+    for j in range(equations.size):
+        row = equations.pivot_row[j]
+        point[j] = equations.weight[j] * equations.tableau[row, 0] if row >= 0 else 0.0
     held = not symmetric  # whether directions that change a velocity are held back
     if singular:
-        held = split(count, size, held, delassus, friction, work)
-    worst = prove(count, delassus, free, friction, work)
-    if singular and held and not worst < PROMISING * (1.0 + settings[EFFORT]):
+        held = split(problem, trial.mode, held, reduced, work.tally, equations)
+    worst = prove(problem, work)
+    if singular and held and not worst < PROMISING * (1.0 + yardstick.effort):
         # The slip speed is not unique, and what the elimination left it at does not do.
-        split(count, size, False, delassus, friction, work)
-        worst = prove(count, delassus, free, friction, work)
+        split(problem, trial.mode, False, reduced, work.tally, equations)
+        worst = prove(problem, work)
     for _ in range(REFINEMENTS):
-        if worst < max(SHARP, 4.0 * settings[ROUNDING]):
+        if worst < max(SHARP, 4.0 * yardstick.rounding):
             break
-        if not worst < PROMISING * (1.0 + settings[EFFORT]):
+        if not worst < PROMISING * (1.0 + yardstick.effort):
             break
-        for j in range(size):
+        for j in range(equations.size):
             before[j] = point[j]
-        refine(size, work)
-        sharper = prove(count, delassus, free, friction, work)
+        refine(reduced, trial.velocity, equations)
+        sharper = prove(problem, work)
         if not sharper < worst:
-            for j in range(size):
+            for j in range(equations.size):
                 point[j] = before[j]
-            return prove(count, delassus, free, friction, work)
+            return prove(problem, work)
         worst = sharper
     return worst
 
 
 @kernel
-def prove(
-    count: int, delassus: Floats, free: Floats, friction: Floats, work: ContactWorkspace
-) -> float:
-    """Write ``POINT`` out as an impulse and certify it; return its largest residual."""
-    vectors = work.vectors
-    expand(count, friction, work)
-    return certify(
-        count,
-        delassus,
-        free,
-        friction,
-        vectors[IMPULSE],
-        vectors[VELOCITY],
-        vectors[RESIDUAL],
-        work,
-    )
+def prove(problem: ContactProblem, work: ContactWorkspace) -> float:
+    """Write the point out as an impulse and certify it; return its largest residual."""
+    slope, tangent = work.yardstick.slope, work.reduced.tangent
+    expand(problem, work.equations.point, slope, tangent, work.trial)
+    return certify(problem, work.settings, work.yardstick, work.trial)
 
 
 @kernel
-def refine(size: int, work: ContactWorkspace) -> None:
-    """Correct ``POINT`` by what the equations' velocities still lack to zero."""
-    equation, pivot_row, source = work.labels[EQUATION], work.labels[PIVOT_ROW], work.labels[SOURCE]
-    point, weight, scale = work.vectors[POINT], work.vectors[WEIGHT], work.vectors[SCALE]
-    velocity, speed, tableau = work.vectors[VELOCITY], work.vectors[SPEED], work.tableau
+def refine(reduced: ReducedProblem, velocity: Floats, equations: Equations) -> None:
+    """Correct the point by what the equations' velocities still lack to zero."""
+    equation, pivot_row, speed = equations.unknown, equations.pivot_row, equations.step
+    size = equations.size
     for j in range(size):
-        speed[j] = scale[equation[j]] * velocity[source[equation[j]]]
+        speed[j] = reduced.scale[equation[j]] * velocity[reduced.source[equation[j]]]
     for j in range(size):
         if pivot_row[j] >= 0:
             correction = 0.0
             for k in range(size):
                 if pivot_row[k] >= 0:
-                    correction -= tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
-            point[j] += weight[j] * correction
+                    correction -= equations.tableau[pivot_row[j], k + 1] * speed[pivot_row[k]]
+            equations.point[j] += equations.weight[j] * correction
 
 
 @kernel
-def label(count: int, velocity: Floats, mode: Integers, work: ContactWorkspace) -> bool:
+def label(
+    count: int, velocity: Floats, reduced: ReducedProblem, yardstick: Yardstick, mode: Integers
+) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
     impulse in its cone. Only with all of these admitted is the least-norm split unique. The
-    velocity is judged by what the last certificate left in ``REST``.
+    velocity is judged by what the last certificate calls rest.
     """
-    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
-    tangent = work.labels[TANGENT]
+    root, rest = yardstick.root, yardstick.rest
     changed = False
     for contact in range(count):
         row = 2 * contact
         name = STICK
-        if velocity[row] > rest * root[row]:
+        if velocity[row] > rest * root[row] and reduced.set[contact] != LINE:
             name = OPEN
         elif velocity[row + 1] > rest * root[row + 1]:
             name = SLIP_FORWARD
         elif velocity[row + 1] < -rest * root[row + 1]:
             name = SLIP_BACKWARD
-        if tangent[contact] >= 0:
+        if reduced.tangent[contact] >= 0:
             changed = changed or name != mode[contact]
         else:
             changed = changed or (name == OPEN) != (mode[contact] == OPEN)

@@ -26,22 +26,9 @@ from heelstrike.contact.modes import (
     SOLVED,
     STICK,
 )
-from heelstrike.contact.workspace import (
-    BASIS,
-    CONE,
-    EQUATIONS,
-    ITERATE,
-    ITERATIONS,
-    MATRIX,
-    NORMAL,
-    OFFSET,
-    PROGRESS,
-    SPEED,
-    STEP,
-    TANGENT,
-    TRIAL_MODE,
-    ContactWorkspace,
-)
+from heelstrike.contact.sets import LINE
+from heelstrike.contact.workspace import Integers, Iteration, ReducedProblem, Tally
+from heelstrike.dynamics.dense import solve_positive
 
 STEPS = 30
 """Newton steps from one starting point."""
@@ -57,15 +44,15 @@ GOLDEN = 0.6180339887498949
 
 
 @kernel
-def read_iterate(count: int, work: ContactWorkspace) -> bool:
-    """Write the modes that ``ITERATE`` and its velocity point to; return whether any changed."""
-    mode, normal, tangent = work.labels[TRIAL_MODE], work.labels[NORMAL], work.labels[TANGENT]
-    iterate, speed, cone = work.vectors[ITERATE], work.vectors[SPEED], work.vectors[CONE]
+def read_iterate(count: int, reduced: ReducedProblem, iteration: Iteration, mode: Integers) -> bool:
+    """Write the modes that an iterate and its velocity point to; return whether any changed."""
+    normal, tangent, cone = reduced.normal, reduced.tangent, reduced.cone
+    iterate, speed = iteration.x, iteration.speed
     changed = False
     for contact in range(count):
         first = normal[contact]
         name = STICK
-        if iterate[first] < speed[first]:
+        if iterate[first] < speed[first] and reduced.set[contact] != LINE:
             name = OPEN
         elif tangent[contact] >= 0:
             limit = cone[contact] * iterate[first]
@@ -79,21 +66,27 @@ def read_iterate(count: int, work: ContactWorkspace) -> bool:
 
 
 @kernel
-def equations(count: int, unknowns: int, size: float, work: ContactWorkspace) -> float:
-    """Evaluate the equations at ``ITERATE``; return half the sum of their squares.
+def equations(count: int, size: float, reduced: ReducedProblem, iteration: Iteration) -> float:
+    """Evaluate the equations and their Jacobian; return half the sum of their squares.
 
-    ``size`` scales the free velocity to one. The Jacobian is left in the tableau.
+    ``size`` scales the free velocity to one.
     """
-    normal, tangent, cone = work.labels[NORMAL], work.labels[TANGENT], work.vectors[CONE]
-    iterate, speed, offset = work.vectors[ITERATE], work.vectors[SPEED], work.vectors[OFFSET]
-    value, matrix, tableau = work.vectors[EQUATIONS], work.squares[MATRIX], work.tableau
+    normal, tangent, cone, matrix = reduced.normal, reduced.tangent, reduced.cone, reduced.matrix
+    iterate, speed = iteration.x, iteration.speed
+    value, tableau, unknowns = iteration.value, iteration.slope, reduced.unknowns
     merit = 0.0
     for i in range(unknowns):
-        speed[i] = offset[i] / size
+        speed[i] = reduced.offset[i] / size
         for j in range(unknowns):
             speed[i] += matrix[i, j] * iterate[j]
     for contact in range(count):
         first = normal[contact]
+        if reduced.set[contact] == LINE:
+            value[first] = speed[first]
+            merit += 0.5 * value[first] * value[first]
+            for j in range(unknowns):
+                tableau[first, j] = matrix[first, j]
+            continue
         force = iterate[first]
         root = math.sqrt(force * force + speed[first] * speed[first])
         value[first] = force + speed[first] - root
@@ -126,10 +119,10 @@ def equations(count: int, unknowns: int, size: float, work: ContactWorkspace) ->
 
 
 @kernel
-def newton_step(unknowns: int, damping: float, work: ContactWorkspace) -> None:
-    """Solve ``(V^T V + damping I) step = -V^T equations`` for the Jacobian V in the tableau."""
-    step, value = work.vectors[STEP], work.vectors[EQUATIONS]
-    tableau, square = work.tableau, work.squares[BASIS]
+def newton_step(unknowns: int, damping: float, iteration: Iteration) -> None:
+    """Solve ``(V^T V + damping I) step = -V^T equations`` for the Jacobian V."""
+    step, value = iteration.step, iteration.value
+    tableau, square = iteration.slope, iteration.square
     for i in range(unknowns):
         step[i] = 0.0
         for j in range(unknowns):
@@ -142,62 +135,59 @@ def newton_step(unknowns: int, damping: float, work: ContactWorkspace) -> None:
                 step[i] -= factor * value[k]
                 for j in range(unknowns):
                     square[i, j] += factor * tableau[k, j]
-    for k in range(unknowns):
-        for i in range(k + 1, unknowns):
-            factor = square[i, k] / square[k, k]
-            step[i] -= factor * step[k]
-            for j in range(k + 1, unknowns):
-                square[i, j] -= factor * square[k, j]
-    for i in range(unknowns - 1, -1, -1):
-        for j in range(i + 1, unknowns):
-            step[i] -= square[i, j] * step[j]
-        step[i] /= square[i, i]
+    solve_positive(unknowns, square, step)
 
 
 @kernel
-def fischer_burmeister(count: int, unknowns: int, call: int, work: ContactWorkspace) -> int:
+def fischer_burmeister(
+    count: int,
+    call: int,
+    reduced: ReducedProblem,
+    tally: Tally,
+    iteration: Iteration,
+    mode: Integers,
+) -> int:
     """Iterate on the reduced problem until other modes are to be tried than before.
 
-    Returns ``SOLVED`` with a proposal in ``TRIAL_MODE``, to be called again (``call`` counts
+    Returns ``SOLVED`` with a proposal in ``mode``, to be called again (``call`` counts
     from 0) if it does not hold, or ``ITERATION_LIMIT``.
     """
-    tangent, cone, offset = work.labels[TANGENT], work.vectors[CONE], work.vectors[OFFSET]
-    iterate, step, progress = work.vectors[ITERATE], work.vectors[STEP], work.vectors[PROGRESS]
+    iterate, step, unknowns = iteration.x, iteration.step, reduced.unknowns
     size = 0.0
     for i in range(unknowns):
-        size = max(size, abs(offset[i]))
+        size = max(size, abs(reduced.offset[i]))
     if size == 0.0:
         size = 1.0
     if call == 0:
-        progress[0] = 0.0
-    while progress[0] < STEPS * STARTS:
-        start = progress[0] // STEPS
-        if progress[0] % STEPS == 0.0:
+        iteration.number = 0
+    while iteration.number < STEPS * STARTS:
+        start = float(iteration.number // STEPS)
+        if iteration.number % STEPS == 0:
             for i in range(unknowns):
                 iterate[i] = 2.0 ** (start % 20.0) * ((GOLDEN * start * (i + 1)) % 1.0)
             for contact in range(count):
-                second = tangent[contact]
+                second = reduced.tangent[contact]
                 if second >= 0:
                     share = 2.0 * ((GOLDEN * start * (second + 1)) % 1.0) - 1.0
-                    iterate[second] = share * cone[contact] * iterate[second - 1]
-        progress[0] += 1.0
-        work.counters[ITERATIONS] += 1
-        merit = equations(count, unknowns, size, work)
-        changed = read_iterate(count, work)
-        newton_step(unknowns, 1e-15 + 10.0 ** (-12.0 + start % 10.0) * min(merit, 1.0), work)
+                    iterate[second] = share * reduced.cone[contact] * iterate[second - 1]
+        iteration.number += 1
+        tally.iterations += 1
+        merit = equations(count, size, reduced, iteration)
+        changed = read_iterate(count, reduced, iteration, mode)
+        newton_step(unknowns, 1e-15 + 10.0 ** (-12.0 + start % 10.0) * min(merit, 1.0), iteration)
         for i in range(unknowns):
             iterate[i] += step[i]
         along = 1.0
         while (
             along > 1e-8
-            and equations(count, unknowns, size, work) > (GROWTH - 1e-4 * along) * merit
+            and equations(count, size, reduced, iteration) > (GROWTH - 1e-4 * along) * merit
         ):
             along *= 0.5
             for i in range(unknowns):
                 iterate[i] -= along * step[i]
         if along <= 1e-8 or merit < 1e-30:
             # Stuck, or solved without the modes being right: on to the next starting point.
-            progress[0] = (start + 1.0) * STEPS
+            iteration.number = (int(start) + 1) * STEPS
         if changed or call == 0:
             return SOLVED
     return ITERATION_LIMIT

@@ -15,33 +15,26 @@ from heelstrike.contact.modes import (
     SOLVED,
     STICK,
 )
-from heelstrike.contact.workspace import (
-    CONE,
-    ITERATE,
-    ITERATIONS,
-    MATRIX,
-    NORMAL,
-    OFFSET,
-    PROGRESS,
-    TANGENT,
-    TRIAL_MODE,
-    ContactWorkspace,
-)
+from heelstrike.contact.sets import LINE
+from heelstrike.contact.workspace import Floats, Integers, Iteration, ReducedProblem, Tally
 
 SWEEPS = 2000
 """Sweeps over all contacts before giving up."""
 
 
 @kernel
-def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
+def solve_block(contact: int, reduced: ReducedProblem, iterate: Floats) -> int:
     """Solve one contact of the reduced problem for its own impulse; return its mode."""
-    offset, iterate, matrix = work.vectors[OFFSET], work.vectors[ITERATE], work.squares[MATRIX]
-    first = work.labels[NORMAL, contact]
-    second = work.labels[TANGENT, contact]
+    offset, matrix, unknowns = reduced.offset, reduced.matrix, reduced.unknowns
+    first = reduced.normal[contact]
+    second = reduced.tangent[contact]
     rest = offset[first] - matrix[first, first] * iterate[first]
     for j in range(unknowns):
         rest += matrix[first, j] * iterate[j]
     inertia = matrix[first, first]
+    if reduced.set[contact] == LINE:
+        iterate[first] = -rest / inertia if inertia > 0.0 else 0.0
+        return STICK
     if second < 0:
         iterate[first] = max(-rest / inertia, 0.0) if inertia > 0.0 else 0.0
         return STICK if rest < 0.0 else OPEN
@@ -55,7 +48,7 @@ def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
     iterate[second] = 0.0
     if rest >= 0.0:
         return OPEN
-    cone = work.vectors[CONE, contact]
+    cone = reduced.cone[contact]
     determinant = inertia * across - coupling * coupling
     if determinant > 1e-14:
         force = (coupling * slip - across * rest) / determinant
@@ -78,24 +71,29 @@ def solve_block(contact: int, unknowns: int, work: ContactWorkspace) -> int:
 
 
 @kernel
-def gauss_seidel(count: int, unknowns: int, call: int, work: ContactWorkspace) -> int:
+def gauss_seidel(
+    count: int,
+    call: int,
+    reduced: ReducedProblem,
+    tally: Tally,
+    iteration: Iteration,
+    mode: Integers,
+) -> int:
     """Sweep over the reduced problem until other modes are to be tried than before.
 
-    The sweeps start from no impulse. Returns ``SOLVED`` with a proposal
-    in ``TRIAL_MODE``, to be called again (``call`` counts from 0) if it does not hold, or
-    ``ITERATION_LIMIT``.
+    The sweeps start from no impulse. Returns ``SOLVED`` with a proposal in ``mode``, to be called
+    again (``call`` counts from 0) if it does not hold, or ``ITERATION_LIMIT``.
     """
-    mode, progress = work.labels[TRIAL_MODE], work.vectors[PROGRESS]
     if call == 0:
-        progress[0] = 0.0
-        for i in range(unknowns):
-            work.vectors[ITERATE, i] = 0.0
-    while progress[0] < SWEEPS:
-        progress[0] += 1.0
-        work.counters[ITERATIONS] += 1
+        iteration.number = 0
+        for i in range(reduced.unknowns):
+            iteration.x[i] = 0.0
+    while iteration.number < SWEEPS:
+        iteration.number += 1
+        tally.iterations += 1
         changed = call == 0
         for contact in range(count):
-            name = solve_block(contact, unknowns, work)
+            name = solve_block(contact, reduced, iteration.x)
             changed = changed or name != mode[contact]
             mode[contact] = name
         if changed:

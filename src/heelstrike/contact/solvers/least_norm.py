@@ -6,25 +6,15 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
+from heelstrike.contact.sets import LINE, contains
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import (
-    BASIS,
-    DUAL,
-    EDGES,
-    EQUATION,
-    LEAN,
-    PIVOT_ROW,
-    PLACE,
-    POINT,
-    ROW_LABEL,
-    SCALE,
-    SOURCE,
-    STEP,
-    TANGENT,
-    TRIAL_MODE,
-    WEIGHT,
-    ContactWorkspace,
+    ContactProblem,
+    Equations,
     Floats,
+    Integers,
+    ReducedProblem,
+    Tally,
 )
 
 TIE = 1e-13
@@ -36,10 +26,10 @@ a hundred times as far if that is not enough, and once more."""
 
 
 @kernel
-def free_directions(size: int, work: ContactWorkspace) -> int:
-    """Write the free directions of the equations in the tableau to ``basis``; return how many."""
-    pivot_row, weight = work.labels[PIVOT_ROW], work.vectors[WEIGHT]
-    tableau, basis = work.tableau, work.squares[BASIS]
+def free_directions(equations: Equations) -> int:
+    """Write the free directions of the solved equations to ``basis``; return how many."""
+    pivot_row, weight, size = equations.pivot_row, equations.weight, equations.size
+    tableau, basis = equations.tableau, equations.basis
     found = 0
     for free in range(size):
         if pivot_row[free] < 0:
@@ -53,25 +43,25 @@ def free_directions(size: int, work: ContactWorkspace) -> int:
 
 @kernel
 def keep_velocity(
-    count: int, size: int, found: int, delassus: Floats, work: ContactWorkspace
+    problem: ContactProblem, found: int, reduced: ReducedProblem, equations: Equations
 ) -> int:
     """Reduce the free directions to those that change no velocity; return how many.
 
     Where contacts slip the equations leave their slip speed open, so a free direction may change
     it. Elimination on the velocities that the directions cause leaves the combinations without.
     """
-    equation, source, kind = work.labels[EQUATION], work.labels[SOURCE], work.labels[ROW_LABEL]
-    lean, weight, scale = work.vectors[LEAN], work.vectors[WEIGHT], work.vectors[SCALE]
-    basis, image = work.squares[BASIS], work.squares[EDGES]
+    count, size, delassus = problem.count, equations.size, problem.delassus
+    equation, lean, weight = equations.unknown, equations.lean, equations.weight
+    basis, image, kind = equations.basis, equations.image, equations.moves
     for k in range(found):
         largest = 0.0
         for i in range(2 * count):
             image[k, i] = 0.0
         for j in range(size):
-            column = source[equation[j]]
+            column = reduced.source[equation[j]]
             scaled = basis[k, j] / weight[j]
             largest = max(largest, abs(scaled))
-            along = scaled * scale[equation[j]]
+            along = scaled * reduced.scale[equation[j]]
             for i in range(2 * count):
                 diagonal = delassus[i, i]
                 entry = along * delassus[i, column]
@@ -107,9 +97,8 @@ def keep_velocity(
 
 
 @kernel
-def project(size: int, nullity: int, work: ContactWorkspace) -> None:
-    """Orthonormalise the free directions and remove them from ``POINT``."""
-    point, basis = work.vectors[POINT], work.squares[BASIS]
+def project(size: int, nullity: int, basis: Floats, point: Floats) -> None:
+    """Orthonormalise the free directions and remove them from the point."""
     for found in range(nullity):
         for _ in range(2 if found > 0 else 0):  # twice is enough (Kahan, Parlett)
             for k in range(found):
@@ -132,14 +121,14 @@ def project(size: int, nullity: int, work: ContactWorkspace) -> None:
 
 @kernel
 def split(
-    count: int,
-    size: int,
+    problem: ContactProblem,
+    mode: Integers,
     hold: bool,
-    delassus: Floats,
-    friction: Floats,
-    work: ContactWorkspace,
+    reduced: ReducedProblem,
+    tally: Tally,
+    equations: Equations,
 ) -> bool:
-    """Move ``POINT`` along the free directions to the least norm that the cones allow.
+    """Move the point along the free directions to the least norm that the cones allow.
 
     The shortest step that brings the point inside is a least-distance problem. Its dual is a
     linear complementarity problem whose unknowns are the edges of the cones that hold the point
@@ -148,15 +137,20 @@ def split(
 
     If ``hold``, directions that would change a velocity are left out; returns whether any were.
     """
-    nullity = free_directions(size, work)
+    count, size, friction = problem.count, equations.size, problem.friction
+    tangent, point, step, weight = (
+        reduced.tangent,
+        equations.point,
+        equations.step,
+        equations.weight,
+    )
+    basis, edges, dual = equations.basis, equations.edge, equations.dual.tableau
+    nullity = free_directions(equations)
     dropped = nullity
     if hold:
-        nullity = keep_velocity(count, size, nullity, delassus, work)
+        nullity = keep_velocity(problem, nullity, reduced, equations)
     dropped -= nullity
-    project(size, nullity, work)
-    mode, tangent = work.labels[TRIAL_MODE], work.labels[TANGENT]
-    point, step, weight = work.vectors[POINT], work.vectors[STEP], work.vectors[WEIGHT]
-    basis, edges, dual = work.squares[BASIS], work.squares[EDGES], work.squares[DUAL]
+    project(size, nullity, basis, point)
 
     longest = 0.0  # impulse
     largest = 0.0  # scaled unknown
@@ -165,17 +159,13 @@ def split(
     for contact in range(count):
         if mode[contact] == OPEN:
             continue
-        along = point[place]
-        longest = max(longest, abs(along))
-        largest = max(largest, abs(along) / weight[place])
-        place += 1
-        if tangent[contact] >= 0 and mode[contact] == STICK:
-            inside = inside and abs(point[place]) <= friction[contact] * along
-            longest = max(longest, abs(point[place]))
-            largest = max(largest, abs(point[place]) / weight[place])
-            place += 1
-        else:
-            inside = inside and along >= 0.0
+        first = place
+        place += 2 if tangent[contact] >= 0 and mode[contact] == STICK else 1
+        across = point[place - 1] if place == first + 2 else 0.0
+        inside = inside and contains(problem, contact, point[first], across)
+        for i in range(first, place):
+            longest = max(longest, abs(point[i]))
+            largest = max(largest, abs(point[i]) / weight[i])
     if inside:
         return dropped > 0
 
@@ -186,7 +176,7 @@ def split(
         if mode[contact] == OPEN:
             continue
         sides = 2 if tangent[contact] >= 0 and mode[contact] == STICK else 1
-        for side in range(sides):
+        for side in range(0 if problem.set[contact] == LINE else sides):
             along = friction[contact] if sides == 2 else 1.0
             across = 2.0 * side - 1.0 if sides == 2 else 0.0
             second = place + sides - 1
@@ -214,7 +204,7 @@ def split(
                 dual[i, j + 1] = entry
             dual[i, 0] = edges[i, nullity] + margin * edges[i, nullity + 1]
             dual[i, number + 1] = 1.0
-        if pivot_to_solution(dual, number, TIE, work) == SOLVED:
+        if pivot_to_solution(number, TIE, tally, equations.dual) == SOLVED:
             break
         if attempt == 3:
             return dropped > 0
@@ -222,7 +212,7 @@ def split(
     for k in range(nullity):
         step[k] = 0.0
     for i in range(number):
-        row = work.labels[PLACE, number + i]
+        row = equations.dual.place[number + i]
         if row >= 0:
             for k in range(nullity):
                 step[k] += longest * dual[row, 0] * edges[i, k]

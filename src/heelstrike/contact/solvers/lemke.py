@@ -11,25 +11,18 @@ contact with friction brings four pairs::
     friction still available       0 <= mu lambda_n - beta_+ - beta_-  _|_  sigma >= 0
 
 with ``lambda_t = beta_+ - beta_-`` and ``sigma`` the slip speed; one without friction brings
-the first. The matrix is copositive, so with lexicographic pivoting a ray means that the problem
-has internal forces that the free velocity works against, not that the method was unlucky.
+the first, and a line the first twice, once in each direction. The matrix is copositive, so with
+lexicographic pivoting a ray means that the problem has internal forces that the free velocity works
+against, not that the method was unlucky.
 """
 
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.sets import LINE
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
-from heelstrike.contact.workspace import (
-    CONE,
-    MATRIX,
-    NORMAL,
-    OFFSET,
-    PLACE,
-    TANGENT,
-    TRIAL_MODE,
-    ContactWorkspace,
-)
+from heelstrike.contact.workspace import Dictionary, Floats, Integers, ReducedProblem, Tally
 
 PATHS = 9
 """How many covering vectors are tried: what rounding spoils on one path it spares on another, and
@@ -49,59 +42,74 @@ def covering(path: int, row: int) -> float:
 
 
 @kernel
-def load_frictional(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
+def faces_of(contact: int, reduced: ReducedProblem) -> int:
+    """How many velocities of a contact are held: with friction three, on a line both ways."""
+    if reduced.tangent[contact] >= 0:
+        return 3
+    return 2 if reduced.set[contact] == LINE else 1
+
+
+@kernel
+def load_frictional(count: int, path: int, reduced: ReducedProblem, tableau: Floats) -> int:
     """Write the reduced problem as a dictionary; return the number of pairs.
 
     The pairs of a contact are consecutive, in the order of the module's docstring. The free
     velocity is scaled to one.
     """
-    normal, tangent = work.labels[NORMAL], work.labels[TANGENT]
-    offset, cone = work.vectors[OFFSET], work.vectors[CONE]
-    matrix, tableau = work.squares[MATRIX], work.tableau
+    normal = reduced.normal
+    offset, cone, matrix = reduced.offset, reduced.cone, reduced.matrix
     size = 0.0
-    for i in range(unknowns):
+    for i in range(reduced.unknowns):
         size = max(size, abs(offset[i]))
     size = 1.0 / size if size > 0.0 else 1.0
-    pairs = unknowns
+    pairs = 0
     for contact in range(count):
-        if tangent[contact] >= 0:
-            pairs += 2
+        faces = faces_of(contact, reduced)
+        pairs += 4 if faces == 3 else faces
     for i in range(pairs):
         for j in range(pairs + 1):
             tableau[i, j] = 0.0
         tableau[i, pairs + 1] = covering(path, i)
     row = 0
     for contact in range(count):
-        height = 3 if tangent[contact] >= 0 else 1
+        height = faces_of(contact, reduced)
         for i in range(height):
-            own = normal[contact] + min(i, 1)
-            own_sign = -1.0 if i == 2 else 1.0
+            own = normal[contact] + (min(i, 1) if height == 3 else 0)
+            own_sign = -1.0 if i > 0 and i == height - 1 else 1.0
             tableau[row + i, 0] = own_sign * size * offset[own]
             column = 1
             for other in range(count):
-                width = 3 if tangent[other] >= 0 else 1
+                width = faces_of(other, reduced)
                 for j in range(width):
-                    entry = matrix[own, normal[other] + min(j, 1)]
-                    tableau[row + i, column + j] = -own_sign * entry if j == 2 else own_sign * entry
-                column += 4 if width == 3 else 1
-            if i > 0:
+                    entry = matrix[own, normal[other] + (min(j, 1) if width == 3 else 0)]
+                    sign = -own_sign if j > 0 and j == width - 1 else own_sign
+                    tableau[row + i, column + j] = sign * entry
+                column += 4 if width == 3 else width
+            if i > 0 and height == 3:
                 tableau[row + i, row + 4] = 1.0
                 tableau[row + 3, row + 1 + i] = -1.0
         if height == 3:
             tableau[row + 3, row + 1] = cone[contact]
-        row += 4 if height == 3 else 1
+        row += 4 if height == 3 else height
     return pairs
 
 
 @kernel
-def value(variable: int, work: ContactWorkspace) -> float:
+def value(variable: int, dictionary: Dictionary) -> float:
     """Return the value of a variable in the final dictionary."""
-    row = work.labels[PLACE, variable]
-    return work.tableau[row, 0] if row >= 0 else 0.0
+    row = dictionary.place[variable]
+    return dictionary.tableau[row, 0] if row >= 0 else 0.0
 
 
 @kernel
-def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
+def lemke(
+    count: int,
+    path: int,
+    reduced: ReducedProblem,
+    tally: Tally,
+    dictionary: Dictionary,
+    mode: Integers,
+) -> int:
     """Find the contact modes of the reduced problem by Lemke's method; return the status.
 
     ``path``, from 0 to ``PATHS`` - 1, chooses the covering vector and how close a tie is.
@@ -111,20 +119,20 @@ def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
         tie = 1e-13
     elif path % 3 == 2:
         tie = 1e-9
-    pairs = load_frictional(count, unknowns, path, work)
-    status = pivot_to_solution(work.tableau, pairs, tie, work)
-    place, tangent, mode = work.labels[PLACE], work.labels[TANGENT], work.labels[TRIAL_MODE]
+    pairs = load_frictional(count, path, reduced, dictionary.tableau)
+    status = pivot_to_solution(pairs, tie, tally, dictionary)
+    place = dictionary.place
     row = 0
     for contact in range(count):
-        frictional = tangent[contact] >= 0
+        frictional = reduced.tangent[contact] >= 0
         mode[contact] = STICK if place[pairs + row] >= 0 else OPEN
         if path == 0:
             # By the velocities. The other paths are for problems that rounding makes difficult,
             # and go by the basis.
-            if mode[contact] == OPEN and value(row, work) <= AT_REST:
+            if mode[contact] == OPEN and value(row, dictionary) <= AT_REST:
                 mode[contact] = STICK
             if mode[contact] == STICK and frictional:
-                slip = 0.5 * (value(row + 1, work) - value(row + 2, work))
+                slip = 0.5 * (value(row + 1, dictionary) - value(row + 2, dictionary))
                 if slip > AT_REST:
                     mode[contact] = SLIP_FORWARD
                 elif slip < -AT_REST:
@@ -137,5 +145,5 @@ def lemke(count: int, unknowns: int, path: int, work: ContactWorkspace) -> int:
                 mode[contact] = SLIP_FORWARD
             elif backward and not forward:
                 mode[contact] = SLIP_BACKWARD
-        row += 4 if frictional else 1
+        row += 4 if frictional else faces_of(contact, reduced)
     return status

@@ -1,37 +1,11 @@
-"""Pivoting of a dictionary: the operation, and Lemke's way of choosing what to pivot.
-
-A dictionary writes its basic variables in terms of the others: row i reads
-``basic_i = tableau[i, 0] + sum_j tableau[i, j] * other_j`` with columns j from 1.
-"""
+"""Lemke's way of choosing what to pivot."""
 
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import ITERATION_LIMIT, RAY, SOLVED
-from heelstrike.contact.workspace import (
-    COLUMN_LABEL,
-    ITERATIONS,
-    PLACE,
-    ROW_LABEL,
-    ContactWorkspace,
-    Floats,
-    Integers,
-)
-
-
-@kernel
-def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> None:
-    """Exchange the basic variable of ``row`` with the other variable of ``column``."""
-    inverse = 1.0 / tableau[row, column]
-    for j in range(columns):
-        tableau[row, j] *= -inverse
-    tableau[row, column] = inverse
-    for i in range(rows):
-        factor = tableau[i, column]
-        if i != row and factor != 0.0:
-            tableau[i, column] = 0.0
-            for j in range(columns):
-                tableau[i, j] += factor * tableau[row, j]
+from heelstrike.contact.workspace import Dictionary, Floats, Integers, Tally
+from heelstrike.dynamics.dense import pivot
 
 
 @kernel
@@ -61,20 +35,20 @@ def precedes(
 
 
 @kernel
-def pivot_to_solution(tableau: Floats, pairs: int, tie: float, work: ContactWorkspace) -> int:
+def pivot_to_solution(pairs: int, tie: float, tally: Tally, dictionary: Dictionary) -> int:
     """Run Lemke's pivots on a complementarity problem; return how they ended.
 
     Find ``w = M z + q >= 0``, ``z >= 0``, ``w @ z = 0``. Column 0 of the dictionary holds q,
     columns 1 ... ``pairs`` hold M and the last one the covering vector, all positive. Ties in the
     ratio test are broken lexicographically (Cottle, Pang and Stone, The Linear Complementarity
     Problem, section 4.9). Variables are numbered w_0 ..., z_0 ..., artificial; in the end
-    ``PLACE`` tells which are basic (their row) and which are zero (minus their column).
+    ``place`` tells which are basic (their row) and which are zero (minus their column).
 
     The entries should be of order one: closer than ``tie`` is equal, and pivots smaller than
     ten times that are rounding.
     """
-    row_label, column_label = work.labels[ROW_LABEL], work.labels[COLUMN_LABEL]
-    place = work.labels[PLACE]
+    row_label, column_label = dictionary.row_label, dictionary.column_label
+    tableau, place = dictionary.tableau, dictionary.place
     artificial = 2 * pairs
     column = pairs + 1
     row = pairs
@@ -96,7 +70,7 @@ def pivot_to_solution(tableau: Floats, pairs: int, tie: float, work: ContactWork
     if row == pairs:
         return SOLVED
     for _ in range(20 * pairs + 50):
-        work.counters[ITERATIONS] += 1
+        tally.iterations += 1
         entering = column_label[column]
         leaving = row_label[row]
         pivot(tableau, pairs, pairs + 2, row, column)

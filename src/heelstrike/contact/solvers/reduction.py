@@ -13,53 +13,34 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
-from heelstrike.contact.workspace import (
-    CONE,
-    MATRIX,
-    NORMAL,
-    OFFSET,
-    PRESCRIBED,
-    SCALE,
-    SLOPE,
-    SOURCE,
-    TANGENT,
-    ContactWorkspace,
-    Floats,
-    Integers,
-)
+from heelstrike.contact.sets import opening
+from heelstrike.contact.workspace import ContactProblem, Floats, Integers, ReducedProblem
 
 
 @kernel
 def reduce_problem(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    mode: Integers,
-    work: ContactWorkspace,
-) -> int:
-    """List the unknowns and their scales in ``work``; return how many they are.
+    problem: ContactProblem, mode: Integers, slope: Floats, reduced: ReducedProblem
+) -> None:
+    """List the unknowns and their scales; write the slope of contacts that are to slide, (nc,).
 
     The unknowns of a contact are consecutive, normal first. A contact whose sliding is
     prescribed has a normal unknown only, its friction following along.
     """
-    normal, tangent, source = work.labels[NORMAL], work.labels[TANGENT], work.labels[SOURCE]
-    prescribed, cone, slope = work.labels[PRESCRIBED], work.vectors[CONE], work.vectors[SLOPE]
-    scale, offset = work.vectors[SCALE], work.vectors[OFFSET]
+    delassus, scale = problem.delassus, reduced.scale
     unknowns = 0
-    for contact in range(count):
-        normal[contact] = unknowns
-        tangent[contact] = -1
-        prescribed[contact] = OPEN
+    for contact in range(problem.count):
+        reduced.normal[contact] = unknowns
+        reduced.tangent[contact] = -1
+        reduced.prescribed[contact] = OPEN
         slope[contact] = 0.0
+        reduced.set[contact] = problem.set[contact]
+        friction = opening(problem, contact)
         components = 1
         if mode[contact] == SLIDING_FORWARD or mode[contact] == SLIDING_BACKWARD:
-            prescribed[contact] = mode[contact]
-            slope[contact] = friction[contact]
-            if mode[contact] == SLIDING_FORWARD:
-                slope[contact] = -friction[contact]
-        elif friction[contact] > 0.0:
-            tangent[contact] = unknowns + 1
+            reduced.prescribed[contact] = mode[contact]
+            slope[contact] = -friction if mode[contact] == SLIDING_FORWARD else friction
+        elif friction > 0.0:
+            reduced.tangent[contact] = unknowns + 1
             components = 2
         for component in range(components):
             row = 2 * contact + component
@@ -67,28 +48,27 @@ def reduce_problem(
             if not weight > 0.0:
                 # Nothing moves it, or the matrix is not a Delassus matrix.
                 weight = 0.0
-                for j in range(2 * count):
+                for j in range(2 * problem.count):
                     weight = max(weight, max(abs(delassus[row, j]), abs(delassus[j, row])))
-            source[unknowns] = row
+            reduced.source[unknowns] = row
             scale[unknowns] = 1.0 / math.sqrt(weight) if weight > 0.0 else 1.0
-            offset[unknowns] = scale[unknowns] * free[row]
+            reduced.offset[unknowns] = scale[unknowns] * problem.free[row]
             unknowns += 1
-        cone[contact] = 0.0
+        reduced.cone[contact] = 0.0
         if components == 2:
-            cone[contact] = friction[contact] * scale[unknowns - 2] / scale[unknowns - 1]
-    return unknowns
+            reduced.cone[contact] = friction * scale[unknowns - 2] / scale[unknowns - 1]
+    reduced.unknowns = unknowns
 
 
 @kernel
-def scale_matrix(unknowns: int, delassus: Floats, work: ContactWorkspace) -> None:
+def scale_matrix(problem: ContactProblem, slope: Floats, reduced: ReducedProblem) -> None:
     """Write the scaled matrix of the listed unknowns; friction that is prescribed is part of it."""
-    source, slope, scale = work.labels[SOURCE], work.vectors[SLOPE], work.vectors[SCALE]
-    matrix = work.squares[MATRIX]
-    for j in range(unknowns):
+    delassus, source, scale = problem.delassus, reduced.source, reduced.scale
+    for j in range(reduced.unknowns):
         column = source[j]
         along = slope[column // 2]
-        for i in range(unknowns):
+        for i in range(reduced.unknowns):
             entry = delassus[source[i], column]
             if along != 0.0:
                 entry += along * delassus[source[i], column + 1]
-            matrix[i, j] = scale[i] * entry * scale[j]
+            reduced.matrix[i, j] = scale[i] * entry * scale[j]

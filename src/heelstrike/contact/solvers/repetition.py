@@ -11,26 +11,20 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
-from heelstrike.contact.certificate import certify
+from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.sets import LINE, opening, projected
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
-    BASIS,
-    EQUATION,
-    ORDER,
-    PIVOT_ROW,
-    POINT,
-    REST,
-    ROOT,
-    SETTINGS,
-    SHARERS,
-    SPAN,
-    SPEED,
-    STEP,
-    ContactWorkspace,
+    ContactAnswer,
+    ContactProblem,
     Floats,
     Integers,
+    Settings,
+    StickingRows,
+    Yardstick,
 )
+from heelstrike.dynamics.dense import solve_positive
 
 SAME_ROW = 1e-14
 """Two rows are one if the inverse mass along their difference is less than this, relative."""
@@ -38,29 +32,37 @@ SAME_ROW = 1e-14
 GOOD_PIVOT = 1e-2
 """Pivots that keep more than this of their diagonal are good."""
 
+CLEAN = 1e-11
+"""Modes with smaller residuals are taken at once; others may be nearly right, and better follow."""
+
+BARELY = 1e-13
+"""Velocities above this, relative to the data, are there, though they count as rest."""
+
+AS_GOOD = 2.0 * REST_TOLERANCE
+"""Residual up to which contacts at rest are left to carry impulses, though a smaller residual may
+be had without."""
+
+TRIES = 4
+"""How often modes are tried, and those that are found wrong changed, before the general way."""
+
 NO_PIVOT = 1e-11
 """Rows that keep less depend on those before; what lies between is left to the general way."""
 
 
 @dissolved_kernel
-def list_equations(
-    count: int, delassus: Floats, friction: Floats, mode: Integers, work: ContactWorkspace
-) -> int:
-    """List the rows that shall have no velocity; return how many differ, or -1 to give up.
-
-    ``EQUATION`` holds the row of each equation, ``PIVOT_ROW`` the equation of each row, -1 for
-    none, and ``SHARERS`` how many rows share an equation.
-    """
-    source, equation, sharers = work.labels[EQUATION], work.labels[PIVOT_ROW], work.vectors[SHARERS]
+def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) -> int:
+    """List the rows that shall have no velocity; return how many differ, or -1 to give up."""
+    delassus = problem.delassus
+    source, equation, sharers = rows.row, rows.equation, rows.sharers
     size = 0
-    for contact in range(count):
+    for contact in range(problem.count):
         row = 2 * contact
         tangent = row + 1
         equation[row] = -1
         equation[tangent] = -1
-        if mode[contact] == OPEN:
+        if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
-        has_friction = friction[contact] > 0.0
+        has_friction = opening(problem, contact) > 0.0
         if mode[contact] >= SLIDING_FORWARD or (has_friction and mode[contact] != STICK):
             return -1
         equation[row] = size
@@ -86,20 +88,20 @@ def list_equations(
 
 
 @dissolved_kernel
-def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
+def solve_at_once(size: int, problem: ContactProblem, rows: StickingRows) -> bool:
     """Like :func:`solve_equations` for few equations, by straight-line code."""
-    if size >= work.eliminations.shape[0] or work.eliminations[size] == 0:
+    if size >= rows.programs.shape[0] or rows.programs[size] == 0:
         return False
-    source, matrix = work.labels[EQUATION], work.lower_half
-    x, pivot = work.vectors[POINT], work.vectors[STEP]
+    delassus, source, matrix = problem.delassus, rows.row, rows.lower_half
+    x, pivot = rows.x, rows.pivot
     place = 0
     for i in range(size):
         row = source[i]
-        x[i] = -free[row]
+        x[i] = -problem.free[row]
         for j in range(i + 1):
             matrix[place] = delassus[row, source[j]]
             place += 1
-    play(work.eliminations[size], (matrix, x, pivot))
+    play(rows.programs[size], (matrix, x, pivot))
     rank = 0
     for i in range(size):
         diagonal = delassus[source[i], source[i]]
@@ -108,12 +110,12 @@ def solve_at_once(size: int, delassus: Floats, free: Floats, work: ContactWorksp
         elif abs(pivot[i]) > NO_PIVOT * diagonal:
             return False
     if rank < size:
-        leave_out_idle(size, work)
+        leave_out_idle(size, rows)
     return True
 
 
 @kernel
-def leave_out_idle(size: int, work: ContactWorkspace) -> None:
+def leave_out_idle(size: int, rows: StickingRows) -> None:
     """Take from the solution what lies along directions that change no velocity.
 
     For few equations it is quicker than :func:`shorten`, which needs them in another order. There
@@ -121,8 +123,7 @@ def leave_out_idle(size: int, work: ContactWorkspace) -> None:
     orthogonal one after the other, in the norm of the impulses: what m rows share in equal parts
     counts 1/m.
     """
-    matrix, x, basis = work.lower_half, work.vectors[POINT], work.squares[BASIS]
-    sharers = work.vectors[SHARERS]
+    matrix, x, basis, sharers = rows.lower_half, rows.x, rows.square, rows.sharers
     found = 0
     for row in range(size):
         if matrix[row * (row + 1) // 2 + row] != 0.0:
@@ -154,26 +155,28 @@ def remove_part(size: int, direction: Floats, sharers: Floats, vector: Floats) -
 
 
 @dissolved_kernel
-def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWorkspace) -> bool:
-    """Solve ``G x = -b`` over the listed rows, x of least norm to ``POINT``; return success.
+def solve_equations(size: int, problem: ContactProblem, rows: StickingRows) -> bool:
+    """Solve ``G x = -b`` over the listed rows, of least norm; return success.
 
     Elimination, G = L D Lᵀ with 1/D on the diagonal. Rows that depend on others are put off to the
     end of the list and bring no column to L: their number costs little. Neighbours among many
     points of a sole nearly do, and are tried again after the others.
     """
-    if solve_at_once(size, delassus, free, work):
+    if solve_at_once(size, problem, rows):
         return True
-    source, matrix, x = work.labels[EQUATION], work.tableau, work.vectors[POINT]
+    delassus, source, order = problem.delassus, rows.row, rows.order
+    matrix, x = rows.factor, rows.spare
+    for i in range(size):
+        order[i] = i
     rank = 0
     rest = size
     least = GOOD_PIVOT
     poor = False
-    moved = False
     while rank < rest:
-        row = source[rank]
-        total = -free[row]
+        row = source[order[rank]]
+        total = -problem.free[row]
         for j in range(rank):
-            entry = delassus[row, source[j]]
+            entry = delassus[row, source[order[j]]]
             for k in range(j):
                 entry -= matrix[rank, k] * matrix[j, k]
             # Until the row is finished, its entries still carry their D.
@@ -192,12 +195,10 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
         elif pivot > POOR_PIVOT * diagonal or abs(pivot) <= NO_PIVOT * diagonal:
             poor = poor or pivot > POOR_PIVOT * diagonal
             rest -= 1
-            work.labels[SPAN, rest] = rank
-            if rest > rank:
-                if not moved:
-                    begin_order(size, work)
-                    moved = True
-                exchange(rank, rest, work)
+            rows.span[rest] = rank
+            order[rank], order[rest] = order[rest], order[rank]
+            for i in range(rank):
+                matrix[rest, i] = matrix[rank, i]
         else:
             return False
         if poor and rank == rest:
@@ -210,44 +211,14 @@ def solve_equations(size: int, delassus: Floats, free: Floats, work: ContactWork
         for j in range(i):
             x[j] -= matrix[i, j] * x[i]
     if rank < size:
-        shorten(rank, size, work)
-    if moved:
-        put_back(size, work)
+        shorten(rank, size, rows)
+    for place in range(size):
+        rows.x[order[place]] = x[place]
     return True
 
 
 @kernel
-def begin_order(size: int, work: ContactWorkspace) -> None:
-    """List the equations in their order."""
-    for i in range(size):
-        work.labels[ORDER, i] = i
-
-
-@kernel
-def exchange(rank: int, rest: int, work: ContactWorkspace) -> None:
-    """Exchange the equation in hand for the last that is untried."""
-    source, order, matrix = work.labels[EQUATION], work.labels[ORDER], work.tableau
-    sharers = work.vectors[SHARERS]
-    source[rank], source[rest] = source[rest], source[rank]
-    order[rank], order[rest] = order[rest], order[rank]
-    sharers[rank], sharers[rest] = sharers[rest], sharers[rank]
-    for i in range(rank):
-        matrix[rest, i] = matrix[rank, i]
-
-
-@kernel
-def put_back(size: int, work: ContactWorkspace) -> None:
-    """Undo all exchanges in the solution and the list of sharers."""
-    order, x, sharers = work.labels[ORDER], work.vectors[POINT], work.vectors[SHARERS]
-    for vector in (x, sharers):
-        for place in range(size):
-            work.vectors[SPEED, place] = vector[place]
-        for place in range(size):
-            vector[order[place]] = work.vectors[SPEED, place]
-
-
-@kernel
-def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
+def shorten(rank: int, size: int, rows: StickingRows) -> None:
     """Spread the solution from the independent rows over all, to the least norm.
 
     The other rows are combinations of these, C = L₂ L₁⁻¹. Where y solves for these alone, every x
@@ -256,11 +227,11 @@ def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
 
         x₂ = M₂ C (M₁ + Cᵀ M₂ C)⁻¹ y
     """
-    matrix, x, sharers = work.tableau, work.vectors[POINT], work.vectors[SHARERS]
-    y, system = work.vectors[STEP], work.squares[BASIS]
+    matrix, x, sharers, order = rows.factor, rows.spare, rows.sharers, rows.order
+    y, system = rows.pivot, rows.square
     for place in range(rank, size):
         part = matrix[place]
-        for j in range(work.labels[SPAN, place], rank):
+        for j in range(rows.span[place], rank):
             part[j] = 0.0
         for j in range(rank - 2, -1, -1):
             entry = part[j]
@@ -271,116 +242,108 @@ def shorten(rank: int, size: int, work: ContactWorkspace) -> None:
         y[i] = x[i]
         for j in range(i):
             system[i, j] = 0.0
-        system[i, i] = sharers[i]
+        system[i, i] = sharers[order[i]]
     for place in range(rank, size):
         part = matrix[place]
         for i in range(rank):
-            weighted = sharers[place] * part[i]
+            weighted = sharers[order[place]] * part[i]
             for j in range(i + 1):
                 system[i, j] += weighted * part[j]
-    solve_regular(rank, system, y)
+    solve_positive(rank, system, y)
     for place in range(rank, size):
         part = matrix[place]
         entry = 0.0
         for i in range(rank):
             entry += part[i] * y[i]
-        entry *= sharers[place]
+        entry *= sharers[order[place]]
         x[place] = entry
         for i in range(rank):
             x[i] -= part[i] * entry
 
 
 @dissolved_kernel
-def solve_regular(size: int, matrix: Floats, x: Floats) -> None:
-    """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
-    for i in range(size):
-        for j in range(i):
-            entry = matrix[i, j]
-            for k in range(j):
-                entry -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = entry
-        for j in range(i):
-            ratio = matrix[i, j] * matrix[j, j]
-            matrix[i, i] -= ratio * matrix[i, j]
-            x[i] -= ratio * x[j]
-            matrix[i, j] = ratio
-        matrix[i, i] = 1.0 / matrix[i, i]
-    for j in range(size - 1, -1, -1):
-        total = x[j] * matrix[j, j]
-        for i in range(j + 1, size):
-            total -= matrix[i, j] * x[i]
-        x[j] = total
+def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactAnswer) -> int:
+    """Write the solution out to all rows in equal shares; return how many contacts would pull.
 
-
-@dissolved_kernel
-def share_impulses(count: int, friction: Floats, impulse: Floats, work: ContactWorkspace) -> bool:
-    """Write the solution out to all rows in equal shares; return whether it is in the cones."""
-    equation, sharers, x = work.labels[PIVOT_ROW], work.vectors[SHARERS], work.vectors[POINT]
-    for row in range(2 * count):
-        place = equation[row]
-        impulse[row] = x[place] / sharers[place] if place >= 0 else 0.0
-    for contact in range(count):
-        normal = impulse[2 * contact]
-        if not (normal >= 0.0 and abs(impulse[2 * contact + 1]) <= friction[contact] * normal):
-            return False
-    return True
-
-
-@dissolved_kernel
-def moves_as_named(
-    count: int, friction: Floats, mode: Integers, velocity: Floats, work: ContactWorkspace
-) -> bool:
-    """Whether the velocity has every contact do what its mode says.
-
-    A contact without friction takes the name of its velocity.
+    Their modes become open. -1 is returned where friction is not held. What pulls no more than
+    rounding may explain is cut off, and the certificate decides.
     """
-    root, rest = work.vectors[ROOT], work.vectors[SETTINGS, REST]
-    for contact in range(count):
+    impulse = answer.impulse
+    largest = 0.0
+    for row in range(2 * problem.count):
+        place = rows.equation[row]
+        impulse[row] = rows.x[place] / rows.sharers[place] if place >= 0 else 0.0
+        largest = max(largest, abs(impulse[row]))
+    pulling = 0
+    for contact in range(problem.count):
+        if problem.set[contact] != LINE and impulse[2 * contact] < -CLEAN * largest:
+            answer.mode[contact] = OPEN
+            rows.pulled[contact] = 1
+            pulling += 1
+    if pulling == 0:
+        for contact in range(problem.count):
+            row = 2 * contact
+            impulse[row], across = projected(problem, contact, impulse[row], impulse[row + 1])
+            if across != impulse[row + 1]:
+                return -1
+    return pulling
+
+
+@dissolved_kernel
+def name_by_velocity(
+    problem: ContactProblem, pulled: Integers, yardstick: Yardstick, answer: ContactAnswer
+) -> int:
+    """Name what contacts do; return how many were open but at rest, or -1 if one slips.
+
+    Contacts at rest may carry impulses, and only with all of these admitted is the least norm
+    unique. One that would pull need not be admitted, if it is not quite at rest.
+    """
+    mode, velocity = answer.mode, answer.velocity
+    root, rest = yardstick.root, yardstick.rest
+    pressed = 0
+    for contact in range(problem.count):
         normal = 2 * contact
         tangent = normal + 1
-        departs = velocity[normal] > rest * root[normal]
-        if departs != (mode[contact] == OPEN):
-            return False
-        if departs:
+        if velocity[normal] > rest * root[normal] and problem.set[contact] != LINE:
+            if mode[contact] != OPEN:
+                return -1
             continue
+        if mode[contact] == OPEN and problem.set[contact] != LINE:
+            moves = velocity[normal] > BARELY * yardstick.unit * root[normal]
+            pressed += not (moves and pulled[contact] == 1)
+        mode[contact] = STICK
         if abs(velocity[tangent]) > rest * root[tangent]:
-            if friction[contact] > 0.0:
-                return False
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
-    return True
+            if opening(problem, contact) > 0.0:
+                return -1
+    return pressed
 
 
 @dissolved_kernel
 def repeat(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    mode: Integers,
-    impulse: Floats,
-    velocity: Floats,
-    residual: Floats,
-    tolerance: float,
-    work: ContactWorkspace,
+    problem: ContactProblem,
+    settings: Settings,
+    rows: StickingRows,
+    yardstick: Yardstick,
+    answer: ContactAnswer,
 ) -> bool:
-    """Solve the contact problem if its contacts do what ``mode`` says; return success.
+    """Solve the contact problem if its contacts do nearly what their modes say; return success.
 
-    Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`. After a
-    success they hold the one solution of least norm, certified to ``tolerance``.
+    After a success the answer is the one of least norm, certified as :data:`AS_GOOD`. Of contacts
+    that pull or press although they should not, the modes are changed.
     """
-    size = list_equations(count, delassus, friction, mode, work)
-    if size < 0 or not solve_equations(size, delassus, free, work):
-        return False
-    if not share_impulses(count, friction, impulse, work):
-        return False
-    worst = certify(
-        count,
-        delassus,
-        free,
-        friction,
-        impulse,
-        velocity,
-        residual,
-        work,
-    )
-    return worst <= tolerance and moves_as_named(count, friction, mode, velocity, work)
+    for contact in range(problem.count):
+        rows.pulled[contact] = 0
+    for _ in range(TRIES):
+        size = list_equations(problem, answer.mode, rows)
+        if size < 0 or not solve_equations(size, problem, rows):
+            return False
+        changed = share_impulses(problem, rows, answer)
+        if changed == 0:
+            worst = certify(problem, settings, yardstick, answer)
+            changed = name_by_velocity(problem, rows.pulled, yardstick, answer)
+            if changed == 0:
+                return worst <= min(settings.tolerance, AS_GOOD)
+        if changed < 0:
+            return False
+    return False

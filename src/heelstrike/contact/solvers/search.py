@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
 from numba import types
 
-from heelstrike.compiler.compilation import kernel, type_of
+from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import separate_kernel
 from heelstrike.contact.certificate import certify
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
@@ -30,41 +29,23 @@ from heelstrike.contact.solvers.combinations import (
     next_combination,
     note_residual,
 )
+from heelstrike.contact.solvers.elimination import LARGEST, elimination_programs
 from heelstrike.contact.solvers.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.lemke import PATHS, lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.solvers.repetition import repeat
+from heelstrike.contact.solvers.repetition import AS_GOOD, CLEAN
 from heelstrike.contact.workspace import (
-    EFFORT,
-    FAILURES,
-    FALLBACKS,
-    IMPULSE,
-    LAST_FALLBACKS,
-    MATRIX,
-    PRESCRIBED,
-    RESIDUAL,
-    REST_TOLERANCE,
-    SCALE,
-    SETTINGS,
-    SHORTCUTS,
-    SKEWED,
-    SOURCE,
-    SUCCEEDED,
-    TOLERANCE,
-    TRIAL_MODE,
-    VELOCITY,
+    ContactAnswer,
+    ContactProblem,
     ContactWorkspace,
-    Floats,
+    Dictionary,
+    Equations,
     Integers,
-    allocate_contact_workspace,
+    ReducedProblem,
+    StickingRows,
+    Yardstick,
 )
-
-CLEAN = 1e-11
-"""Modes with smaller residuals are taken at once; others may be nearly right, and better follow."""
-
-AS_GOOD = 2.0 * REST_TOLERANCE
-"""Residual up to which released contacts are preferred to a smaller residual without."""
 
 NEARLY_SINGULAR = 1e-10
 """Pivots of the unit-diagonal matrix below this allow of impulses 1e5 times the data."""
@@ -74,52 +55,46 @@ ROUNDS = 6
 
 
 @kernel
-def keep(
-    count: int,
-    mode: Integers,
-    impulse: Floats,
-    velocity: Floats,
-    residual: Floats,
-    work: ContactWorkspace,
-) -> None:
-    """Copy the trial in the workspace to the caller's arrays."""
+def keep(count: int, trial: ContactAnswer, answer: ContactAnswer) -> None:
+    """Copy the trial to the answer."""
     for i in range(2 * count):
-        impulse[i] = work.vectors[IMPULSE, i]
-        velocity[i] = work.vectors[VELOCITY, i]
+        answer.impulse[i] = trial.impulse[i]
+        answer.velocity[i] = trial.velocity[i]
     for i in range(3):
-        residual[i] = work.vectors[RESIDUAL, i]
+        answer.residual[i] = trial.residual[i]
     for contact in range(count):
-        mode[contact] = work.labels[TRIAL_MODE, contact]
+        answer.mode[contact] = trial.mode[contact]
 
 
 @kernel
-def is_doubtful(count: int, worst: float, work: ContactWorkspace) -> bool:
+def is_doubtful(count: int, worst: float, tolerance: float, yardstick: Yardstick) -> bool:
     """Whether an answer fails its certificate only because its impulses cannot be written down.
 
     Rounding them changes velocities by more than the tolerance, and they miss by no more than that.
     """
-    settings = work.vectors[SETTINGS]
-    rounding = UNIT_ROUNDOFF * settings[EFFORT]
-    return (
-        settings[TOLERANCE] < worst and settings[TOLERANCE] < rounding and worst <= count * rounding
-    )
+    rounding = UNIT_ROUNDOFF * yardstick.effort
+    return tolerance < worst and tolerance < rounding and worst <= count * rounding
 
 
 @kernel
-def nearly_singular(unknowns: int, delassus: Floats, work: ContactWorkspace) -> bool:
+def nearly_singular(problem: ContactProblem, reduced: ReducedProblem) -> bool:
     """Whether the matrix is singular to rounding, and not known to be so exactly.
 
     Whether an internal force changes no velocity, so that no impulse helps, or almost none, so that
     a huge one does, is then a question of the last digits. Elimination with complete pivoting; it
     is exact where no operation is rounded, as with two walls that face each other.
     """
-    source, scale = work.labels[SOURCE], work.vectors[SCALE]
-    matrix = work.squares[MATRIX]
+    unknowns, source, scale, matrix = (
+        reduced.unknowns,
+        reduced.source,
+        reduced.scale,
+        reduced.matrix,
+    )
     for i in range(unknowns):
         for j in range(unknowns):
             # Powers of two round nothing.
             shift = math.frexp(scale[i])[1] + math.frexp(scale[j])[1]
-            matrix[i, j] = math.ldexp(delassus[source[i], source[j]], shift)
+            matrix[i, j] = math.ldexp(problem.delassus[source[i], source[j]], shift)
     exact = True
     for step in range(unknowns):
         row = step
@@ -148,81 +123,35 @@ def nearly_singular(unknowns: int, delassus: Floats, work: ContactWorkspace) -> 
     return False
 
 
-@kernel
-def stick_or_open(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    tolerance: float,
-    work: ContactWorkspace,
-) -> bool:
-    """Try the modes under trial the quick way, if no contact is prescribed to slide."""
-    vectors, labels = work.vectors, work.labels
-    if vectors[SETTINGS, SKEWED] != 0.0:
-        return False
-    for contact in range(count):
-        if labels[PRESCRIBED, contact] != OPEN:
-            return False
-    return repeat(
-        count,
-        delassus,
-        free,
-        friction,
-        labels[TRIAL_MODE],
-        vectors[IMPULSE],
-        vectors[VELOCITY],
-        vectors[RESIDUAL],
-        tolerance,
-        work,
-    )
-
-
 def _signature() -> Any:
-    matrix, vector, integers = types.float64[:, ::1], types.float64[::1], types.int64[::1]
-    work = type_of(allocate_contact_workspace(1, np.zeros(1, np.int64)))
     return types.int64(
-        types.int64,
-        matrix,
-        vector,
-        vector,
-        integers,
-        integers,
-        vector,
-        vector,
-        vector,
-        work,
+        ContactProblem.compiled_type(),
+        types.int64[::1],
+        ContactWorkspace.compiled_type(),
+        ContactAnswer.compiled_type(),
     )
 
 
 @separate_kernel(_signature)
 def try_solvers(
-    count: int,
-    delassus: Floats,
-    free: Floats,
-    friction: Floats,
-    order: Integers,
-    mode: Integers,
-    impulse: Floats,
-    velocity: Floats,
-    residual: Floats,
-    work: ContactWorkspace,
+    problem: ContactProblem, order: Integers, work: ContactWorkspace, answer: ContactAnswer
 ) -> int:
-    """Try the modes in ``mode``, then the solvers in ``order``; return a ``SolveStatus`` value.
+    """Try the modes of the answer, then the solvers in ``order``; return a ``SolveStatus`` value.
 
     Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`.
     """
-    counters, labels, vectors = work.counters, work.labels, work.vectors
-    tolerance = vectors[SETTINGS, TOLERANCE]
+    count, tally, reduced, trial = problem.count, work.tally, work.reduced, work.trial
+    mode = answer.mode
+    tolerance = work.settings.tolerance
     clean = min(tolerance, CLEAN)
     for contact in range(count):
-        labels[TRIAL_MODE, contact] = mode[contact]
+        trial.mode[contact] = mode[contact]
     for i in range(2 * count):
-        impulse[i] = 0.0
-        velocity[i] = free[i]
+        answer.impulse[i] = 0.0
+        answer.velocity[i] = problem.free[i]
     for i in range(3):
-        residual[i] = math.inf
-    unknowns = reduce_problem(count, delassus, free, friction, mode, work)
+        answer.residual[i] = math.inf
+    reduce_problem(problem, mode, work.yardstick.slope, reduced)
 
     status = UNCERTIFIED
     best = math.inf
@@ -234,10 +163,10 @@ def try_solvers(
         outcome = UNCERTIFIED
         if attempt >= 0:
             if attempt == 0:
-                scale_matrix(unknowns, delassus, work)
+                scale_matrix(problem, work.yardstick.slope, reduced)
             elif status != SOLVED:
-                counters[FALLBACKS] += 1
-                counters[LAST_FALLBACKS] += 1
+                tally.fallbacks += 1
+                tally.last_fallbacks += 1
         before = best
         latest = False
         call = count - count
@@ -246,79 +175,71 @@ def try_solvers(
             if attempt < 0:
                 proposing = False
             elif solver == LEMKE:
-                outcome = lemke(count, unknowns, call, work)
+                outcome = lemke(count, call, reduced, tally, work.lemke, trial.mode)
                 proposing = call + 1 < PATHS
             elif solver == FISCHER_BURMEISTER:
-                outcome = fischer_burmeister(count, unknowns, call, work)
+                outcome = fischer_burmeister(
+                    count, call, reduced, tally, work.iteration, trial.mode
+                )
                 proposing = outcome == SOLVED
             elif solver == GAUSS_SEIDEL:
-                outcome = gauss_seidel(count, unknowns, call, work)
+                outcome = gauss_seidel(count, call, reduced, tally, work.iteration, trial.mode)
                 proposing = outcome == SOLVED
             else:
                 if call == 0:
-                    begin_combinations(count, mode, best, work)
-                proposing = next_combination(count, work)
+                    begin_combinations(count, mode, best, work.combinations)
+                proposing = next_combination(
+                    count, reduced.tangent, tally, work.combinations, trial.mode
+                )
                 if not proposing:
                     break
             call += 1
-            if attempt >= 0 and stick_or_open(count, delassus, free, friction, clean, work):
-                keep(count, mode, impulse, velocity, residual, work)
-                counters[SUCCEEDED] = solver
-                return SOLVED
-            worst = evaluate(count, delassus, free, friction, work)
+            worst = evaluate(problem, work)
             if solver == COMBINATIONS:
-                note_residual(count, worst, work)
+                note_residual(count, worst, trial.mode, work.combinations)
             latest = worst < best
             if latest:
                 best = worst
-                keep(count, mode, impulse, velocity, residual, work)
+                keep(count, trial, answer)
             if worst <= clean:
                 break
-        if attempt >= 0 or best <= clean:
+        found = best
+        if attempt >= 0 or found <= clean:
             if not latest:
-                certify(
-                    count,
-                    delassus,
-                    free,
-                    friction,
-                    impulse,
-                    velocity,
-                    residual,
-                    work,
-                )
+                certify(problem, work.settings, work.yardstick, answer)
             # The same answer whichever solver found it: contacts at rest are released to carry
             # any impulse in their cone, so that the split is of least norm among all. And a
             # candidate that is not quite a solution may become one.
             for _ in range(ROUNDS):
-                if not label(count, velocity, mode, work):
+                if not label(count, answer.velocity, reduced, work.yardstick, mode):
                     break
                 for contact in range(count):
-                    labels[TRIAL_MODE, contact] = mode[contact]
-                worst = evaluate(count, delassus, free, friction, work)
+                    trial.mode[contact] = mode[contact]
+                worst = evaluate(problem, work)
                 if not (worst < best or worst <= AS_GOOD):
                     break
                 best = worst
-                keep(count, mode, impulse, velocity, residual, work)
+                keep(count, trial, answer)
         if best < before and attempt >= 0:
-            counters[SUCCEEDED] = solver
-        if best <= tolerance and (attempt >= 0 or best <= clean):
+            tally.solver = solver
+        if best <= tolerance and (attempt >= 0 or found <= clean):
             status = SOLVED
-            if best <= clean:
+            if found <= clean:
                 break
         elif attempt == 0 or outcome == RAY:
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
-        counters[FAILURES] += 1
-        worst = certify(count, delassus, free, friction, impulse, velocity, residual, work)
-        if is_doubtful(count, worst, work) or (
-            with_fallbacks and nearly_singular(unknowns, delassus, work)
+        tally.failures += 1
+        worst = certify(problem, work.settings, work.yardstick, answer)
+        if is_doubtful(count, worst, tolerance, work.yardstick) or (
+            with_fallbacks and nearly_singular(problem, reduced)
         ):
             status = UNDECIDABLE
     elif attempt < 0:
-        counters[SHORTCUTS] += 1
+        tally.shortcuts += 1
     for contact in range(count):
-        if labels[PRESCRIBED, contact] != OPEN and mode[contact] != OPEN:
-            mode[contact] = labels[PRESCRIBED, contact]
+        if reduced.prescribed[contact] != OPEN and mode[contact] != OPEN:
+            mode[contact] = reduced.prescribed[contact]
     return status
 
 
@@ -335,4 +256,17 @@ def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
     """
     if ready:
         try_solvers.finish()
-    return allocate_contact_workspace(capacity, try_solvers.address)
+    contacts = max(int(capacity), 1)
+    rows = 2 * contacts
+    programs = elimination_programs()
+    work = ContactWorkspace.allocate(
+        nc=contacts,
+        sticking=StickingRows.allocate(
+            nc=contacts, half=LARGEST * (LARGEST + 1) // 2, programs=programs
+        ),
+        equations=Equations.allocate(nc=contacts, dual=Dictionary.allocate(pairs=rows)),
+        lemke=Dictionary.allocate(pairs=2 * rows),
+        solvers=try_solvers.address,
+    )
+    work.settings.tolerance = 1e-9
+    return work

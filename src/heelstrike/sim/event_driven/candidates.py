@@ -31,20 +31,8 @@ def solve_candidates(
                 memory.problem_mode[place] = SLIDING_BACKWARD
             elif memory.mode[contact] < SLIDING_FORWARD:
                 memory.problem_mode[place] = memory.mode[contact]
-    return int(
-        solve_contact_kernel(
-            count,
-            memory.delassus,
-            memory.free,
-            memory.problem_friction,
-            order,
-            memory.problem_mode,
-            memory.impulse,
-            memory.velocity,
-            memory.residual,
-            memory.solver,
-        )
-    )
+    memory.problem.count = count
+    return int(solve_contact_kernel(memory.problem, order, memory.solver, memory.answer))
 
 
 @kernel

@@ -8,12 +8,12 @@ contact points, dry joints from the stops, and these kernels tell them apart.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.sets import press
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contact_geometry import contact_rows, contact_velocity, write_unit_row
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.dry_friction import press_dry_joint
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 
@@ -87,4 +87,4 @@ def free_gap_acceleration(
     dry = contact - phase.closed.shape[0] + phase.dry_joint.shape[0]
     if dry >= 0:
         limit = model.dry_friction[phase.dry_joint[dry]]
-        press_dry_joint(place, limit, memory.delassus, memory.free)
+        press(memory.problem, place, limit)

@@ -26,8 +26,8 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.contact.modes import STICK as STICKING
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Integers, Model
@@ -292,6 +292,7 @@ def select_candidates(
             normal += memory.restitution[contact] * before
         memory.free[2 * count] = normal
         memory.free[2 * count + 1] = velocity[contact, 1]
+        memory.problem.set[count] = CONE
         memory.problem_friction[count] = memory.friction[contact]
         memory.problem_mode[count] = memory.mode[contact]
         memory.candidate[count] = contact
@@ -324,9 +325,8 @@ def select_stops(
                 continue
             memory.free[2 * count] = normal
             memory.free[2 * count + 1] = 0.0
-            memory.problem_friction[count] = 0.0
-            pressed = sign * memory.stop_torque[joint] > 0.0
-            memory.problem_mode[count] = STICKING if pressed else 0
+            memory.problem.set[count] = HALF_LINE
+            memory.problem_mode[count] = memory.stop_mode[joint, end]
             memory.candidate[count] = points + 2 * joint + end
             count += 1
     return count
@@ -349,57 +349,110 @@ def write_rows(model: Model, memory: Memory, count: int) -> None:
 
 
 @dissolved_kernel
-def are_usual(memory: Memory, count: int) -> bool:
-    """Whether there are programs for all candidates."""
-    if memory.programs[DELASSUS] == 0:
-        return False
-    for place in range(count):
-        candidate = memory.candidate[place]
-        if candidate >= memory.usual_place.shape[0] or memory.usual_place[candidate] < 0:
-            return False
-    return True
+def are_usual(memory: Memory, near: int) -> bool:
+    """Whether there are programs for the contact points among the candidates, the first `near`."""
+    usual = memory.programs[DELASSUS] != 0
+    for place in range(near):
+        usual = usual and memory.usual_place[memory.candidate[place]] >= 0
+    return usual
+
+
+@kernel
+def joint_row(model: Model, memory: Memory, place: int) -> tuple[int, int, float]:
+    """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
+    stop = memory.candidate[place] - model.contact_link.shape[0]
+    dry = stop - 2 * model.parent.shape[0]
+    if dry >= 0:
+        return 2 * place + 1, memory.dry_joint[dry], 1.0
+    return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
 
 
 @dissolved_kernel
-def gather_delassus(model: Model, memory: Memory, count: int) -> None:
-    """Delassus matrix of all usual points; that of the candidates too, if they are fewer."""
+def gather_delassus(model: Model, memory: Memory, near: int, count: int) -> None:
+    """Delassus matrix of all usual points; that of the candidates too, if these are others."""
     contacts = memory.contacts
-    play(
-        memory.programs[DELASSUS],
-        (
-            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-            memory.factor, memory.point_rows, memory.point_delassus,
-        ),
-    )  # fmt: skip
-    if count == memory.usual_points.shape[0]:
+    if near > 0:
+        play(
+            memory.programs[DELASSUS],
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                memory.factor, memory.point_rows, memory.point_delassus,
+            ),
+        )  # fmt: skip
+    if near == count == memory.usual_points.shape[0]:
         return
-    for place in range(count):
+    for place in range(near):
         row = 2 * memory.usual_place[memory.candidate[place]]
-        for other in range(count):
+        for other in range(near):
             column = 2 * memory.usual_place[memory.candidate[other]]
             for i in range(2):
                 for j in range(2):
                     entry = memory.point_delassus[row + i, column + j]
                     memory.delassus[2 * place + i, 2 * other + j] = entry
+    for place in range(near, count):
+        add_joint(model, memory, near, place)
 
 
 @dissolved_kernel
-def push_candidates(model: Model, memory: Memory, count: int) -> None:
-    """Add what the impulses of the candidates, usual points all, do to the velocity."""
+def add_joint(model: Model, memory: Memory, near: int, place: int) -> None:
+    """Add the stop or dry joint at a place to the Delassus matrix of the candidates before.
+
+    What a unit impulse along its row does to the joint velocities, A⁻¹ e, goes to that row of
+    ``memory.jacobian``.
+    """
+    contacts, delassus, velocity = memory.contacts, memory.delassus, memory.point_velocity
+    row, joint, sign = joint_row(model, memory, place)
+    change = memory.jacobian[row]
+    for j in range(model.parent.shape[0]):
+        change[j] = 0.0
+    change[joint] = sign
+    solve_mass_matrix(model, memory, change)
+    for other in range(2 * place + 2):
+        for own in range(2 * place, 2 * place + 2):
+            delassus[own, other] = 0.0
+            delassus[other, own] = 0.0
+    if near > 0:
+        play(
+            memory.programs[VELOCITIES],
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                change, velocity,
+            ),
+        )  # fmt: skip
+    for other in range(near):
+        for i in range(2):
+            entry = velocity[memory.candidate[other], i]
+            delassus[row, 2 * other + i] = entry
+            delassus[2 * other + i, row] = entry
+    for other in range(near, place + 1):
+        column, its_joint, its_sign = joint_row(model, memory, other)
+        entry = its_sign * change[its_joint]
+        delassus[row, column] = entry
+        delassus[column, row] = entry
+
+
+@dissolved_kernel
+def push_candidates(model: Model, memory: Memory, near: int, count: int) -> None:
+    """Add what the impulses of the candidates do to the velocity, after `gather_delassus`."""
     contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
         memory.point_impulse[contact, 0] = 0.0
         memory.point_impulse[contact, 1] = 0.0
-    for place in range(count):
+    for place in range(near):
         memory.point_impulse[memory.candidate[place], 0] = memory.impulse[2 * place]
         memory.point_impulse[memory.candidate[place], 1] = memory.impulse[2 * place + 1]
-    play(
-        memory.programs[PUSH],
-        (
-            model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-            memory.factor, memory.point_impulse, memory.rate, memory.next_v,
-        ),
-    )  # fmt: skip
+    if near > 0:
+        play(
+            memory.programs[PUSH],
+            (
+                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
+                memory.factor, memory.point_impulse, memory.rate, memory.next_v,
+            ),
+        )  # fmt: skip
+    for place in range(near, count):
+        row, _, _ = joint_row(model, memory, place)
+        for j in range(model.parent.shape[0]):
+            memory.next_v[j] += memory.impulse[row] * memory.jacobian[row, j]
 
 
 @dissolved_kernel
@@ -407,14 +460,16 @@ def solve_contacts(
     model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
 ) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
-    count = select_candidates(model, step, scheme, activation, memory)
-    count = select_stops(model, step, scheme, activation, count, memory)
+    near = select_candidates(model, step, scheme, activation, memory)
+    count = select_stops(model, step, scheme, activation, near, memory)
     count = select_dry_joints(model, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
     dry = points + 2 * nv
     for j in range(nv):
         memory.stop_torque[j] = 0.0
+        memory.stop_mode[j, 0] = 0
+        memory.stop_mode[j, 1] = 0
     contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
         contacts.force[contact, 0] = 0.0
@@ -425,30 +480,20 @@ def solve_contacts(
         memory.residual[i] = 0.0
     if count == 0:
         return True
-    straight = are_usual(memory, count)
-    delassus = memory.delassus
+    straight = are_usual(memory, near)
+    problem = memory.problem
     if straight:
-        gather_delassus(model, memory, count)
-        if count == memory.usual_points.shape[0]:
-            delassus = memory.point_delassus
+        gather_delassus(model, memory, near, count)
+        if near == count == memory.usual_points.shape[0]:
+            problem = memory.usual_problem
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
-        press_dry_joints(model, step, count, memory)
-    status = solve_contact_kernel(
-        count,
-        delassus,
-        memory.free,
-        memory.problem_friction,
-        order,
-        memory.problem_mode,
-        memory.impulse,
-        memory.velocity,
-        memory.residual,
-        memory.solver,
-    )
+    press_dry_joints(model, step, count, memory)
+    problem.count = count
+    status = solve_contact_kernel(problem, order, memory.solver, memory.answer)
     if straight:
-        push_candidates(model, memory, count)
+        push_candidates(model, memory, near, count)
     else:
         add_impulse(model, memory, count, memory.next_v)
     for place in range(count):
@@ -461,6 +506,7 @@ def solve_contacts(
             joint = (contact - points) // 2
             sign = 1.0 - 2.0 * ((contact - points) % 2)
             memory.stop_torque[joint] += sign * memory.impulse[2 * place] / step
+            memory.stop_mode[joint, (contact - points) % 2] = memory.problem_mode[place] != 0
             continue
         contacts.force[contact, 0] = memory.impulse[2 * place] / step
         contacts.force[contact, 1] = memory.impulse[2 * place + 1] / step

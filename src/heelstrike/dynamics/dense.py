@@ -1,0 +1,128 @@
+"""Small dense systems of equations, singular ones too.
+
+A tableau, or dictionary, writes its basic variables in terms of the others: row i reads
+``basic_i = tableau[i, 0] + sum_j tableau[i, j] * other_j`` with columns j from 1.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.robot.model import Floats, Integers
+
+RANK_TOLERANCE = 1e-12
+"""Pivots of the unit-diagonal matrix below this count as zero."""
+
+GOOD_PIVOT = 0.03
+"""Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
+matrix is stable in any order, and only its rank needs the large pivots first."""
+
+SINGULAR = 2e-15
+"""Pivots of the unit-diagonal matrix below this are rounding."""
+
+CONSISTENT = 1e-12
+"""Equations that are left with less than this, relative to the largest, are met."""
+
+
+@kernel
+def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> None:
+    """Exchange the basic variable of ``row`` with the other variable of ``column``."""
+    inverse = 1.0 / tableau[row, column]
+    for j in range(columns):
+        tableau[row, j] *= -inverse
+    tableau[row, column] = inverse
+    for i in range(rows):
+        factor = tableau[i, column]
+        if i != row and factor != 0.0:
+            tableau[i, column] = 0.0
+            for j in range(columns):
+                tableau[i, j] += factor * tableau[row, j]
+
+
+@kernel
+def eliminate(
+    size: int, symmetric: bool, tableau: Floats, pivot_row: Integers, taken: Integers
+) -> int:
+    """Solve equations ``c + A x = 0`` as far as their rank allows; return their nullity.
+
+    Symmetric equations, positive semidefinite, pivot on a large diagonal element, others on the
+    largest element of all.
+
+    Parameters
+    ----------
+    size : int
+        Number of equations, and of unknowns.
+    symmetric : bool
+        Whether A is.
+    tableau : (size, size + 1) float
+        c and A, of order one. Out: row ``pivot_row[j]`` is unknown j, in column 0 its value where
+        the free ones are zero, in their columns what it gains by each; in the other columns the
+        inverse of the part of A that was solved with.
+    pivot_row : (size,) int
+        Out: row of each unknown, -1 if it stays free.
+    taken : (size,) int
+        Out: whether each row holds an unknown.
+    """
+    speeds = 0.0
+    for i in range(size):
+        pivot_row[i] = -1
+        taken[i] = 0
+        speeds = max(speeds, abs(tableau[i, 0]))
+    nullity = size
+    smallest = RANK_TOLERANCE
+    while nullity > 0:
+        largest = smallest
+        row = size
+        column = size
+        for i in range(size):
+            if taken[i] != 0:
+                continue
+            if symmetric:
+                if tableau[i, i + 1] > largest:
+                    largest = tableau[i, i + 1]
+                    row = i
+                    column = i
+                    if largest > GOOD_PIVOT:
+                        break
+                continue
+            for j in range(size):
+                if pivot_row[j] < 0 and abs(tableau[i, j + 1]) > largest:
+                    largest = abs(tableau[i, j + 1])
+                    row = i
+                    column = j
+        if row < size:
+            pivot(tableau, size, size + 1, row, column + 1)
+            taken[row] = 1
+            pivot_row[column] = row
+            nullity -= 1
+            continue
+        # What is left is singular. If it is not consistent, it was not quite singular.
+        left = 0.0
+        for i in range(size):
+            if taken[i] == 0:
+                left = max(left, abs(tableau[i, 0]))
+        if smallest == SINGULAR or left <= CONSISTENT * speeds:
+            break
+        smallest = SINGULAR
+    return nullity
+
+
+@dissolved_kernel
+def solve_positive(size: int, matrix: Floats, x: Floats) -> None:
+    """Replace x by the solution of equations whose matrix, its lower half given, is positive."""
+    for i in range(size):
+        for j in range(i):
+            entry = matrix[i, j]
+            for k in range(j):
+                entry -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = entry
+        for j in range(i):
+            ratio = matrix[i, j] * matrix[j, j]
+            matrix[i, i] -= ratio * matrix[i, j]
+            x[i] -= ratio * x[j]
+            matrix[i, j] = ratio
+        matrix[i, i] = 1.0 / matrix[i, i]
+    for j in range(size - 1, -1, -1):
+        total = x[j] * matrix[j, j]
+        for i in range(j + 1, size):
+            total -= matrix[i, j] * x[i]
+        x[j] = total

@@ -1,0 +1,112 @@
+"""The sets of impulses: what is in them, what is nearest, and that all solvers obey them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from heelstrike.compiler.compilation import uncompiled
+from heelstrike.contact import sets, solve_contact
+from heelstrike.contact.certificate import certify
+from heelstrike.contact.modes import FISCHER_BURMEISTER, GAUSS_SEIDEL, LEMKE, SOLVED
+from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import CONE, HALF_LINE, LINE
+from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem, Floats
+
+projected, contains, press = (
+    uncompiled(kernel) for kernel in (sets.projected, sets.contains, sets.press)
+)
+
+
+def one(kind: int, friction: float = 0.5) -> ContactProblem:
+    problem = ContactProblem.allocate(nc=1, count=1)
+    problem.set[0], problem.friction[0] = kind, friction
+    return problem
+
+
+@pytest.mark.parametrize(
+    ("kind", "impulse", "nearest"),
+    [
+        (CONE, (2.0, 0.9), (2.0, 0.9)),
+        (CONE, (2.0, 1.5), (2.0, 1.0)),
+        (CONE, (2.0, -1.5), (2.0, -1.0)),
+        (CONE, (-2.0, 0.3), (0.0, 0.0)),
+        (HALF_LINE, (2.0, 0.3), (2.0, 0.0)),
+        (HALF_LINE, (-2.0, 0.0), (0.0, 0.0)),
+        (LINE, (-2.0, 0.0), (-2.0, 0.0)),
+        (LINE, (-2.0, 0.3), (-2.0, 0.0)),
+    ],
+)
+def test_projection(kind: int, impulse: tuple[float, float], nearest: tuple[float, float]) -> None:
+    problem = one(kind)
+    assert projected(problem, 0, *impulse) == nearest
+    assert contains(problem, 0, *impulse) == (impulse == nearest)
+    assert contains(problem, 0, *nearest)
+
+
+def with_line(seed: int) -> ContactProblem:
+    """Two contacts with friction, then a line between a third and a stop."""
+    draw = np.random.default_rng([17, seed])
+    root = draw.standard_normal((8, 9))
+    root[[5, 7]] = 0.0
+    return ContactProblem.allocate(
+        nc=4,
+        count=4,
+        delassus=root @ root.T,
+        free=root @ draw.standard_normal(9),
+        friction=np.array([0.6, 0.3, 0.7, 0.9]),
+        set=np.array([CONE, CONE, LINE, HALF_LINE]),
+    )
+
+
+def solved(problem: ContactProblem, solver: int) -> Floats:
+    work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
+    assert solve_contact_kernel(problem, np.array([solver]), work, answer) == SOLVED
+    return answer.impulse
+
+
+@pytest.mark.parametrize("solver", [LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL])
+def test_a_line_holds_both_ways(solver: int) -> None:
+    """Without its row, which its impulse keeps at rest, the problem is one of three contacts."""
+    pulls = 0
+    for seed in range(40):
+        problem = with_line(seed)
+        G, b, line = problem.delassus, problem.free, 4
+        others = [0, 1, 2, 3, 6, 7]
+        without = G - np.outer(G[:, line], G[line]) / G[line, line]
+        rest = b - G[:, line] * b[line] / G[line, line]
+        expected = solve_contact(
+            without[np.ix_(others, others)], rest[others], np.array([0.6, 0.3, 0.0])
+        )
+        impulse = solved(problem, solver)
+        scale = np.abs(impulse).max()
+        assert abs(G[line] @ impulse + b[line]) <= 1e-9 * np.abs(b).max()
+        np.testing.assert_allclose(impulse[others], expected.impulse.ravel(), atol=1e-7 * scale)
+        pulls += impulse[line] < -1e-3 * scale
+    assert pulls >= 10
+
+
+@pytest.mark.parametrize("push", [-0.5, 0.5])
+def test_a_line_that_gives_way_is_not_certified(push: float) -> None:
+    work, answer = contact_workspace(1), ContactAnswer.allocate(nc=1)
+    problem = one(LINE)
+    problem.delassus[0, 0] = 1.0
+    problem.free[0] = -1.0
+    answer.impulse[0] = 1.0 + push
+    assert certify(problem, work.settings, work.yardstick, answer) == pytest.approx(0.5)
+    answer.impulse[0] = 1.0
+    assert certify(problem, work.settings, work.yardstick, answer) < 1e-14
+
+
+@pytest.mark.parametrize("solver", [LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL])
+@pytest.mark.parametrize(
+    ("speed", "impulse"), [(0.1, -0.2), (-0.1, 0.2), (4.0, -3.0), (-4.0, 3.0), (0.0, 0.0)]
+)
+def test_an_interval_is_a_section_of_a_cone(solver: int, speed: float, impulse: float) -> None:
+    """Dry friction up to 3 N s of a joint that 1 N s makes 0.5 rad/s faster, beside a contact."""
+    problem = ContactProblem.allocate(nc=4, count=2, friction=np.array([0.5, 9.0, 0.0, 0.0]))
+    problem.delassus[[0, 1, 3], [0, 1, 3]] = 0.5
+    problem.free[:4] = [-1.0, 0.0, 0.0, speed]
+    press(problem, 1, 3.0)
+    np.testing.assert_allclose(solved(problem, solver)[:4], [2.0, 0.0, 3.0, impulse], atol=1e-12)
