@@ -5,6 +5,7 @@ The reference describes every public name once, and its first page leads there.
 
 from __future__ import annotations
 
+import pkgutil
 import re
 from pathlib import Path
 
@@ -36,6 +37,19 @@ def test_the_reference_is_that_of_the_public_names() -> None:
     assert sorted(each.partition("#")[2] for each in described) == sorted(public_names())
     index = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
     assert sorted(re.findall(r"\((reference/\S+#\S+)\)", index)) == sorted(described)
+
+
+def test_links_to_names_lead_to_what_is_described() -> None:
+    """The strict build asks the same of every link, and of names that are described in place."""
+    docs = ROOT / "docs"
+    for page in docs.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        here = set(re.findall(r"^::: (\S+)$", text, re.MULTILINE))
+        for name in here:
+            pkgutil.resolve_name(name)
+        for target, name in re.findall(r"\]\(([^)#]*)#(heelstrike\.[^)]+)\)", text):
+            described = (docs / target).read_text(encoding="utf-8") if target else text
+            assert f"::: {name}\n" in described, f"{page.name}: {name}"
 
 
 def test_every_page_is_in_the_navigation() -> None:

@@ -59,7 +59,20 @@ def test_walker2d_stays_on_four_stops(runs: dict[str, hs.Run], how: str) -> None
 
 def test_stamping_changes_contacts_in_most_steps(runs: dict[str, hs.Run]) -> None:
     solver = runs["stamping, bravo7"].solver
-    assert solver.shortcuts < 0.5 * solver.solves
+    assert solver.shortcuts < 0.25 * solver.solves
+
+
+@pytest.mark.parametrize("name", instructions.scenarios())
+def test_no_count_hangs_on_rounding(name: str) -> None:
+    """A position that is off by 1e-12 at first is off by no more than 1e-9 at the end."""
+    counted = instructions.scenarios()[name]
+    scenario = replace(counted.scenario, duration=0.6)
+    ends = []
+    for change in (0.0, 1e-12):
+        q = scenario.state.q + change * np.eye(scenario.robot.nq)[2]
+        begun = replace(scenario, state=hs.State(q, scenario.state.v))
+        ends.append(begun.run(counted.method, controller=counted.controller).position[-1])
+    assert np.abs(ends[1] - ends[0]).max() <= 1e-9
 
 
 def test_each_is_held_against_the_same_robot_sticking() -> None:

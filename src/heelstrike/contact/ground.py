@@ -204,6 +204,11 @@ class Ground:
         ----------
         numbers : mapping of str to array
             What that returned.
+
+        Returns
+        -------
+        Ground
+            The ground.
         """
         return cls(
             friction=_one_if_equal(numbers["friction"]),

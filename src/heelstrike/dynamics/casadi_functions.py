@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike import dynamics
 from heelstrike.dynamics.evaluation import contact_indices
-from heelstrike.dynamics.query import VECTORS, Query
+from heelstrike.dynamics.query import VECTORS, Query, docstring
 from heelstrike.dynamics.symbolic import TracedDynamics, expression, symbols
 from heelstrike.robot.robot import Robot
 
@@ -36,16 +36,15 @@ def _function_of(
         return self._function(asked.__name__, inputs, _sx(value))
 
     signature = inspect.signature(asked.at)
+    others = {k: one for k, one in signature.parameters.items() if k not in ("at", *VECTORS)}
+    itself = inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY)
     method.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[
-            inspect.Parameter("self", inspect.Parameter.POSITIONAL_ONLY),
-            *[one for name, one in signature.parameters.items() if name not in ("at", *VECTORS)],
-        ],
-        return_annotation="casadi.Function",
+        parameters=[itself, *others.values()], return_annotation="casadi.Function"
     )
     method.__name__, method.__qualname__ = asked.__name__, f"CasadiDynamics.{asked.__name__}"
     summary = (asked.__doc__ or "").split("\n\nParameters")[0]
-    method.__doc__ = f"Return ({', '.join(names)}) → {asked.returns}\n\n{summary}"
+    meaning = f"Of ({', '.join(names)}), it is a {asked.returns}"
+    method.__doc__ = docstring(summary, others, "casadi.Function", meaning)
     return method
 
 
@@ -150,6 +149,16 @@ class CasadiDynamics:
         zero: A v̇ + H − passive − SᵀΓ − Jᵀλ, and J v̇ + J̇v. Whatever is unknown of them, and whatever
         inequality the forces obey, is the user's choice; redundant points do no harm. The contact
         force is n₀ t₀ n₁ t₁ …, in N, on the robot.
+
+        Parameters
+        ----------
+        contacts : iterable of int or str, optional
+            Contact points, all k = nc by default.
+
+        Returns
+        -------
+        casadi.Function
+            Of the inputs above, (nv + 2k,).
         """
         held = self._contacts(contacts)
         inputs = {name: self._symbol(name) for name in ("q", "v", "acceleration")}
@@ -165,6 +174,16 @@ class CasadiDynamics:
 
         The points must be independent: two of one flat foot make the equations singular, and
         :meth:`contact_equations` is what to use then.
+
+        Parameters
+        ----------
+        contacts : iterable of int or str, optional
+            Contact points, all k = nc by default.
+
+        Returns
+        -------
+        casadi.Function
+            Of the inputs above, (nv,) and (2k,).
         """
         held = self._contacts(contacts)
         n, k = self.robot.nv, 2 * len(held)

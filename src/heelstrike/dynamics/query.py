@@ -9,7 +9,7 @@ is the query itself, which :mod:`heelstrike.dynamics.symbolic` and
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import update_wrapper
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
@@ -107,11 +107,18 @@ def _described(answer: Any, body: Callable[..., Any], returns: str) -> Any:
     signature = own.replace(parameters=[*names, *list(own.parameters.values())[1:]])
     update_wrapper(answer, body)
     answer.__signature__, answer.at, answer.returns = signature, body, returns
-    text = [inspect.getdoc(body) or "", "", "Parameters", "----------"]
-    for name in signature.parameters:
+    shape, _, meaning = returns.partition(": ")
+    answer.__doc__ = docstring(inspect.getdoc(body) or "", signature.parameters, shape, meaning)
+    return answer
+
+
+def docstring(summary: str, names: Iterable[str], returned: str, meaning: str) -> str:
+    """Return the documentation of a function that takes arguments of queries."""
+    text = [summary, "", "Parameters", "----------"] if names else [summary]
+    for name in names:
         kind, words = _ARGUMENTS[name]
         text += [f"{name} : {kind}", f"    {words}"]
-    shape, _, meaning = returns.partition(": ")
-    text += ["", "Returns", "-------", shape, f"    {meaning}"]
-    answer.__doc__ = "\n".join([*text, "", "Raises", "------", "RobotError", f"    {_RAISES}"])
-    return answer
+    text += ["", "Returns", "-------", returned, f"    {meaning}"]
+    if names:
+        text += ["", "Raises", "------", "RobotError", f"    {_RAISES}"]
+    return "\n".join(text)

@@ -32,6 +32,16 @@ class ClearanceProfile(enum.Enum):
     def height(self, phase: ArrayLike) -> NDArray[np.float64]:
         """Share of the greatest height at phases, (...), from 0 to 1.
 
+        Parameters
+        ----------
+        phase : array
+            Share of the step that is over, from 0 to 1, of any shape.
+
+        Returns
+        -------
+        array of the same shape
+            Shares.
+
         Examples
         --------
         >>> ClearanceProfile.PARABOLA.height([0.0, 0.25, 0.5]).tolist()

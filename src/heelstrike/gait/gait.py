@@ -239,6 +239,11 @@ class Gait:
         robot : Robot, optional
             The robot that is to walk; its actuated joints must be those of the gait.
 
+        Returns
+        -------
+        (d + 1, nu) float
+            Lowest power first.
+
         Raises
         ------
         GaitError
@@ -249,7 +254,18 @@ class Gait:
         return _only(self.mirrored_pieces())
 
     def check_joints(self, robot: Robot) -> None:
-        """Raise a `GaitError` unless the gait moves exactly the actuated joints of a robot."""
+        """Raise a `GaitError` unless the gait moves exactly the actuated joints of a robot.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Raises
+        ------
+        GaitError
+            That names the joints.
+        """
         joints = actuated_joints(robot)
         if joints != self.joint_names:
             raise GaitError(
@@ -268,6 +284,11 @@ class Gait:
             Times in s, of any shape; the first step begins at 0. The paper's polynomials end at T
             (eq. 41): the walk goes on with the mirrored step, then with the first again, and so
             also back in time.
+
+        Returns
+        -------
+        (..., nu) float
+            Positions (rad).
         """
         return self._walk(t, 0)
 
@@ -275,11 +296,32 @@ class Gait:
         """Joint velocities at times of the walk, (..., nu), in rad/s.
 
         At a touchdown this is the velocity just after the impact. See :meth:`position`.
+
+        Parameters
+        ----------
+        t : array
+            Times of the walk (s), of any shape.
+
+        Returns
+        -------
+        (..., nu) float
+            Velocities (rad/s).
         """
         return self._walk(t, 1)
 
     def acceleration(self, t: ArrayLike) -> Floats:
-        """Joint accelerations at times of the walk, (..., nu), in rad/s². See :meth:`position`."""
+        """Joint accelerations at times of the walk, (..., nu), in rad/s². See :meth:`position`.
+
+        Parameters
+        ----------
+        t : array
+            Times of the walk (s), of any shape.
+
+        Returns
+        -------
+        (..., nu) float
+            Accelerations (rad/s²).
+        """
         return self._walk(t, 2)
 
     def in_step(self, t: ArrayLike, *, order: int = 0) -> Floats:
@@ -291,6 +333,11 @@ class Gait:
             Times in s, of any shape.
         order : int
             0 for positions, 1 for velocities, 2 for accelerations.
+
+        Returns
+        -------
+        (..., nu) float
+            In rad, rad/s or rad/s².
         """
         return evaluated(self.pieces, self.breakpoints, np.asarray(t, np.float64), order)
 
@@ -299,6 +346,18 @@ class Gait:
 
         On point feet no motor acts on it; it moves as the dynamics demands when the joints follow
         their polynomials exactly.
+
+        Parameters
+        ----------
+        t : array
+            Times of the step (s), of any shape.
+        order : int
+            0 for the pitch, 1 for its rate, 2 for its acceleration.
+
+        Returns
+        -------
+        (...) float
+            In rad, rad/s or rad/s².
 
         Raises
         ------
@@ -314,7 +373,20 @@ class Gait:
         return evaluated(_joined(given), self.breakpoints, np.asarray(t, np.float64), order)[..., 0]
 
     def mirrored(self, joints: Floats, *, order: int = 0) -> Floats:
-        """Mirror image of joint positions, or of a derivative of them, (..., nu)."""
+        """Mirror image of joint positions, or of a derivative of them, (..., nu).
+
+        Parameters
+        ----------
+        joints : (..., nu) float
+            Positions, or a derivative.
+        order : int
+            0 for positions, 1 or more for derivatives, which have no offset.
+
+        Returns
+        -------
+        (..., nu) float
+            Those of the mirror image.
+        """
         image: Floats = self.mirror_sign * joints[..., self.mirror_joint]
         return image + self.mirror_offset if order == 0 else image
 
@@ -328,6 +400,11 @@ class Gait:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the gait to a readable JSON file; :func:`load_gait` reads it back unchanged.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
 
         Raises
         ------

@@ -107,6 +107,16 @@ class Batch:
     def run(self, index: int) -> Run:
         """Return the record of one run, as :func:`~heelstrike.simulate` would have.
 
+        Parameters
+        ----------
+        index : int
+            Which run.
+
+        Returns
+        -------
+        Run
+            Its record.
+
         Raises
         ------
         SimulationError

@@ -54,11 +54,33 @@ class Method(ABC):
 
     @abstractmethod
     def new_work(self, robot: Robot) -> Bundle:
-        """Allocate its bundle for a robot."""
+        """Allocate its bundle for a robot.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Returns
+        -------
+        Bundle
+            With its settings in it, and nothing remembered yet.
+        """
 
     @abstractmethod
     def room(self, robot: Robot) -> tuple[int, int]:
-        """Return how many rows and events one instant may add to the record."""
+        """Return how many rows and events one instant may add to the record.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Returns
+        -------
+        tuple of int
+            Rows, and events.
+        """
 
     @property
     @abstractmethod
@@ -67,6 +89,11 @@ class Method(ABC):
 
     def check(self, setting: Setting) -> None:  # noqa: B027 - most can do everything
         """Refuse what this method cannot simulate.
+
+        Parameters
+        ----------
+        setting : Setting
+            What is to be simulated.
 
         Raises
         ------
@@ -77,6 +104,13 @@ class Method(ABC):
     def check_span(self, setting: Setting, duration: float) -> None:
         """Refuse a time whose steps cannot be counted, or whose record does not fit into memory.
 
+        Parameters
+        ----------
+        setting : Setting
+            What is to be simulated.
+        duration : float
+            How long it is to go on (s).
+
         Raises
         ------
         SimulationError
@@ -86,7 +120,15 @@ class Method(ABC):
         check_room(setting, duration, *self.row_period)
 
     def set_clock(self, setting: Setting, clock: Clock) -> None:
-        """Say how often the controller is called, in steps of one length or in seconds."""
+        """Say how often the controller is called, in steps of one length or in seconds.
+
+        Parameters
+        ----------
+        setting : Setting
+            What is to be simulated.
+        clock : Clock
+            Clock that is set.
+        """
         if self.step_length is None:
             clock.control_period = setting.control_period or 0.0
         elif setting.control_period is None:
@@ -97,17 +139,54 @@ class Method(ABC):
             )
 
     def instant(self, clock: Clock, time: float) -> float:
-        """Return the instant of the method that is nearest to a time."""
+        """Return the instant of the method that is nearest to a time.
+
+        Parameters
+        ----------
+        clock : Clock
+            Clock of the simulation.
+        time : float
+            A time (s).
+
+        Returns
+        -------
+        float
+            The instant (s).
+        """
         if self.step_length is None:
             return time
         return clock.start + round((time - clock.start) / self.step_length) * self.step_length
 
     def rows_in(self, duration: float, record_every: int) -> int:
-        """Return about how many rows the record of a time has."""
+        """Return about how many rows the record of a time has.
+
+        Parameters
+        ----------
+        duration : float
+            The time (s).
+        record_every : int
+            Steps between two rows.
+
+        Returns
+        -------
+        int
+            Rows.
+        """
         return int(min(duration / (self.row_period[1] * record_every), 2.0**62)) + 2
 
     def reason(self, work: Any) -> str:  # noqa: ARG002 - for those who know more
-        """Say why a simulation could not go on; nothing if there is no more to say."""
+        """Say why a simulation could not go on; nothing if there is no more to say.
+
+        Parameters
+        ----------
+        work : Bundle
+            Its bundle, as the loop has left it.
+
+        Returns
+        -------
+        str
+            In a person's words.
+        """
         return ""
 
 

@@ -76,6 +76,16 @@ class Push:
     def place(self, robot: Robot) -> tuple[int, tuple[float, float]]:
         """Link of `robot` on which it acts, and the point in the axes of that link.
 
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Returns
+        -------
+        tuple
+            Index of the link, and the point (x, z) in its axes (m).
+
         Raises
         ------
         SimulationError
@@ -103,7 +113,18 @@ class Push:
         return index, (float(x), float(z))
 
     def time_within(self, begin: Floats, end: Floats) -> Floats:
-        """Seconds that it acts within each of the intervals from `begin` to `end`."""
+        """Seconds that it acts within each of the intervals from `begin` to `end`.
+
+        Parameters
+        ----------
+        begin, end : (k,) float
+            Ends of the intervals (s).
+
+        Returns
+        -------
+        (k,) float
+            Seconds.
+        """
         return np.maximum(np.minimum(end, self.end) - np.maximum(begin, self.start), 0.0)
 
 

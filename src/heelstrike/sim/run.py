@@ -91,7 +91,15 @@ class SolverCount:
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds spent compiling (or loading compiled code) and simulating."""
+    """Seconds spent.
+
+    Attributes
+    ----------
+    compile_s : float
+        Compiling, or loading compiled code.
+    wall_s : float
+        Simulating.
+    """
 
     compile_s: float
     wall_s: float
@@ -210,19 +218,56 @@ class Run:
         return np.stack((normal * nx + tangent * nz, normal * nz - tangent * nx), axis=-1)
 
     def summary(self, **options: Any) -> Summary:
-        """Summarise the run; see :func:`heelstrike.analysis.summary.summarize`."""
+        """Summarise the run; see :func:`heelstrike.analysis.summary.summarize`.
+
+        Parameters
+        ----------
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Summary
+            Figures with units in their names.
+        """
         from heelstrike.analysis.summary import summarize
 
         return summarize(self, **options)
 
     def plot(self, what: str, **options: Any) -> Figure:
-        """Draw a figure of the run; see :func:`heelstrike.view.figures.plot`."""
+        """Draw a figure of the run; see :func:`heelstrike.view.figures.plot`.
+
+        Parameters
+        ----------
+        what : str
+            Name of the figure.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Figure
+            Matplotlib's figure.
+        """
         from heelstrike.view.figures import plot
 
         return plot(self, what, **options)
 
     def animate(self, path: str | os.PathLike[str], **options: Any) -> Path:
-        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`."""
+        """Write an animation of the run; see :func:`heelstrike.view.animation.animate`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         from heelstrike.view.animation import animate
 
         return animate(self, path, **options)
@@ -234,7 +279,18 @@ class Run:
         return to_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`."""
+        """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
         from heelstrike.sim.files.run_file import save
 
         return save(self, path)

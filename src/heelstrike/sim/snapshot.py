@@ -51,7 +51,18 @@ class Snapshot:
         return State(self.arrays["memory.q"], self.arrays["memory.v"])
 
     def part(self, name: str) -> dict[str, NDArray[Any]]:
-        """Return the arrays whose names begin so, without that beginning."""
+        """Return the arrays whose names begin so, without that beginning.
+
+        Parameters
+        ----------
+        name : str
+            Name of the part.
+
+        Returns
+        -------
+        dict
+            Its arrays by name.
+        """
         begin = f"{name}."
         return {
             key.removeprefix(begin): value
@@ -66,6 +77,11 @@ class Snapshot:
         ----------
         path : str or path
             The file; an existing one is replaced. It appears whole or not at all.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
@@ -85,6 +101,11 @@ def load_snapshot(path: str | os.PathLike[str]) -> Snapshot:
     ----------
     path : str or path
         The file.
+
+    Returns
+    -------
+    Snapshot
+        The snapshot.
 
     Raises
     ------

@@ -122,6 +122,11 @@ class HuntCrossley:
             Ratio of the speeds after and before an impact at `speed` (m/s), in (0, 1].
         exponent : float
             n of the law.
+
+        Returns
+        -------
+        HuntCrossley
+            The law.
         """
         _positive("weight", weight, "N")
         _positive("sink", sink, "m")
@@ -147,6 +152,16 @@ class HuntCrossley:
 
         ``m v dv/dδ = −k δⁿ (1 + c v)``, c = 3/2 α, integrates to ``c v − ln(1 + c v)`` being the
         same when the mass leaves as when it came.
+
+        Parameters
+        ----------
+        speed : float
+            Speed before (m/s).
+
+        Returns
+        -------
+        float
+            From 0 to 1.
         """
         _positive("speed", speed, "m/s")
         approach = 1.5 * self.dissipation * speed
@@ -157,11 +172,33 @@ class HuntCrossley:
         return leave / approach
 
     def sink(self, weight: float) -> float:
-        """Penetration in metres of a contact point at rest under a load in newtons."""
+        """Penetration in metres of a contact point at rest under a load in newtons.
+
+        Parameters
+        ----------
+        weight : float
+            The load (N).
+
+        Returns
+        -------
+        float
+            Metres.
+        """
         return float((weight / self.stiffness) ** (1.0 / self.exponent))
 
     def stored_energy(self, gap: Floats) -> Floats:
-        """Elastic energy in joules at the given gaps (m)."""
+        """Elastic energy in joules at the given gaps (m).
+
+        Parameters
+        ----------
+        gap : float array
+            Gaps (m), negative in the ground.
+
+        Returns
+        -------
+        (nc,) float
+            Joules.
+        """
         depth = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0)
         energy: Floats = self.stiffness * depth ** (self.exponent + 1.0) / (self.exponent + 1.0)
         return energy
@@ -172,7 +209,13 @@ class HuntCrossley:
         return HUNT_CROSSLEY
 
     def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them."""
+        """Write the parameters where the kernels look for them.
+
+        Parameters
+        ----------
+        numbers : (k,) float
+            Out: the parameters in the order that the kernels know.
+        """
         numbers[STIFFNESS] = self.stiffness
         numbers[DISSIPATION] = 1.5 * self.dissipation
         numbers[EXPONENT] = self.exponent
@@ -219,6 +262,11 @@ class KelvinVoigt:
             Penetration under that load, in metres.
         restitution : float
             Ratio of the speeds after and before an impact, in (0, 1], whatever the speed.
+
+        Returns
+        -------
+        KelvinVoigt
+            The law.
         """
         _positive("weight", weight, "N")
         _positive("sink", sink, "m")
@@ -230,7 +278,18 @@ class KelvinVoigt:
         return cls(stiffness=stiffness, damping=2.0 * ratio * sqrt(stiffness * weight / GRAVITY))
 
     def damping_ratio(self, mass: float) -> float:
-        """Damping of a mass (kg) on one contact point, relative to critical damping."""
+        """Damping of a mass (kg) on one contact point, relative to critical damping.
+
+        Parameters
+        ----------
+        mass : float
+            The mass (kg).
+
+        Returns
+        -------
+        float
+            1 is critical.
+        """
         _positive("mass", mass, "kg")
         return self.damping / (2.0 * sqrt(self.stiffness * mass))
 
@@ -240,20 +299,63 @@ class KelvinVoigt:
         With damping ratio ζ: ``exp(−2 ζ acos ζ / √(1 − ζ²))``, since the force has fallen to zero
         after ``2 acos ζ / ω`` at the damped frequency ω. Beyond critical damping both the
         arc cosine and the root turn hyperbolic.
+
+        Parameters
+        ----------
+        mass : float
+            The mass (kg).
+
+        Returns
+        -------
+        float
+            From 0 to 1.
         """
         return _linear_restitution(self.damping_ratio(mass))
 
     def contact_time(self, mass: float) -> float:
-        """Duration in seconds of an impact of a free mass (kg), without gravity."""
+        """Duration in seconds of an impact of a free mass (kg), without gravity.
+
+        Parameters
+        ----------
+        mass : float
+            The mass (kg).
+
+        Returns
+        -------
+        float
+            Seconds.
+        """
         ratio = self.damping_ratio(mass)
         return 2.0 * _arc_over_root(ratio) * sqrt(mass / self.stiffness)
 
     def sink(self, weight: float) -> float:
-        """Penetration in metres of a contact point at rest under a load in newtons."""
+        """Penetration in metres of a contact point at rest under a load in newtons.
+
+        Parameters
+        ----------
+        weight : float
+            The load (N).
+
+        Returns
+        -------
+        float
+            Metres.
+        """
         return weight / self.stiffness
 
     def stored_energy(self, gap: Floats) -> Floats:
-        """Elastic energy in joules at the given gaps (m)."""
+        """Elastic energy in joules at the given gaps (m).
+
+        Parameters
+        ----------
+        gap : float array
+            Gaps (m), negative in the ground.
+
+        Returns
+        -------
+        (nc,) float
+            Joules.
+        """
         depth = np.maximum(-np.asarray(gap, dtype=np.float64), 0.0)
         energy: Floats = 0.5 * self.stiffness * depth**2
         return energy
@@ -264,7 +366,13 @@ class KelvinVoigt:
         return KELVIN_VOIGT
 
     def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them."""
+        """Write the parameters where the kernels look for them.
+
+        Parameters
+        ----------
+        numbers : (k,) float
+            Out: the parameters in the order that the kernels know.
+        """
         numbers[STIFFNESS] = self.stiffness
         numbers[DISSIPATION] = self.damping
 
@@ -293,7 +401,23 @@ class RegularisedFriction:
         _positive("regularisation speed", self.speed, "m/s")
 
     def creep(self, use: float) -> float:
-        """Speed (m/s) at which a contact creeps that needs the given fraction of the friction."""
+        """Speed (m/s) at which a contact creeps that needs the given fraction of the friction.
+
+        Parameters
+        ----------
+        use : float
+            Share of the friction, from 0 up to 1.
+
+        Returns
+        -------
+        float
+            m/s.
+
+        Raises
+        ------
+        SimulationError
+            If the share is not one that friction can give.
+        """
         if not 0.0 <= use < 1.0:
             raise SimulationError(f"the use of friction must lie in [0, 1), got {use}")
         return self.speed * use / sqrt(1.0 - use * use)
@@ -304,7 +428,13 @@ class RegularisedFriction:
         return REGULARISED
 
     def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them."""
+        """Write the parameters where the kernels look for them.
+
+        Parameters
+        ----------
+        numbers : (k,) float
+            Out: the parameters in the order that the kernels know.
+        """
         numbers[SLIP_SCALE] = self.speed
         numbers[JOINT_SCALE] = self.speed
 
@@ -344,7 +474,13 @@ class BristleFriction:
         return BRISTLE
 
     def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them."""
+        """Write the parameters where the kernels look for them.
+
+        Parameters
+        ----------
+        numbers : (k,) float
+            Out: the parameters in the order that the kernels know.
+        """
         numbers[BRISTLE_STIFFNESS] = self.stiffness
         numbers[BRISTLE_DAMPING] = self.damping
         numbers[JOINT_SCALE] = JOINT_SPEED

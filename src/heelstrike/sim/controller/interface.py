@@ -47,7 +47,22 @@ class Controller(Protocol):
     """Anything that can say which joint torques to apply."""
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
-        """Return the joint torques (nu,), in N m, to hold until the next call."""
+        """Return the joint torques (nu,), in N m, to hold until the next call.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        state : State
+            Where the robot is.
+        contacts : Contacts
+            How it touches the ground.
+
+        Returns
+        -------
+        (nu,) float
+            Torques, in the order of the actuators.
+        """
         ...
 
 
@@ -124,6 +139,16 @@ def controller_kernel(function: Callable[..., None]) -> Any:
     Its own indices are checked, those of the functions it calls are not: an index beyond an array
     raises IndexError, which like any exception ends the run; ``simulate(..., checked=True)`` names
     the array and the index.
+
+    Parameters
+    ----------
+    function : callable
+        The controller.
+
+    Returns
+    -------
+    kernel
+        What a :class:`CompiledController` is made of.
     """
     checked = not _is_ours(function)  # the tests see to those of this package
     return compiled_for(CONTROLLER_SIGNATURE, function, address=True, boundscheck=checked)
