@@ -12,7 +12,7 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
-from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Pair, model_of
+from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Model, Pair
 from heelstrike.robot.robot import Robot
 
 UNLIMITED = (-math.inf, math.inf)
@@ -238,7 +238,7 @@ class RobotBuilder:
         driven = [i for i, link in enumerate(links) if link.torque is not None]
         torques = np.reshape([links[i].torque for i in driven], (-1, 2)).T
         numbers = {name: [link.numbers[name] for link in links] for name in links[0].numbers}
-        model = model_of(
+        model = Model.made(
             **numbers,
             parent=[link.parent for link in links],
             axis=[link.axis for link in links],

@@ -172,6 +172,28 @@ class Model(Bundle):
     torque_upper: Floats = of("nu", unit="N m, N", **_LIMIT)
     pivot: int = of(kind=int, points="nl", least=0)
 
+    @classmethod
+    def made(cls, **members: Any) -> Model:
+        """Make a model of anything array-like; lists may be empty.
+
+        Parameters
+        ----------
+        **members : array
+            Every member by its name.
+
+        Returns
+        -------
+        Model
+            The model.
+        """
+        made = dict(members)
+        for name, number in NUMBERS.items():
+            if number.shape:
+                rest = [AXES if size == "axes" else size for size in number.shape[1:]]
+                values = np.array(members[name], dtype=number.dtype, order="C")
+                made[name] = values.reshape(-1, *rest)
+        return cls(**made)
+
 
 class JointProperties(TypedDict, total=False):
     """What a link and the joint that moves it may have; nothing is required.
@@ -228,16 +250,6 @@ NUMBERS: dict[str, Number] = {
 
 PROPERTIES = {name: number for name, number in NUMBERS.items() if number.given}
 """Numbers of a link and its joint that a user gives, each by itself."""
-
-
-def model_of(**members: Any) -> Model:
-    """Make a model of anything array-like; lists may be empty."""
-    made = dict(members)
-    for name, number in NUMBERS.items():
-        if number.shape:
-            rest = [AXES if size == "axes" else size for size in number.shape[1:]]
-            made[name] = np.array(members[name], dtype=number.dtype, order="C").reshape(-1, *rest)
-    return Model(**made)
 
 
 def label(name: str) -> str:

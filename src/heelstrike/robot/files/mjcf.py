@@ -13,7 +13,7 @@ from heelstrike.robot.files.joint_numbers import read_joint_numbers
 from heelstrike.robot.files.links import IN_PLANE, read_links
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
 from heelstrike.robot.files.unmodelled import warn_of_unmodelled
-from heelstrike.robot.model import Floats, model_of
+from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 
 
@@ -78,7 +78,7 @@ def _robot(file: MujocoFile, name: str) -> Robot:
     numbers["armature"] += actuators.armature
     if not file.disabled("damper"):
         numbers["damping"] += actuators.damping
-    arrays = model_of(
+    arrays = Model.made(
         **numbers,
         **links.numbers,
         lower=_limits(np.where(limited, model.jnt_range[:, 0], -np.inf)),
