@@ -18,14 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics import kernels
+from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.contact_geometry import observe
 from heelstrike.sim.controller.interface import CompiledController, Controller
 from heelstrike.sim.event_driven.method import EventDriven
-from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate
 from heelstrike.sim.status import EventKind
@@ -65,21 +63,8 @@ class Section:
 
     def contacts(self, state: State) -> tuple[Floats, Floats, Floats]:
         """Places along the ground, gaps and velocities (normal, tangent) of the contact points."""
-        model = self.robot.model
-        memory = allocate_memory(self.robot)
-        memory.q[:] = state.q
-        memory.v[:] = state.v
-        observe(model, self.ground.model(), memory)
-        velocity = np.empty((self.robot.nc, 2))
-        jacobian = np.zeros((3, self.robot.nv))
-        for i, position in enumerate(memory.contacts.position):
-            kernels.point_jacobian(
-                model, memory.tree, int(model.contact_link[i]), position, jacobian
-            )
-            vx, vz, _ = jacobian @ state.v
-            nx, nz = memory.contacts.normal[i]
-            velocity[i] = nx * vx + nz * vz, nz * vx - nx * vz
-        return memory.contacts.position @ self.along, memory.contacts.gap, velocity
+        seen = contact_kinematics(self.robot, state.q, state.v, self.ground)
+        return seen.position @ self.along, seen.gap, seen.velocity
 
     def standing(self, state: State) -> tuple[Flags, Flags]:
         """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""

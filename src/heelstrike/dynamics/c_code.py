@@ -18,7 +18,7 @@ from heelstrike.dynamics.kernels import (
     link_velocities,
     mass_matrix,
 )
-from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 
 _HEAD = """Equations of motion of {name}, A(q) a + H(q, v) = force, written by heelstrike.
@@ -34,9 +34,9 @@ The robot's numbers stand in tables; those that are 0, 1 or -1 are worked into t
 def _kinematics(model: Model, q: Floats, tree: Workspace, angle: Floats, origin: Floats) -> None:
     """Poses of the links: `angle` (rad) and `origin` (x, z of the link's frame, m) in the world."""
     forward_kinematics(model, q, tree)
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nl):
         angle[i] = tree.angle[i]
-        for k in range(2):
+        for k in range(model.axes):
             origin[i, k] = tree.origin[i, k]
 
 
@@ -65,12 +65,13 @@ def _solve(
 
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
     """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
-    nv = len(model.parent)
-    tree, square, vector = workspace(nv), np.zeros((nv, nv)), np.zeros(nv)
+    tree = Workspace.allocate(**model.extents)
+    square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
     scratch = (*(f"tree.{member}" for member in tree.members()), "factor")
+    poses = {"angle": np.zeros(model.nl), "origin": np.zeros((model.nl, model.axes))}
     q, state = {"model": model, "q": vector}, {"model": model, "q": vector, "v": vector}
     given: list[tuple[Callable[..., None], dict[str, Any], tuple[str, ...]]] = [
-        (_kinematics, q | {"tree": tree, "angle": vector, "origin": np.zeros((nv, 2))}, scratch),
+        (_kinematics, q | {"tree": tree} | poses, scratch),
         (_mass_matrix, q | {"tree": tree, "matrix": square}, scratch),
         (_bias_force, state | {"tree": tree, "bias": vector}, scratch),
         (
@@ -81,7 +82,7 @@ def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
             (*scratch, "matrix"),
         ),
     ]
-    known = {"tree.zero": np.zeros(nv)}
+    known = {"tree.zero": vector}
     return c_text(
         [
             Recording(Program(kernel, arguments, unread, kernel.__name__[1:]), known)

@@ -211,15 +211,16 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
         pieces=pieces[:, :, joint - stance.held],
         pitch_pieces=None if stance.flat else pieces[:, :, 0],
     )
+    legs = mirror.among(joint)
     return Gait(
         robot=robot.name,
         fingerprint=fingerprint(robot),
         joint_names=actuated_joints(robot),
         step_length=float(length),
         phases=(phase,),
-        mirror_joint=np.argsort(joint)[mirror.joint[joint] - 3],
-        mirror_sign=mirror.sign[joint],
-        mirror_offset=mirror.position(np.zeros(robot.nv), robot.model.reference)[joint],
+        mirror_joint=legs.joint,
+        mirror_sign=legs.sign,
+        mirror_offset=legs.offset,
         initial_state=State(*state),
         cost=program.effort(unknowns),
         friction=request.friction,

@@ -75,7 +75,7 @@ def starts(request: Request) -> Iterator[Start]:
         lift = request.clearance + 0.02 * request.height
         end = kinematics.posture((length, 0.0), (0.5 * length, low, lean), bend)
         middle = kinematics.posture((0.0, lift), (0.0, legs, lean), bend)
-        begin = mirror.position(end, request.robot.model.reference)
+        begin = mirror.position(end)
         yield Start(begin[held:], middle[held:], end[held:], duration, length)
 
 

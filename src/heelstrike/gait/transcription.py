@@ -150,7 +150,7 @@ class Transcription:
         mirror, reference = self.robot.mirror, self.robot.model.reference
         assert mirror is not None
         whole_q, whole_v = (np.array([*reference[: self.held], *part]) for part in (q, v))
-        images: Any = (mirror.position(whole_q, reference), mirror.velocity(whole_v))
+        images: Any = (mirror.position(whole_q), mirror.velocity(whole_v))
         return images[0][self.held :], images[1][self.held :]
 
     def _build_path(self) -> None:

@@ -41,19 +41,18 @@ class Mirror:
     reference: Floats = field(default_factory=lambda: np.zeros(0))
 
     def among(self, coordinates: Sequence[int] | Integers) -> Mirror:
-        """Return the mirror of vectors that have these coordinates only, in this order.
-
-        The counterpart of a coordinate that is not among them is the coordinate itself.
+        """Return the mirror of vectors that have some of the coordinates only.
 
         Parameters
         ----------
         coordinates : sequence of int
-            Places of the coordinates in q.
+            Indices of the coordinates in the order of the vectors. One whose counterpart is not
+            among them counts as its own.
 
         Returns
         -------
         Mirror
-            Their mirror.
+            It mirrors vectors over these coordinates.
         """
         chosen = np.asarray(coordinates, dtype=np.int64)
         place = {coordinate: i for i, coordinate in enumerate(chosen.tolist())}
@@ -71,36 +70,34 @@ class Mirror:
         offset: Floats = self.reference - self.sign * self.reference[self.joint]
         return offset
 
-    def position(self, q: Any, reference: Floats | None = None) -> Any:
-        """Mirror positions (..., nq); about another reference than the robot's if one is given.
+    def position(self, q: Any) -> Any:
+        """Mirror positions.
 
         Parameters
         ----------
-        q : (..., nq) float
-            Positions.
-        reference : (nq,) float, optional
-            Another reference.
+        q : (..., nq) array
+            Positions, in m and rad.
 
         Returns
         -------
-        (..., nq) float
-            Positions of the mirror image.
+        (..., nq) array
+            Those of the mirror image.
         """
-        about = self.reference if reference is None else reference
+        about = self.reference
         return self.sign * (self._exchanged(q) - about[self.joint]) + about
 
     def velocity(self, v: Any) -> Any:
-        """Mirror velocities, accelerations or generalised forces, (..., nv).
+        """Mirror velocities, accelerations or generalised forces.
 
         Parameters
         ----------
-        v : (..., nv) float
-            Velocities or accelerations.
+        v : (..., nv) array
+            One of these.
 
         Returns
         -------
-        (..., nv) float
-            Those of the mirror image.
+        (..., nv) array
+            That of the mirror image.
         """
         return self.sign * self._exchanged(v)
 
@@ -115,33 +112,33 @@ class Mirror:
         Returns
         -------
         State
-            Its mirror image.
+            That of the mirror image.
         """
         return State(self.position(state.q), self.velocity(state.v))
 
     def ranges(self, lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
-        """Mirror the ends of ranges of the coordinates, (nq,) each.
+        """Mirror ranges of the coordinates.
 
         Parameters
         ----------
         lower, upper : (nq,) float
-            The ends.
+            Ends of the ranges, in m and rad.
 
         Returns
         -------
-        tuple
-            Lower and upper ends of the mirror image.
+        tuple of (nq,) float
+            Those of the mirror image.
         """
         ends = self.position(lower), self.position(upper)
         return np.minimum(*ends), np.maximum(*ends)
 
     def at_contacts(self, values: Floats) -> Floats:
-        """Mirror forces, positions … of the contact points in x–z, (nc, ...).
+        """Mirror what the contact points have in x–z: forces, positions, gaps.
 
         Parameters
         ----------
         values : (nc, ...) float
-            A value of each contact point.
+            A row for every contact point.
 
         Returns
         -------
