@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import copy
+import math
 import os
 import shutil
 import subprocess
 import sys
+from math import sin as sine_by_another_name
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +87,21 @@ def test_twins_replace_names_in_all_that_they_call() -> None:
     # The twin of a kernel is an ordinary function.
     assert uncompiled(inner)(1.5) == 1.0
     assert not hasattr(uncompiled(inner), "py_func")
+
+
+@kernel
+def half_sine(x: float) -> float:
+    return 0.5 * sine_by_another_name(x)
+
+
+def test_twins_call_something_else_whatever_its_name() -> None:
+    def outer(x: float) -> float:
+        return half_sine(x) + sin(x)
+
+    def sin(x: float) -> float:
+        return 1.0
+
+    assert uncompiled(outer, replace={math.sin: lambda x: 6.0 * x})(2.0) == 7.0
 
 
 @pytest.mark.filterwarnings("error")

@@ -14,6 +14,7 @@ from llvmlite import ir
 from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike.compiler import machine_code, trigonometry
+from heelstrike.compiler.bundle import Bundle, array, cell
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.recording import Program, Recording
 from heelstrike.compiler.straight_line import add_function, play
@@ -161,6 +162,19 @@ def test_everything_is_read_before_anything_is_written() -> None:
     (address,) = machine_code.addresses(["exchange"], b"test of exchange", "", lambda: module)
     called(address, x, y)
     assert (x.tolist(), y.tolist()) == ([2.0, 3.0], [1.0])
+
+
+class Counted(Bundle):
+    value: np.ndarray = array("n")
+    count: int = cell(int)
+
+
+def test_what_a_recording_would_take_for_a_constant_is_refused() -> None:
+    def counting(counted: Counted) -> None:
+        counted.count += 1
+
+    with pytest.raises(TypeError, match="counted has cells"):
+        Recording(Program(counting, {"counted": Counted.allocate(n=1)}))
 
 
 def constant(number: float) -> ir.Module:

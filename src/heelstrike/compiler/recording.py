@@ -93,6 +93,11 @@ class Recording:
         The operations.
     arrays : dict of str to array
         What the kernel leaves in its arrays.
+
+    Raises
+    ------
+    TypeError
+        If a bundle has cells.
     """
 
     def __init__(self, program: Program, known: Mapping[str, Symbols] | None = None) -> None:
@@ -102,6 +107,8 @@ class Recording:
         operands: list[Any] = []
         for name, argument in program.arguments.items():
             if isinstance(argument, Bundle):
+                if any(member.role == "cell" for member in argument.declared.values()):
+                    raise TypeError(f"{name} has cells, which a recording would take for constants")
                 members = {
                     member: self._symbols(f"{name}.{member}", value, known or {})
                     for member, value in argument.members().items()

@@ -23,7 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import LINE, opening, room
+from heelstrike.contact.sets import LINE, room
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -157,13 +157,14 @@ def certify(
         else:  # it moves nothing
             force = 1.0 if normal_impulse > 0.0 else (-1.0 if normal_impulse < 0.0 else 0.0)
         non_penetration = max(non_penetration, -speed)
-        if problem.set[contact] == LINE:
-            non_penetration = max(non_penetration, speed)
-        else:
-            cone = max(cone, -force)
-            complementarity = max(complementarity, min(speed, force))
+        complementarity = max(complementarity, min(speed, force))
+        if force <= 0.0:
+            if problem.set[contact] == LINE:
+                non_penetration = max(non_penetration, speed)
+            else:
+                cone = max(cone, -force)
 
-        friction = opening(problem, contact)
+        friction = problem.friction[contact]
         if root[tangent] > 0.0:
             force_scale = root[tangent] * inverse
         elif friction > 0.0 and force_scale > 0.0:

@@ -6,9 +6,9 @@
 ``LINE``              any λ_n                     closed loop, latch: the rows do not part at all
 ====================  ==========================  =========================================
 
-A group has two rows, normal and tangent; where the set says nothing of the tangent, there is no
-impulse along it. An interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a
-normal impulse that is known (:func:`press`).
+A group has two rows, normal and tangent. Only cones have friction; that of other sets is zero. An
+interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a normal impulse that is
+known (:func:`press`).
 """
 
 from __future__ import annotations
@@ -20,12 +20,6 @@ from heelstrike.contact.workspace import ContactProblem
 CONE = 0
 HALF_LINE = 1
 LINE = 2
-
-
-@kernel
-def opening(problem: ContactProblem, group: int) -> float:
-    """Largest tangential impulse per unit of the normal one."""
-    return problem.friction[group] if problem.set[group] == CONE else 0.0
 
 
 @kernel
@@ -50,17 +44,18 @@ def projected(
     problem: ContactProblem, group: int, normal: float, tangent: float
 ) -> tuple[float, float]:
     """Return an impulse moved into its set, exactly, along the normal first."""
-    if problem.set[group] != LINE:
-        normal = max(normal, 0.0)
-    limit = opening(problem, group) * normal
+    if normal < 0.0 and problem.set[group] != LINE:
+        normal = 0.0
+    limit = problem.friction[group] * normal
     return normal, min(max(tangent, -limit), limit)
 
 
 @kernel
 def contains(problem: ContactProblem, group: int, normal: float, tangent: float) -> bool:
     """Whether an impulse is in its set."""
-    apart = problem.set[group] != LINE and normal < 0.0
-    return not apart and abs(tangent) <= opening(problem, group) * normal
+    if normal < 0.0 and problem.set[group] == LINE:
+        return tangent == 0.0
+    return abs(tangent) <= problem.friction[group] * normal
 
 
 @kernel
@@ -71,7 +66,7 @@ def room(
 
     Negative outside; ``sharply`` in twice the precision.
     """
-    friction = opening(problem, group)
+    friction = problem.friction[group]
     limit = friction * normal
     beyond = product_error(friction, normal, limit) if sharply else 0.0
     return (limit - tangent) + beyond, (limit + tangent) + beyond

@@ -28,7 +28,7 @@ class ContactProblem(Bundle):
     free : (2 nc,) float
         Free velocity (or acceleration), the free term b.
     friction : (nc,) float
-        Friction coefficient of each contact.
+        Friction coefficient of each contact, zero where its set is no cone.
     set : (nc,) int
         Where its impulses may lie; see :mod:`heelstrike.contact.sets`.
     """

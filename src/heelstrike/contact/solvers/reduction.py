@@ -13,7 +13,6 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
-from heelstrike.contact.sets import opening
 from heelstrike.contact.workspace import ContactProblem, Floats, Integers, ReducedProblem
 
 
@@ -34,7 +33,7 @@ def reduce_problem(
         reduced.prescribed[contact] = OPEN
         slope[contact] = 0.0
         reduced.set[contact] = problem.set[contact]
-        friction = opening(problem, contact)
+        friction = problem.friction[contact]
         components = 1
         if mode[contact] == SLIDING_FORWARD or mode[contact] == SLIDING_BACKWARD:
             reduced.prescribed[contact] = mode[contact]

@@ -13,7 +13,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.certificate import REST_TOLERANCE, certify
 from heelstrike.contact.modes import OPEN, SLIDING_FORWARD, SLIP_BACKWARD, SLIP_FORWARD, STICK
-from heelstrike.contact.sets import LINE, opening, projected
+from heelstrike.contact.sets import LINE, projected
 from heelstrike.contact.solvers.elimination import POOR_PIVOT
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -62,7 +62,7 @@ def list_equations(problem: ContactProblem, mode: Integers, rows: StickingRows) 
         equation[tangent] = -1
         if mode[contact] == OPEN and problem.set[contact] != LINE:
             continue
-        has_friction = opening(problem, contact) > 0.0
+        has_friction = problem.friction[contact] > 0.0
         if mode[contact] >= SLIDING_FORWARD or (has_friction and mode[contact] != STICK):
             return -1
         equation[row] = size
@@ -276,7 +276,7 @@ def share_impulses(problem: ContactProblem, rows: StickingRows, answer: ContactA
         largest = max(largest, abs(impulse[row]))
     pulling = 0
     for contact in range(problem.count):
-        if problem.set[contact] != LINE and impulse[2 * contact] < -CLEAN * largest:
+        if impulse[2 * contact] < -CLEAN * largest and problem.set[contact] != LINE:
             answer.mode[contact] = OPEN
             rows.pulled[contact] = 1
             pulling += 1
@@ -314,7 +314,7 @@ def name_by_velocity(
         mode[contact] = STICK
         if abs(velocity[tangent]) > rest * root[tangent]:
             mode[contact] = SLIP_FORWARD if velocity[tangent] > 0.0 else SLIP_BACKWARD
-            if opening(problem, contact) > 0.0:
+            if problem.friction[contact] > 0.0:
                 return -1
     return pressed
 

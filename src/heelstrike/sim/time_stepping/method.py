@@ -326,6 +326,7 @@ def select_stops(
             memory.free[2 * count] = normal
             memory.free[2 * count + 1] = 0.0
             memory.problem.set[count] = HALF_LINE
+            memory.problem_friction[count] = 0.0
             memory.problem_mode[count] = memory.stop_mode[joint, end]
             memory.candidate[count] = points + 2 * joint + end
             count += 1
