@@ -58,8 +58,11 @@ def test_walker2d_stays_on_four_stops(runs: dict[str, hs.Run], how: str) -> None
 
 
 def test_stamping_changes_contacts_in_most_steps(runs: dict[str, hs.Run]) -> None:
-    solver = runs["stamping, bravo7"].solver
-    assert solver.shortcuts < 0.25 * solver.solves
+    run = runs["stamping, bravo7"]
+    pushed = run.contact_force[..., 0] > 0.0
+    mode = np.where(pushed, 2 + np.where(slipping(run), np.sign(run.slip_velocity), 0.0), 0.0)
+    changed = np.any(mode[1:] != mode[:-1], axis=1)
+    assert changed.mean() > 0.5
 
 
 @pytest.mark.parametrize("name", instructions.scenarios())
