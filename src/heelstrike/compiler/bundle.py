@@ -7,13 +7,14 @@ compiled code as in Python.
 
 What a bundle holds is declared once, where its class is written: shapes by the names of their
 extents, from which follow its allocation, its compiled type, its checks and its contents by name.
+Kernels written into the class are its methods, in compiled code as in Python.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, TypeVar
@@ -23,10 +24,12 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.core.typing.templates import AttributeTemplate
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
+    intrinsic,
+    lower_builtin,
     lower_getattr_generic,
     lower_setattr_generic,
     register_model,
@@ -55,7 +58,7 @@ class Member:
     shape : tuple of str and int
         Extents of an array: ``"nv"``, ``"2 nc"``, ``"nc + 1"``, 3.
     address : bool
-        Whether it holds places in this process, which mean nothing in another.
+        Whether it holds places in this process, or a part what is another's: nothing to keep.
     """
 
     role: str
@@ -84,9 +87,9 @@ def number(of: type) -> Any:
     return Member("number", of)
 
 
-def part(kind: type[Bundle]) -> Any:
+def part(kind: type[Bundle], *, address: bool = False) -> Any:
     """Declare a bundle within a bundle."""
-    return Member("part", kind)
+    return Member("part", kind, address=address)
 
 
 class Bundle:
@@ -124,16 +127,18 @@ class Bundle:
 
     declared: ClassVar[dict[str, Member]] = {}
     """The members that the class declares, by name."""
+    methods: ClassVar[bool] = False
+    """Whether the class has kernels for methods."""
 
     def __init_subclass__(cls) -> None:
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Member)}
         cls.declared = cls.declared | own
+        cls.methods = cls.methods or any(hasattr(value, "py_func") for value in vars(cls).values())
         cells = [name for name, member in cls.declared.items() if member.role == "cell"]
         for name in own:
-            if name in cells:
-                setattr(cls, name, _cell_property(cells.index(name), own[name]))
-            else:
-                delattr(cls, name)
+            delattr(cls, name)
+        for place, name in enumerate(cells):
+            setattr(cls, name, _cell_property(place, cls.declared[name]))
 
     def __init__(self, **members: Any) -> None:
         own = self.__dict__
@@ -262,10 +267,46 @@ class Bundle:
         if self._cell_count():
             yield f"{prefix}cells", self.__dict__["_cells"]
         for name, member in self.declared.items():
-            if member.role == "part":
+            if member.role == "part" and not member.address:
                 yield from getattr(self, name).storage(f"{prefix}{name}.")
             elif member.role == "array" and not member.address:
                 yield prefix + name, getattr(self, name)
+
+    def stored(
+        self: _Some, place: Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
+    ) -> _Some:
+        """Return a copy whose storage is what `place` makes of each array of this one."""
+        cells = place(self.__dict__["_cells"]) if self._cell_count() else None
+        members = self.members()
+        for name, member in self.declared.items():
+            if member.role == "part" and not member.address:
+                members[name] = members[name].stored(place)
+            elif member.role == "array" and not member.address:
+                members[name] = place(members[name])
+        copy = type(self)(**members)
+        if cells is not None:
+            copy.__dict__["_cells"] = cells
+        return copy
+
+    def check(self, extents: Mapping[str, int]) -> None:
+        """Refuse to be one for other extents.
+
+        Raises
+        ------
+        TypeError
+            That names the array.
+        """
+        known = dict(extents)
+        for name, member in self.declared.items():
+            if member.role == "part":
+                getattr(self, name).check(known)
+            elif member.role == "array":
+                _check_shape(f"{type(self).__name__}.{name}", member, getattr(self, name).shape, known)
+
+    @classmethod
+    def settable(cls: type[_Some]) -> type[_Some]:
+        """Return a class of the same members whose numbers are cells, and so can be set."""
+        return _settable(cls)  # type: ignore[return-value, arg-type]
 
     def contents(self) -> dict[str, np.ndarray[Any, Any]]:
         """Copy what is its own in its storage, by name: read-only arrays are shared with others."""
@@ -294,6 +335,14 @@ class Bundle:
 
 def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
     return kind(**members)
+
+
+@lru_cache
+def _settable(cls: Any) -> Any:
+    numbers = {
+        name: cell(member.kind) for name, member in cls.declared.items() if member.role == "number"
+    }
+    return type(cls.__name__, (cls,), {"__module__": cls.__module__, **numbers})
 
 
 def _cell_property(place: int, member: Member) -> property:
@@ -345,9 +394,10 @@ def _check_shape(
 
 
 class BundleType(types.Type):
-    """Type of a bundle: its members and theirs."""
+    """Type of a bundle: its members and theirs, and the class whose kernels are its methods."""
 
-    def __init__(self, name: str, members: tuple[tuple[str, Any, bool], ...]) -> None:
+    def __init__(self, cls: Any, members: tuple[tuple[str, Any, bool], ...]) -> None:
+        name, self.cls = cls.__name__, cls
         self.members = {member: kind for member, kind, _ in members}
         self.cells = {member for member, _, changes in members if changes}
         described = ", ".join(map(str, members))
@@ -367,7 +417,7 @@ class BundleType(types.Type):
 @lru_cache
 def _bundle_type(cls: Any) -> BundleType:
     return BundleType(
-        cls.__name__,
+        cls,
         tuple(
             (name, _member_type(member), member.role == "cell")
             for name, member in cls.declared.items()
@@ -407,7 +457,61 @@ class _BundleAttribute(AttributeTemplate):
     key = BundleType
 
     def generic_resolve(self, kind: BundleType, name: str) -> Any:  # type: ignore[override]
-        return kind.members.get(name)
+        if name in kind.members:
+            return kind.members[name]
+        return _method(kind, name) if hasattr(getattr(kind.cls, name, None), "py_func") else None
+
+
+@lru_cache
+def _method(kind: BundleType, name: str) -> Any:
+    """Type of a kernel of the class of a bundle, bound to the bundle."""
+    function = getattr(kind.cls, name)._numba_type_
+
+    class Method(AbstractTemplate):
+        key = f"{kind.name}.{name}"
+
+        def generic(self, arguments: Any, keywords: Any) -> Any:
+            return function.get_call_type(self.context, (kind, *arguments), keywords).as_method()
+
+    @lower_builtin(Method.key, kind, types.VarArg(types.Any))
+    def call(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return context.get_function(function, signature)(builder, values)
+
+    return types.BoundFunction(Method, kind)
+
+
+@lru_cache
+def bundle_at(cls: Any) -> Any:
+    """Return an intrinsic that returns the bundle of a class whose table is at an address."""
+    kind = cls.compiled_type()
+
+    def define(context: Any, address: Any) -> Any:
+        del context
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            del context, signature
+            return builder.inttoptr(values[0], _WORD.as_pointer())
+
+        return kind(types.int64), generate
+
+    # What compiled code is made of is known by these: its members, and where its methods stand.
+    define.__name__ = define.__qualname__ = kind.name
+    define.__module__ = cls.__module__ if cls.methods else __name__
+    return intrinsic(define)
+
+
+def _address_of(context: Any, bundle: Any) -> Any:
+    del context
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        del context, signature
+        return builder.ptrtoint(values[0], _WORD)
+
+    return types.int64(bundle), generate
+
+
+address_of: Any = intrinsic(_address_of)
+"""``address_of(bundle)``: where its table is."""
 
 
 def _word(builder: Any, table: Any, place: int) -> Any:

@@ -13,7 +13,7 @@ import re
 import sys
 import types
 from collections.abc import Callable, Mapping
-from functools import cached_property, lru_cache, update_wrapper
+from functools import cached_property, lru_cache, partial, update_wrapper
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -150,6 +150,10 @@ class Kernel:
     def _numba_type_(self) -> Any:
         """What Numba takes it for where another kernel names it."""
         return type_of(self._part)
+
+    def __get__(self, instance: Any, owner: Any = None) -> Any:
+        """Bind it to the bundle whose method it is."""
+        return self if instance is None else partial(self, instance)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
