@@ -178,10 +178,14 @@ class Bundle:
         dtype : type, optional
             Of its arrays of floats, for other numbers than these: ``object`` for symbols.
         **given : int, array, number or Bundle
-            The extents by name, and members that are not to be zeros. Parts are allocated with the
-            same extents.
+            The extents by name, and members that are not to be zeros; a whole number may be both.
+            Parts are allocated with the same extents.
         """
-        extents = {name: value for name, value in given.items() if name not in cls.declared}
+        extents = {
+            name: value
+            for name, value in given.items()
+            if name not in cls.declared or cls.declared[name] == Member("number", int)
+        }
         members = {name: value for name, value in given.items() if name in cls.declared}
         for name, member in cls.declared.items():
             if name in members or member.role == "cell":
@@ -273,19 +277,22 @@ class Bundle:
                 yield prefix + name, getattr(self, name)
 
     def stored(
-        self: _Some, place: Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
+        self: _Some,
+        place: Callable[[str, np.ndarray[Any, Any]], np.ndarray[Any, Any]],
+        prefix: str = "",
     ) -> _Some:
-        """Return a copy whose storage is what `place` makes of each array of this one."""
-        cells = place(self.__dict__["_cells"]) if self._cell_count() else None
+        """Return a copy whose storage is what `place(name, array)` makes of that of this one."""
+        cells = self.__dict__["_cells"]
+        if self._cell_count():
+            cells = place(f"{prefix}cells", cells)
         members = self.members()
         for name, member in self.declared.items():
             if member.role == "part" and not member.address:
-                members[name] = members[name].stored(place)
+                members[name] = members[name].stored(place, f"{prefix}{name}.")
             elif member.role == "array" and not member.address:
-                members[name] = place(members[name])
+                members[name] = place(prefix + name, members[name])
         copy = type(self)(**members)
-        if cells is not None:
-            copy.__dict__["_cells"] = cells
+        copy.__dict__["_cells"] = cells
         return copy
 
     def check(self, extents: Mapping[str, int]) -> None:

@@ -22,6 +22,7 @@ from numba import njit
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.errors import NumbaError
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
@@ -32,6 +33,9 @@ from heelstrike.compiler.quick_compiling import load_numba, quick_compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+
+CompileError = (NumbaError, RuntimeError, TypeError)
+"""What compiling a function raises that cannot be compiled."""
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
@@ -188,6 +192,16 @@ def dissolved_kernel(function: Function) -> Function:
     compiled: Any = Kernel(function, dissolved=True)
     result: Function = compiled
     return result
+
+
+def within_bounds(function: Any) -> Any:
+    """Compile a function of somebody's to be called by kernels, its indices checked.
+
+    What Numba has compiled already stays as it is.
+    """
+    if _is_compiled(function):
+        return function
+    return njit(**_OPTIONS, boundscheck=True)(function)
 
 
 def compiled_for(

@@ -52,6 +52,8 @@ class SeparateKernel:
         The kernel. Its name in its module must be that of the :class:`SeparateKernel`.
     signature : callable
         Gives its Numba signature.
+    boundscheck : bool
+        Whether an index beyond an array raises IndexError.
 
     Attributes
     ----------
@@ -60,13 +62,20 @@ class SeparateKernel:
         Read-only: all who call it share it.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Callable[[], Any]) -> None:
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        signature: Callable[[], Any],
+        *,
+        boundscheck: bool = False,
+    ) -> None:
         self._place = np.zeros(1, dtype=np.int64)
         self.address: NDArray[np.int64] = self._place[:]
         self.address.flags.writeable = False
         self.__module__ = function.__module__
         self._function = function
         self._signature = signature
+        self._boundscheck = boundscheck
         self._compiled: Any = None
         self._helper: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
@@ -93,7 +102,9 @@ class SeparateKernel:
                 _wait_for(self._helper)
                 self._helper = None
             signature = self._signature()
-            compiled: Any = compiled_for(signature, self._function, address=True)
+            compiled: Any = compiled_for(
+                signature, self._function, address=True, boundscheck=self._boundscheck
+            )
             result = compiled.get_compile_result(signature)
             self._place[0] = result.library.get_pointer_to_function(
                 result.fndesc.llvm_cfunc_wrapper_name
