@@ -74,8 +74,11 @@ if TYPE_CHECKING:
     from heelstrike.sim import Push as Push
     from heelstrike.sim import Run as Run
     from heelstrike.sim import Scheme as Scheme
+    from heelstrike.sim import Simulation as Simulation
+    from heelstrike.sim import Snapshot as Snapshot
     from heelstrike.sim import TimeStepping as TimeStepping
     from heelstrike.sim import load_run as load_run
+    from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
 
@@ -110,7 +113,9 @@ _HOME = {
     "Run": "heelstrike.sim",
     "RunFileError": "heelstrike.errors",
     "Scheme": "heelstrike.sim",
+    "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
+    "Snapshot": "heelstrike.sim",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "ViewError": "heelstrike.errors",
@@ -126,6 +131,7 @@ _HOME = {
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
+    "load_snapshot": "heelstrike.sim",
     "optimize_gait": "heelstrike.gait",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",

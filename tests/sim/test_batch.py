@@ -14,9 +14,9 @@ import walking
 import heelstrike as hs
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import CompiledController, Contacts, RunStatus, controller_kernel
-from heelstrike.sim import batch as batch_module
 from heelstrike.sim.batch import Batch
-from heelstrike.sim.method import Engine, Method, Setting
+from heelstrike.sim.method import Method
+from heelstrike.sim.setting import Setting
 from heelstrike.sim.status import EventKind
 
 ROWS = ("time", "position", "velocity", "torque", "contact_force", "gap", "slip_velocity")
@@ -380,10 +380,9 @@ def test_robots_of_one_size_and_another_structure(threads: int) -> None:
 
 
 class Careful(hs.TimeStepping):
-    def engine(self, setting: Setting) -> Engine:
-        if setting.memory.q[0] > 1.0:
+    def check(self, setting: Setting) -> None:
+        if setting.state.q[0] > 1.0:
             raise hs.SimulationError("too far")
-        return super().engine(setting)
 
 
 def test_what_only_the_method_refuses_comes_before_the_first_run() -> None:
@@ -403,17 +402,16 @@ def test_what_only_the_method_refuses_comes_before_the_first_run() -> None:
 def test_runs_are_let_go_when_they_are_finished(monkeypatch: pytest.MonkeyPatch) -> None:
     begun, alive = [], []
 
-    def watched(**options: Any) -> Any:
-        loop = prepared(**options)
-        begun.append(weakref.ref(loop))
-        return loop
+    def watched(simulation: hs.Simulation, *arguments: Any, **options: Any) -> None:
+        begun.append(weakref.ref(simulation))
+        begin(simulation, *arguments, **options)
 
     def count(done: int, total: int) -> None:
         if done == total:
-            alive[:] = [loop for loop in begun if loop() is not None]
+            alive[:] = [simulation for simulation in begun if simulation() is not None]
 
-    prepared = batch_module.prepared
-    monkeypatch.setattr(batch_module, "prepared", watched)
+    begin = hs.Simulation._begin
+    monkeypatch.setattr(hs.Simulation, "_begin", watched)
     start = walking.gait().initial_state
     hs.simulate_batch(
         walking.bravo7(), controller(), state=[start] * 3, duration=0.01, progress=count,

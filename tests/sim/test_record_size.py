@@ -16,8 +16,7 @@ from synthetic_runs import box, make_run
 
 import heelstrike as hs
 from heelstrike.sim import record_size
-from heelstrike.sim.memory import allocate_memory
-from heelstrike.sim.method import Setting
+from heelstrike.sim.setting import Setting, checked_setting
 
 SHORT: dict[str, Any] = {
     "step": lambda step: hs.TimeStepping(step=step),
@@ -42,17 +41,8 @@ def simulate(method: Any, **options: Any) -> hs.Run:
     return hs.simulate(robot, state=robot.reference_state(), method=method, **options)
 
 
-def setting(duration: float, record_every: int = 1) -> Setting:
-    robot = box()
-    return Setting(
-        robot=robot,
-        ground=hs.Ground().model(),
-        memory=allocate_memory(robot),
-        duration=duration,
-        control_period=None,
-        record_every=record_every,
-        fallen_height=-np.inf,
-    )
+def setting(record_every: int = 1) -> Setting:
+    return checked_setting(box(), box().reference_state(), record_every=record_every)
 
 
 @pytest.mark.parametrize("name", SHORT)
@@ -69,10 +59,10 @@ def test_steps_beyond_counting(name: str, step: float, rows: str) -> None:
     shortest = float(re.search(r"The shortest is (\S+) s\.", words)[1])  # type: ignore[index]
     every = int(re.search(r"record_every=(\d+)", words)[1])  # type: ignore[index]
     assert shortest > step
-    record_size.check_steps(setting(7.0), "step", shortest)
-    record_size.check_room(setting(7.0, every), "step", shortest)
+    record_size.check_steps(setting(), 7.0, "step", shortest)
+    record_size.check_room(setting(every), 7.0, "step", shortest)
     with pytest.raises(hs.SimulationError):
-        record_size.check_steps(setting(7.0), "step", shortest / 1.2)
+        record_size.check_steps(setting(), 7.0, "step", shortest / 1.2)
 
 
 def test_periods_beyond_counting() -> None:

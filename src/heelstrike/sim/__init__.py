@@ -16,9 +16,11 @@ from heelstrike.sim.controller.interface import (
 )
 from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.files.run_file import load_run
+from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
-from heelstrike.sim.simulation import simulate
+from heelstrike.sim.simulation import Simulation, simulate
+from heelstrike.sim.snapshot import Snapshot, load_snapshot
 from heelstrike.sim.status import EventKind, RunStatus, Scheme
 from heelstrike.sim.time_stepping import TimeStepping
 
@@ -35,16 +37,20 @@ __all__ = [
     "EventKind",
     "HuntCrossley",
     "KelvinVoigt",
+    "Method",
     "Push",
     "RegularisedFriction",
     "Run",
     "RunStatus",
     "Scheme",
+    "Simulation",
+    "Snapshot",
     "SolverCount",
     "TimeStepping",
     "Timing",
     "controller_kernel",
     "load_run",
+    "load_snapshot",
     "simulate",
     "simulate_batch",
 ]

@@ -54,8 +54,9 @@ CHUNK = 4096
 # Steps before the first look, and seconds that should pass between two.
 FIRST_LOOK = 256
 LOOK_EVERY = 0.05
-# A pause that never comes.
+# A pause that never comes, and a time (s).
 NEVER = 2**62
+FAR = 1e300
 # Points deeper than this (m) in ground that is laid under them are in it.
 LAID = 1e-6
 
@@ -193,6 +194,7 @@ class Simulation:
         self._keeps_rows = keep_rows
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
+        self._complaint = ""
         self.status = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
@@ -289,7 +291,7 @@ class Simulation:
         SimulationError
             If the simulation has come to its end.
         """
-        return self._advance(np.inf, self._clock.index + 1)
+        return self._advance(FAR, self._clock.index + 1)
 
     def advance(
         self, until: float, *, progress: Callable[[float], None] | None = None
@@ -332,6 +334,7 @@ class Simulation:
         self._clock.until = until
         self._clock.forked = 0
         self._fork = None
+        self._complaint = ""
         try:
             self.status, self.message = self._go(pause, progress, stopped)
         except KeyboardInterrupt as interrupt:
@@ -360,14 +363,14 @@ class Simulation:
                     f"{self._name} {misdeed}; noticed at {self._now}"
                     + ("" if self._python else ". simulate(..., checked=True) tells more")
                 )
-            complaint = self._report(progress)
+            self._report(progress)
             if isinstance(code, tuple):
                 return code
             if code is not Outcome.PAUSED or self._clock.index >= last:
                 status, message = self._ending(code)
-                return status, f"{message}; {complaint}" if complaint else message
-            if complaint or (stopped is not None and stopped()):
-                more = f": {complaint}" if complaint else ""
+                return status, f"{message}; {self._complaint}" if self._complaint else message
+            if self._complaint or (stopped is not None and stopped()):
+                more = f": {self._complaint}" if self._complaint else ""
                 return RunStatus.INTERRUPTED, f"interrupted at {self._now}{more}"
             steps = int(min(CHUNK, max(1.0, steps * min(4.0, LOOK_EVERY / max(elapsed, 1e-9)))))
 
@@ -390,7 +393,7 @@ class Simulation:
             if outcome is Outcome.RECORD_FULL:
                 self._new_record()
             elif outcome is Outcome.FORK:
-                self._fork = self.snapshot()
+                self._fork = self.snapshot() if self._can_be_kept else None
             elif outcome is Outcome.ASKING:
                 ending = self._ask()
                 if ending is not None:
@@ -398,18 +401,17 @@ class Simulation:
             else:
                 return outcome
 
-    def _report(self, progress: Callable[[float], None] | None) -> str:
-        """Report progress; say what went wrong with that, if something did."""
+    def _report(self, progress: Callable[[float], None] | None) -> None:
+        """Report progress; keep in mind what went wrong with that, if something did."""
         if progress is None:
-            return ""
+            return
         try:
             progress(self.time)
         except KeyboardInterrupt:
             raise
         except BaseException as error:
             self.error = error
-            return f"progress raised {_raised(error)}"
-        return ""
+            self._complaint = f"progress raised {_raised(error)}"
 
     def _ask(self) -> tuple[RunStatus, str] | None:
         """Ask a controller in Python for torques; return how it ended the run, if it did."""
@@ -488,7 +490,7 @@ class Simulation:
         clock = self._clock
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
         rows = min(CHUNK, rows + clock.row_margin)
-        events = max(256, 2 * clock.event_margin)
+        events = 256 + 2 * clock.event_margin
         self._records.append(allocate_record(self.robot, rows, events))
 
     def _count_events(self) -> None:
@@ -763,12 +765,13 @@ def simulation_to_the_end(
     row = last.rows - 1
     if row >= 0 and last.time[row] == simulation.time:  # event-driven rows lie on the constraints
         state = State(last.q[row], last.v[row])
-    run = simulation._run(status, message) if keep_rows else None
-    simulation._count_events()
-    return Ending(
-        status, message, state, simulation.time, simulation._event_counts, run,
-        None if keep_rows else last,
-    )  # fmt: skip
+    if not keep_rows:
+        simulation._count_events()
+        events = simulation._event_counts
+        return Ending(status, message, state, simulation.time, events, None, last)
+    run = simulation._run(status, message)
+    events = np.bincount([event.kind for event in run.events], minlength=len(EventKind))
+    return Ending(status, message, state, simulation.time, events, run, None)
 
 
 def check_duration(duration: float) -> None:

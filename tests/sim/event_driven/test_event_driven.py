@@ -24,9 +24,8 @@ from heelstrike.sim import (
     controller_kernel,
 )
 from heelstrike.sim.event_driven.method import EVENTS_WITHOUT_END, LOOKS
-from heelstrike.sim.event_driven.phase import REASON, allocate_phase
-from heelstrike.sim.method import DIVERGED
-from heelstrike.sim.simulation import prepared
+from heelstrike.sim.event_driven.phase import allocate_phase
+from heelstrike.sim.frame import Outcome
 
 Floats = NDArray[np.float64]
 
@@ -297,14 +296,11 @@ def test_instants_that_differ_by_rounding_are_one(speed: float, options: dict[st
 
 
 def test_why_it_could_not_go_on_is_told() -> None:
-    loop = prepared(
-        robot=walking.bravo7(), state=walking.gait().initial_state, duration=1.0,
-        method=hs.EventDriven(), ground=None, control_period=None, record_every=1,
-        stop_when_fallen=None, pushes=(),
-    )  # fmt: skip
-    loop.begin()
-    loop.engine._phase.count[REASON] = EVENTS_WITHOUT_END  # type: ignore[attr-defined]
-    _, message = loop._ending(DIVERGED)
+    simulation = hs.Simulation(
+        walking.bravo7(), state=walking.gait().initial_state, method=hs.EventDriven()
+    )
+    simulation._work.reason = EVENTS_WITHOUT_END
+    _, message = simulation._ending(Outcome.DIVERGED)
     assert "events followed each other" in message
 
 
@@ -322,14 +318,11 @@ def test_the_events_of_an_instant_have_room() -> None:
         lower=np.full(9, -9.0), upper=np.full(9, 9.0), dry_friction=np.ones(9)
     )
     robot = dataclasses.replace(robot, model=model)
-    loop = prepared(
-        robot=robot, state=walking.gait().initial_state, duration=1.0, method=hs.EventDriven(),
-        ground=None, control_period=None, record_every=1, stop_when_fallen=None, pushes=(),
-    )  # fmt: skip
-    loop.begin()
+    simulation = hs.Simulation(robot, state=walking.gait().initial_state, method=hs.EventDriven())
+    simulation.step()
     contacts = len(allocate_phase(robot).closed)
     assert contacts == robot.nc + 3 * robot.nv
-    assert len(loop.records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
+    assert len(simulation._records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
 
 
 @pytest.mark.parametrize("turn", [0.0, -3.0])

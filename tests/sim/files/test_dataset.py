@@ -85,6 +85,8 @@ def test_round_trip_is_exact(run: hs.Run, tmp_path: Path) -> None:
     path = save(run, tmp_path / "run.nc")
     again = load_run(path)
     for field in dataclasses.fields(hs.Run):
+        if field.name == "final":  # what goes on from it is a file of its own
+            continue
         assert same(getattr(run, field.name), getattr(again, field.name)), field.name
 
 

@@ -23,7 +23,12 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.contact_geometry import contact_velocity, locate_contacts, observe
+from heelstrike.sim.contact_geometry import (
+    contact_velocity,
+    evaluate_equations,
+    locate_contacts,
+    observe,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.dry_friction import dry_force
@@ -645,7 +650,8 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
         phase.begin[i] = memory.q[i]
         phase.begin[nv + i] = memory.v[i]
     begin_dry_joints(memory, phase)
-    observe(model, ground, memory)
+    evaluate_equations(model, memory.q, memory.v, memory)
+    locate_contacts(model, ground, memory)
     code = meet_event(True, model, ground, memory, phase, record)
     for i in range(nv):
         memory.v[i] = phase.begin[nv + i]
