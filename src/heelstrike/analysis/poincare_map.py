@@ -23,7 +23,7 @@ from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.contact_geometry import observe
-from heelstrike.sim.controller.interface import CompiledController, Controller
+from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.run import Run
@@ -202,7 +202,7 @@ class PoincareMap:
     def __init__(
         self,
         section: Section,
-        controller: Controller | CompiledController | None,
+        controller: Controller | None,
         method: EventDriven,
         landing: Sequence[int] | None,
         symmetry: Callable[[State], State] | None,

@@ -308,7 +308,9 @@ class Bundle:
             if member.role == "part":
                 getattr(self, name).check(known)
             elif member.role == "array":
-                _check_shape(f"{type(self).__name__}.{name}", member, getattr(self, name).shape, known)
+                _check_shape(
+                    f"{type(self).__name__}.{name}", member, getattr(self, name).shape, known
+                )
 
     @classmethod
     def settable(cls: type[_Some]) -> type[_Some]:
@@ -493,7 +495,7 @@ def bundle_at(cls: Any) -> Any:
     kind = cls.compiled_type()
 
     def define(context: Any, address: Any) -> Any:
-        del context
+        del context, address
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             del context, signature

@@ -1,4 +1,4 @@
-"""Words of memory beyond what arrays own."""
+"""Arrays as the words of memory in which they lie."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import raw_memcpy
 from numba.extending import intrinsic
 
 
@@ -23,3 +24,19 @@ def _word_at(context: Any, array: Any, place: Any) -> Any:
 
 word_at: Any = intrinsic(_word_at)
 """``word_at(array, place)``: bits of the word so many after the first, inside the array or not."""
+
+
+def _copy_words(context: Any, source: Any, target: Any) -> Any:
+    signature = types.void(source, target)
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        pairs = zip(signature.args, values, strict=True)
+        found = [context.make_array(kind)(context, builder, value) for kind, value in pairs]
+        raw_memcpy(builder, found[1].data, found[0].data, found[0].nitems, found[0].itemsize)
+        return context.get_dummy_value()
+
+    return signature, generate
+
+
+copy_words: Any = intrinsic(_copy_words)
+"""``copy_words(source, target)``: copy an array into one of as many numbers."""

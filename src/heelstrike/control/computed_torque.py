@@ -224,8 +224,10 @@ def estimate_pose(
 ) -> None:
     """Fill in `robot.estimate`: joints as read, the trunk so that the stance foot is flat (28)."""
     seen, model = robot.estimate, robot.model
-    seen.q[:] = state.q
-    seen.v[:] = state.v
+    for j in range(robot.nq):
+        seen.q[j] = state.q[j]
+    for j in range(robot.nv):
+        seen.v[j] = state.v[j]
     for i in range(robot.nu):
         seen.joint_position[i] = memory.readings[0, i]
         seen.q[model.actuator_joint[i]] = memory.readings[0, i]
@@ -340,25 +342,24 @@ class ComputedTorque(Law):
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
-        flat = not isinstance(gait, PiecewiseGait)
         pitch = _pitch_of(robot, gait)
-        if not flat:
-            _check_points(robot, gait, encoder)
-        both = np.empty((2, *(gait.coefficients[None] if flat else gait.pieces).shape))
-        both[gait.stance_foot] = gait.coefficients if flat else gait.pieces
-        both[1 - gait.stance_foot] = (
-            gait.mirrored_coefficients(robot) if flat else gait.mirrored_pieces()
-        )
         duration = gait.step_duration
+        if isinstance(gait, PiecewiseGait):
+            _check_points(robot, gait, encoder)
+            breakpoints = gait.breakpoints
+            pieces, mirrored = gait.pieces, gait.mirrored_pieces()
+        else:
+            breakpoints = np.array([0.0, duration])
+            pieces, mirrored = gait.coefficients[None], gait.mirrored_coefficients(robot)[None]
         parameters = Parameters(
             kp=_gains("kp", kp, robot),
             kd=_gains("kd", kd, robot),
-            breakpoints=np.array([0.0, duration]) if flat else gait.breakpoints.copy(),
-            coefficients=both,
+            breakpoints=breakpoints,
+            coefficients=np.array([mirrored, pieces] if gait.stance_foot else [pieces, mirrored]),
             earliest=0.5 * duration,
             latest=1.1 * duration,
             landing=0.02 * duration,
-            on_points=not flat,
+            on_points=isinstance(gait, PiecewiseGait),
             encoder_period=-1.0 if encoder is None else encoder.period,
             encoder_resolution=0.0 if encoder is None else encoder.resolution,
             pitch=pitch,

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from heelstrike.experiments.benchmark.scenarios import Scenario
 from heelstrike.experiments.benchmark.stopwatch import Work
-from heelstrike.sim import Run, TimeStepping, simulate
-from heelstrike.sim.controller.interface import CompiledController
+from heelstrike.sim import Controller, Run, TimeStepping, simulate
 from heelstrike.sim.method import Method
 from heelstrike.sim.whole_run import whole
 
@@ -21,10 +18,9 @@ class InvalidRunError(Exception):
     """A run that does not count, and why."""
 
 
-def controller(scenario: Scenario, *, own: bool) -> CompiledController | None:
-    """Controller of a scenario in its compiled form."""
-    chosen: Any = scenario.own if own and scenario.own is not None else scenario.feedback
-    return None if chosen is None else chosen.compiled()
+def controller(scenario: Scenario, *, own: bool) -> Controller | None:
+    """Controller of a scenario."""
+    return scenario.own if own and scenario.own is not None else scenario.feedback
 
 
 def run(

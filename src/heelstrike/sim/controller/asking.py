@@ -8,6 +8,7 @@ import numpy as np
 
 from heelstrike.compiler.bundle import address_of
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.controller.control import OVERRAN, TRUSTED, Control
 from heelstrike.sim.controller.guard import intact, intact_between
@@ -70,17 +71,17 @@ def _ask(
 def _show_copies(control: Control, memory: Memory) -> None:
     """Copy kinematics and contacts: what a controller does to them harms nobody."""
     tree, own = memory.tree, control.state.kinematics
-    own.angle[:] = tree.angle
-    own.cosine[:] = tree.cosine
-    own.sine[:] = tree.sine
-    own.origin[:] = tree.origin
-    own.pivot[:] = tree.pivot
-    own.motion[:] = tree.motion
-    own.velocity[:] = tree.velocity
-    own.bias_acceleration[:] = tree.bias_acceleration
-    own.inertia[:] = tree.inertia
+    copy_words(tree.angle, own.angle)
+    copy_words(tree.cosine, own.cosine)
+    copy_words(tree.sine, own.sine)
+    copy_words(tree.origin, own.origin)
+    copy_words(tree.pivot, own.pivot)
+    copy_words(tree.motion, own.motion)
+    copy_words(tree.velocity, own.velocity)
+    copy_words(tree.bias_acceleration, own.bias_acceleration)
+    copy_words(tree.inertia, own.inertia)
     contacts, seen = memory.contacts, control.contacts
-    seen.position[:] = contacts.position
-    seen.normal[:] = contacts.normal
-    seen.gap[:] = contacts.gap
-    seen.force[:] = contacts.force
+    copy_words(contacts.position, seen.position)
+    copy_words(contacts.normal, seen.normal)
+    copy_words(contacts.gap, seen.gap)
+    copy_words(contacts.force, seen.force)

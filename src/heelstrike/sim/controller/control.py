@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.guard import guarded_bundle, in_one_block
@@ -52,7 +51,7 @@ class Control(Bundle):
         What it has done that it may not.
     """
 
-    parameters: Integers = array("parameters", of=int)
+    parameters: Integers = array("words", of=int)
     kept: Integers = array("memory", of=int)
     spare: Integers = array("memory", of=int)
     between_parameters: Integers = array("p", of=int, address=True)
@@ -98,22 +97,13 @@ class ReadyLaw:
         contacts: Contacts | None = None,
     ) -> None:  # fmt: skip
         extents = extents_of(robot)
-        function = law.function
-        try:
-            law.parameters.check(extents)
-            numbers = type(law.parameters).settable()(**law.parameters.members())
-            memory = function.memory.settable().allocate(**extents | law.memory)
-            memory.check(extents)
-        except TypeError as error:
-            raise ControllerError(
-                f"controller {function.name!r} does not fit robot {robot.name!r}: {error}"
-            ) from error
+        numbers, memory = law.numbers(robot)
         self.parameters, parameters, between_parameters = in_one_block(numbers)
         self.memory, kept, between_kept = in_one_block(memory)
         self._spare, spare, _ = in_one_block(memory)
         shown: dict[str, Any] = {}
         self._shown: dict[str, Bundle] = {}
-        if function.is_ours and tree is not None and contacts is not None:
+        if law.function.is_ours and tree is not None and contacts is not None:
             shown["state"] = ControlState.allocate(kinematics=tree, **extents)
             shown["contacts"] = contacts
             shown["robot"] = controlled_robot(robot)

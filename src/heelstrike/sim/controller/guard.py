@@ -109,7 +109,7 @@ def intact(array: Any) -> bool:
 @kernel
 def intact_between(block: Integers, between: Integers) -> bool:
     """Whether the guard words next to the arrays within a block are what they were."""
+    same = True
     for i in range(between.shape[0]):
-        if block[between[i]] != GUARD:
-            return False
-    return True
+        same = same and block[between[i]] == GUARD
+    return same

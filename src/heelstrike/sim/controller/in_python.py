@@ -44,9 +44,9 @@ class AskedLaw:
     ) -> None:
         ready = ReadyLaw(robot, law)
         control = ready.control
-        self.name, self.checked = law.function.name, checked
+        self.name = law.function.name
         self._model = robot.model
-        self._memory, self._control = ready, control
+        self.numbers, self._control = ready, control
         self._torque: NDArray[np.float64] = np.zeros(robot.nu)
         self._call: Any
         self._arguments: tuple[Any, ...]
@@ -72,9 +72,7 @@ class AskedLaw:
         names = ["state", "contacts", "robot", *law.function.own, "torque"]
         self._arguments = tuple(shown[name] for name in names)
 
-    def torque(
-        self, t: float, state: State, contacts: Contacts | None
-    ) -> NDArray[np.float64]:
+    def torque(self, t: float, state: State, contacts: Contacts | None) -> NDArray[np.float64]:
         """Return the joint torques (nu,), in N m.
 
         Raises
@@ -126,7 +124,9 @@ class AskedLaw:
         copy.__dict__["_cells"] = value.__dict__["_cells"]
         return copy.stored(
             lambda part, array: _shown(
-                f"{name}.{part}", array, self.name,
+                f"{name}.{part}",
+                array,
+                self.name,
                 writable=free or part in tuple(f"kinematics.{field}" for field in SCRATCH),
             )  # fmt: skip
         )

@@ -22,7 +22,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller
-from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState, extents_of
 
 # Time, then where state, contacts, robot, parameters and memory are, and the torques: the same
 # for all, so that one compiled loop serves every controller.
@@ -72,9 +72,11 @@ class ControllerFunction:
 
         def annotated() -> None: ...
 
-        annotated.__annotations__ = {name: inspect.signature(self.python).parameters[name].annotation}
+        annotated.__annotations__ = {
+            name: inspect.signature(self.python).parameters[name].annotation
+        }
         try:
-            found = get_type_hints(annotated, self.python.__globals__, dict(scope))[name]
+            found: Any = get_type_hints(annotated, self.python.__globals__, dict(scope))[name]
         except NameError as error:
             found = error
         if not (isinstance(found, type) and issubclass(found, Bundle)):
@@ -82,7 +84,8 @@ class ControllerFunction:
                 f"controller {self.name!r} must say what its {name} are: annotate the argument with "
                 f"a class of heelstrike.Bundle, such as {name}: {name.capitalize()}; got {found!r}"
             )
-        return found
+        bundle: type[Bundle] = found
+        return bundle
 
     @property
     def name(self) -> str:
@@ -147,7 +150,13 @@ def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., 
     memory_at = bundle_at(law.memory.settable())
 
     def both(
-        t: float, state: int, contacts: int, robot: int, parameters: int, memory: int, torque: Floats
+        t: float,
+        state: int,
+        contacts: int,
+        robot: int,
+        parameters: int,
+        memory: int,
+        torque: Floats,
     ) -> None:
         function(
             t, state_at(state), contacts_at(contacts), robot_at(robot), parameters_at(parameters),
@@ -294,7 +303,7 @@ class Law:
                 f"{type(parameters).__name__}"
             )
         self.function = function
-        self.parameters = parameters
+        self.parameters: Any = parameters
         self.memory = dict(memory or {})
         self.robot = robot
         self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
@@ -307,6 +316,25 @@ class Law:
             self.function, parameters, memory=self.memory, robot=self.robot,
             stiffness=self.stiffness, damping=self.damping,
         )  # fmt: skip
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return its parameters, and a memory to begin with, for a robot; all can be set.
+
+        Raises
+        ------
+        ControllerError
+            If they do not fit the robot.
+        """
+        extents = extents_of(robot)
+        try:
+            self.parameters.check(extents)
+            memory = self.function.memory.settable().allocate(**extents | self.memory)
+            memory.check(extents)
+        except TypeError as error:
+            raise ControllerError(
+                f"controller {self.function.name!r} does not fit robot {robot.name!r}: {error}"
+            ) from error
+        return type(self.parameters).settable()(**self.parameters.members()), memory
 
     def reset(self) -> None:
         """Forget what :meth:`torque` has been asked; runs begin anew by themselves."""
@@ -342,8 +370,15 @@ def no_torque(  # noqa: D103
         torque[i] = 0.0
 
 
-def law_of(controller: Controller | None) -> Law | None:
+def law_of(controller: Controller | None, *, begin: bool = False) -> Law | None:
     """Return the law that a controller is; None if it is an object of Python.
+
+    Parameters
+    ----------
+    controller : Controller or None
+        None applies no torque.
+    begin : bool
+        Whether a stock one shall be compiled by another process meanwhile.
 
     Raises
     ------
@@ -353,6 +388,8 @@ def law_of(controller: Controller | None) -> Law | None:
     if controller is None:
         return Law(no_torque)
     if isinstance(controller, Law):
+        if begin:
+            controller.function.begin()
         return controller
     if isinstance(controller, ControllerFunction):
         raise ControllerError(

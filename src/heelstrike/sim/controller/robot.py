@@ -79,7 +79,7 @@ class ControlledRobot(Bundle):
     foot_link: Integers = array("nf", of=int)
     foot_contact: Integers = array("nf", of=int)
     contact_foot: Integers = array("nc", of=int)
-    unactuated: Integers = array("unactuated", of=int)
+    unactuated: Integers = array("free", of=int)
     estimate: ControlState = part(ControlState)
     acceleration: Floats = array("nv")
     force: Floats = array("nv")
@@ -176,9 +176,7 @@ class ControlledRobot(Bundle):
     def foot_jacobian(self, state: ControlState, foot: int, jacobian: Floats) -> None:
         """Jacobian (3, nv) of the frame of a foot: x, z and rotation."""
         link = self.foot_link[foot]
-        point_jacobian(
-            self.model, state.kinematics, link, state.kinematics.origin[link], jacobian
-        )
+        point_jacobian(self.model, state.kinematics, link, state.kinematics.origin[link], jacobian)
 
     @kernel
     def center_of_mass(self, state: ControlState, position: Floats) -> None:
@@ -213,7 +211,7 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
     extents = extents_of(robot)
     driven = set(robot.model.actuator_joint.tolist())
     view = ControlledRobot.allocate(
-        model=robot.model, nf=len(robot.feet), unactuated=robot.nv - len(driven),
+        model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven),
         **extents,
     )  # fmt: skip
     view.contact_foot[:] = -1

@@ -6,8 +6,8 @@ what springs and dampers give, then fixes what the ground exerts, J_uᵀ F = f_u
 Γ = f_a − J_aᵀ F. This is eq. 37 with the products MᵀA M and MᵀH carried out by recursion instead of
 as matrices.
 
-A flat foot is held in its three coordinates. On a point foot the ground exerts no moment: two of the
-three unactuated accelerations follow from the contact. The third goes along the direction n with
+A flat foot is held in its three coordinates. On a point foot the ground exerts no moment: two of
+the three unactuated accelerations follow from the contact. The third goes along the direction n with
 J_u n = 0, the trunk's turning about the foot; the motors do not reach it, nᵀ(A v̇ + H)_u = 0, so it
 follows from the accelerations of the joints (partial feedback linearisation: M. W. Spong, *Partial
 feedback linearization of underactuated mechanical systems*, 1994).
@@ -121,7 +121,8 @@ def flat_foot_torque(
     `acceleration`.
     """
     if self.unactuated.shape[0] != 3:
-        torque[:] = np.nan
+        for i in range(self.nu):
+            torque[i] = np.nan
         return
     model, work, columns, wanted = self.model, state.kinematics, self.columns, self.acceleration
     a, b, c = self.unactuated[0], self.unactuated[1], self.unactuated[2]
@@ -162,7 +163,8 @@ def point_foot_torque(
     a motor; NaN for others. `torque` may be the array `acceleration`.
     """
     if self.unactuated.shape[0] != 3:
-        torque[:] = np.nan
+        for i in range(self.nu):
+            torque[i] = np.nan
         return
     model, work, columns, wanted = self.model, state.kinematics, self.columns, self.acceleration
     a, b, c = self.unactuated[0], self.unactuated[1], self.unactuated[2]
