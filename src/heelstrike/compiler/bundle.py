@@ -315,7 +315,7 @@ class Bundle:
     @classmethod
     def settable(cls: type[_Some]) -> type[_Some]:
         """Return a class of the same members whose numbers are cells, and so can be set."""
-        return _settable(cls)  # type: ignore[return-value, arg-type]
+        return _settable(cls)  # type: ignore[arg-type]
 
     def contents(self) -> dict[str, np.ndarray[Any, Any]]:
         """Copy what is its own in its storage, by name: read-only arrays are shared with others."""

@@ -27,12 +27,15 @@ word_at: Any = intrinsic(_word_at)
 
 
 def _copy_words(context: Any, source: Any, target: Any) -> Any:
+    del context
     signature = types.void(source, target)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         pairs = zip(signature.args, values, strict=True)
         found = [context.make_array(kind)(context, builder, value) for kind, value in pairs]
-        raw_memcpy(builder, found[1].data, found[0].data, found[0].nitems, found[0].itemsize)
+        raw_memcpy(  # type: ignore[no-untyped-call]
+            builder, found[1].data, found[0].data, found[0].nitems, found[0].itemsize
+        )
         return context.get_dummy_value()
 
     return signature, generate

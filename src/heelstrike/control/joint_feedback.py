@@ -15,7 +15,6 @@ from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
@@ -44,9 +43,8 @@ class Parameters(Bundle):
 
 @controller
 def joint_feedback(
-    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
-    parameters: Parameters, torque: Floats,
-) -> None:  # fmt: skip
+    t: float, state: ControlState, robot: ControlledRobot, parameters: Parameters, torque: Floats
+) -> None:
     """Joint torques of the law above."""
     begins, coefficients = parameters.begins, parameters.coefficients
     piece = 0

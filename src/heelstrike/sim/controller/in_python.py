@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,14 +15,14 @@ from heelstrike.errors import ControllerError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.control import ReadyLaw
-from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.interface import ARGUMENTS, Contacts
 from heelstrike.sim.controller.robot import ControlledRobot
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.law import Law
 
-SCRATCH = ("acceleration", "force", "composite")
-"""Fields of the state's kinematics that controllers may write to."""
+SCRATCH = ("kinematics.acceleration", "kinematics.force", "kinematics.composite")
+"""Of the state, what queries write to."""
 
 
 class AskedLaw:
@@ -45,19 +46,10 @@ class AskedLaw:
         ready = ReadyLaw(robot, law)
         control = ready.control
         self.name = law.function.name
-        self._model = robot.model
         self.numbers, self._control = ready, control
+        self._model = robot.model
         self._torque: NDArray[np.float64] = np.zeros(robot.nu)
-        self._call: Any
-        self._arguments: tuple[Any, ...]
-        if compiled:
-            self._call = law.function.finish()
-            self._arguments = (
-                control.state.address, control.contacts.address, control.robot.address,
-                control.parameters_at, control.kept_at, self._torque,
-            )  # fmt: skip
-            return
-        shown: dict[str, Any] = {
+        self._given: dict[str, Any] = {
             "state": control.state,
             "contacts": control.contacts,
             "robot": control.robot,
@@ -65,12 +57,17 @@ class AskedLaw:
             "memory": ready.memory,
             "torque": self._torque,
         }
-        self._call = law.function.python
-        if checked:
+        self._names: Iterable[str] = law.function.arguments
+        self._call: Any = law.function.python
+        if compiled:
+            self._names, self._call = ARGUMENTS, law.function.finish()
+            self._given = {
+                name: value.address if isinstance(value, Bundle) else value
+                for name, value in self._given.items()
+            }
+        elif checked:
             self._call = uncompiled(law.function.python)
-            shown = {name: self._shown(name, value) for name, value in shown.items()}
-        names = ["state", "contacts", "robot", *law.function.own, "torque"]
-        self._arguments = tuple(shown[name] for name in names)
+            self._given = {name: self._shown(name, value) for name, value in self._given.items()}
 
     def torque(self, t: float, state: State, contacts: Contacts | None) -> NDArray[np.float64]:
         """Return the joint torques (nu,), in N m.
@@ -89,8 +86,9 @@ class AskedLaw:
         if contacts is not None:
             for name, values in contacts.members().items():
                 getattr(self._control.contacts, name)[...] = values
+        given = self._given | {"t": np.float64(t)}
         with np.errstate(all="ignore"):
-            self._call(np.float64(t), *self._arguments)
+            self._call(*(given[name] for name in self._names))
         return self._torque.copy()
 
     def snapshot(self) -> NDArray[np.int64]:
@@ -124,11 +122,8 @@ class AskedLaw:
         copy.__dict__["_cells"] = value.__dict__["_cells"]
         return copy.stored(
             lambda part, array: _shown(
-                f"{name}.{part}",
-                array,
-                self.name,
-                writable=free or part in tuple(f"kinematics.{field}" for field in SCRATCH),
-            )  # fmt: skip
+                f"{name}.{part}", array, self.name, writable=free or part in SCRATCH
+            )
         )
 
 

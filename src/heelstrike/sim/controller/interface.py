@@ -11,6 +11,9 @@ from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
 
+ARGUMENTS = ("t", "state", "contacts", "robot", "parameters", "memory", "torque")
+"""What functions made controllers may take."""
+
 
 class Contacts(Bundle):
     """Contact points of a robot as a controller sees them.

@@ -21,16 +21,13 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.in_python import AskedLaw
-from heelstrike.sim.controller.interface import Contacts, Controller
+from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState, extents_of
 
 # Time, then where state, contacts, robot, parameters and memory are, and the torques: the same
 # for all, so that one compiled loop serves every controller.
 CONTROLLER_SIGNATURE = types.void(types.float64, *[types.int64] * 5, types.float64[::1])
 CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
-
-_SHOWN = ["t", "state", "contacts", "robot"]
-_OWN = ["parameters", "memory"]
 
 
 class ControllerFunction:
@@ -54,35 +51,34 @@ class ControllerFunction:
         self.function = function
         self.compiles = compiles
         self.is_ours = is_ours(self.python)
-        names = list(inspect.signature(self.python).parameters)
-        self.own = [name for name in _OWN if name in names]
-        if names != [*_SHOWN, *self.own, "torque"]:
+        self.arguments = list(inspect.signature(self.python).parameters)
+        strange = [name for name in self.arguments if name not in ARGUMENTS]
+        if strange or "torque" not in self.arguments:
             raise ControllerError(
-                f"controller {self.name!r} takes ({', '.join(names)}); it must take "
-                f"({', '.join([*_SHOWN, *_OWN, 'torque'])}), where parameters or memory may be left "
-                "out"
+                f"controller {self.name!r} takes ({', '.join(self.arguments)}); it can take "
+                f"{', '.join(ARGUMENTS)}, of which all but torque may be left out"
             )
         self.parameters = self._bundle("parameters", scope)
         self.memory = self._bundle("memory", scope)
 
     def _bundle(self, name: str, scope: Mapping[str, Any]) -> type[Bundle]:
         """Class of the parameters or of the memory, as the function is annotated."""
-        if name not in self.own:
+        if name not in self.arguments:
             return Bundle
 
         def annotated() -> None: ...
 
-        annotated.__annotations__ = {
-            name: inspect.signature(self.python).parameters[name].annotation
-        }
+        hint = inspect.signature(self.python).parameters[name].annotation
+        annotated.__annotations__ = {name: hint}
         try:
             found: Any = get_type_hints(annotated, self.python.__globals__, dict(scope))[name]
         except NameError as error:
             found = error
         if not (isinstance(found, type) and issubclass(found, Bundle)):
             raise ControllerError(
-                f"controller {self.name!r} must say what its {name} are: annotate the argument with "
-                f"a class of heelstrike.Bundle, such as {name}: {name.capitalize()}; got {found!r}"
+                f"controller {self.name!r} must say what its {name} are: annotate the argument "
+                f"with a class of heelstrike.Bundle, as in {name}: {name.capitalize()}; got "
+                f"{found!r}"
             )
         bundle: type[Bundle] = found
         return bundle
@@ -144,58 +140,23 @@ class ControllerFunction:
 
 def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., None]:
     """Return what loops call: it finds the bundles at their addresses and calls the function."""
-    state_at, contacts_at = bundle_at(ControlState), bundle_at(Contacts)
-    robot_at = bundle_at(ControlledRobot)
-    parameters_at = bundle_at(law.parameters.settable())
-    memory_at = bundle_at(law.memory.settable())
-
-    def both(
-        t: float,
-        state: int,
-        contacts: int,
-        robot: int,
-        parameters: int,
-        memory: int,
-        torque: Floats,
-    ) -> None:
-        function(
-            t, state_at(state), contacts_at(contacts), robot_at(robot), parameters_at(parameters),
-            memory_at(memory), torque,
-        )  # fmt: skip
-
-    def parameters_only(
-        t: float, state: int, contacts: int, robot: int, parameters: int, _: int, torque: Floats
-    ) -> None:
-        function(
-            t, state_at(state), contacts_at(contacts), robot_at(robot), parameters_at(parameters),
-            torque,
-        )  # fmt: skip
-
-    def memory_only(
-        t: float, state: int, contacts: int, robot: int, _: int, memory: int, torque: Floats
-    ) -> None:
-        function(
-            t, state_at(state), contacts_at(contacts), robot_at(robot), memory_at(memory), torque
-        )
-
-    def neither(
-        t: float, state: int, contacts: int, robot: int, _: int, __: int, torque: Floats
-    ) -> None:
-        function(t, state_at(state), contacts_at(contacts), robot_at(robot), torque)
-
-    call: Any = {
-        "parameters memory": both,
-        "parameters": parameters_only,
-        "memory": memory_only,
-        "": neither,
-    }[" ".join(law.own)]
-    # Machine code is kept beside the file of the function, and under its name.
-    source = law.python.__code__
-    call.__code__ = call.__code__.replace(
-        co_filename=source.co_filename, co_firstlineno=source.co_firstlineno
-    )
+    kinds: dict[str, Any] = {
+        "state": ControlState,
+        "contacts": Contacts,
+        "robot": ControlledRobot,
+        "parameters": law.parameters.settable(),
+        "memory": law.memory.settable(),
+    }
+    given = (f"{name}_at({name})" if name in kinds else name for name in law.arguments)
+    text = f"def call({', '.join(ARGUMENTS)}): function({', '.join(given)})"
+    scope = {f"{name}_at": bundle_at(kind) for name, kind in kinds.items()}
+    scope |= {"function": function, "__name__": law.python.__module__}
+    # Machine code is kept beside the file of the function, under its name.
+    place = law.python.__code__
+    exec(compile(text, place.co_filename, "exec"), scope)
+    call: Any = scope["call"]
+    call.__code__ = call.__code__.replace(co_firstlineno=place.co_firstlineno)
     call.__name__, call.__qualname__ = law.python.__name__, law.python.__qualname__
-    call.__module__ = law.python.__module__
     called: Callable[..., None] = call
     return called
 
@@ -211,10 +172,10 @@ def controller(*, compile: bool = True) -> Callable[[Callable[..., None]], Contr
 def controller(function: Callable[..., None] | None = None, /, *, compile: bool = True) -> Any:
     """Make a function a control law that runs inside the compiled loop.
 
-    The function takes ``(t, state, contacts, robot, parameters, memory, torque)`` and writes the
-    joint torques (nu,), in N m, into `torque`. `parameters` and `memory` are bundles of its own,
-    which their annotations name; either may be left out of the signature. What the function makes
-    when it is called with parameters is a controller for :func:`heelstrike.simulate`.
+    The function takes ``(t, state, contacts, robot, parameters, memory, torque)``, or those of them
+    that it needs, and writes the joint torques (nu,), in N m, into `torque`. `parameters` and
+    `memory` are bundles of its own, which their annotations name. What the function makes when it
+    is called with parameters is a controller for :func:`heelstrike.simulate`.
 
     Its own indices are checked, those of the functions it calls are not: an index beyond an array
     raises IndexError, which like any exception ends the run; ``simulate(..., checked=True)`` names
@@ -244,7 +205,7 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
     ...     kp: np.ndarray = hs.array("nu")
     ...     kd: np.ndarray = hs.array("nu")
     >>> @hs.controller(compile=False)
-    ... def stand(t, state, contacts, robot, parameters: Gains, torque):
+    ... def stand(state, robot, parameters: Gains, torque):
     ...     robot.gravity_force(state, torque)
     ...     torque -= parameters.kp * state.joint_position + parameters.kd * state.joint_velocity
     >>> robot = hs.load_robot("bravo7")
@@ -297,9 +258,9 @@ class Law:
     ) -> None:
         parameters = Bundle() if parameters is None else parameters
         if not isinstance(parameters, function.parameters):
-            wanted = function.parameters.__name__ if "parameters" in function.own else "nothing"
+            wanted = "none" if function.parameters is Bundle else function.parameters.__name__
             raise ControllerError(
-                f"controller {function.name!r} takes {wanted} for parameters, got "
+                f"controller {function.name!r} takes {wanted} as parameters, got "
                 f"{type(parameters).__name__}"
             )
         self.function = function
@@ -357,15 +318,19 @@ class Law:
             self._asked = AskedLaw(self.robot, self, compiled=self.function.compiles)
         return self._asked.torque(t, state, contacts)
 
+    @property
+    def remembered(self) -> Any:
+        """Memory of the calls of :meth:`torque`; None before the first."""
+        return None if self._asked is None else self._asked.numbers.memory
+
     def __getstate__(self) -> dict[str, Any]:
         """Leave what holds places in this process."""
         return self.__dict__ | {"_asked": None}
 
 
 @controller
-def no_torque(  # noqa: D103
-    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot, torque: Floats
-) -> None:
+def no_torque(torque: Floats) -> None:
+    """Apply no torque."""
     for i in range(torque.shape[0]):
         torque[i] = 0.0
 
@@ -394,7 +359,7 @@ def law_of(controller: Controller | None, *, begin: bool = False) -> Law | None:
     if isinstance(controller, ControllerFunction):
         raise ControllerError(
             f"controller {controller.name!r} has no parameters yet: call it with them, as in "
-            f"{controller.name}({'...' if 'parameters' in controller.own else ''})"
+            f"{controller.name}({'...' if 'parameters' in controller.arguments else ''})"
         )
     if not callable(getattr(controller, "torque", None)):
         raise ControllerError(

@@ -7,10 +7,10 @@ what springs and dampers give, then fixes what the ground exerts, J_uᵀ F = f_u
 as matrices.
 
 A flat foot is held in its three coordinates. On a point foot the ground exerts no moment: two of
-the three unactuated accelerations follow from the contact. The third goes along the direction n with
-J_u n = 0, the trunk's turning about the foot; the motors do not reach it, nᵀ(A v̇ + H)_u = 0, so it
-follows from the accelerations of the joints (partial feedback linearisation: M. W. Spong, *Partial
-feedback linearization of underactuated mechanical systems*, 1994).
+the three unactuated accelerations follow from the contact. The third goes along the direction n
+with J_u n = 0, the trunk's turning about the foot; the motors do not reach it, nᵀ(A v̇ + H)_u = 0,
+so it follows from the accelerations of the joints (partial feedback linearisation: M. W. Spong,
+*Partial feedback linearization of underactuated mechanical systems*, 1994).
 """
 
 from __future__ import annotations
