@@ -11,7 +11,8 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.control import ControllerFunction, Law
+from heelstrike.control import ControllerFunction as Function
+from heelstrike.control import Law
 from heelstrike.sim import Compliant, EventDriven, RunStatus, TimeStepping
 from heelstrike.sim.method import Method
 
@@ -80,13 +81,13 @@ def misbehave(  # type: ignore[no-untyped-def]
 
 
 @pytest.fixture(scope="module")
-def careless() -> ControllerFunction:
+def careless() -> Function:
     """The controller as somebody compiles it who leaves Numba's defaults as they are."""
     return hs.controller(numba.njit(misbehave))
 
 
 @pytest.fixture(scope="module")
-def careful() -> ControllerFunction:
+def careful() -> Function:
     return hs.controller(misbehave)
 
 
@@ -101,7 +102,7 @@ def run(controller: Any, method: Method, **options: Any) -> hs.Run:
     )
 
 
-def faulty(function: ControllerFunction, fault: int) -> Law:
+def faulty(function: Function, fault: int) -> Law:
     return function(Fault(which=np.array([float(fault)])))
 
 
@@ -127,7 +128,7 @@ def check(found: hs.Run, *words: str, until: float = 0.1) -> None:
     ],
 )
 def test_what_is_written_next_to_an_array_ends_the_run_at_once(
-    careless: ControllerFunction, fault: int, place: str, method: Method
+    careless: Function, fault: int, place: str, method: Method
 ) -> None:
     found = run(faulty(careless, fault), method)
     check(
@@ -137,33 +138,27 @@ def test_what_is_written_next_to_an_array_ends_the_run_at_once(
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 def test_what_is_written_farther_off_is_seen_when_the_loop_comes_back(
-    careless: ControllerFunction, method: Method
+    careless: Function, method: Method
 ) -> None:
     check(run(faulty(careless, WRITE_FAR), method), "torque[46] of shape (6,)")
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_what_is_read_beyond_an_array_is_no_number(
-    careless: ControllerFunction, method: Method
-) -> None:
+def test_what_is_read_beyond_an_array_is_no_number(careless: Function, method: Method) -> None:
     found = run(faulty(careless, READ_MEMORY), method)
     actuator = walking.bravo7().actuator_names[2]
     check(found, "not finite", repr(actuator), until=AFTER + 2e-3)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_what_compiled_code_raises_ends_the_run(
-    careful: ControllerFunction, method: Method
-) -> None:
+def test_what_compiled_code_raises_ends_the_run(careful: Function, method: Method) -> None:
     found = run(faulty(careful, RAISE), method)
     check(found, "controller 'misbehave' raised ValueError: battery empty", until=AFTER + 2e-3)
     assert isinstance(found.error, ValueError)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_a_changed_robot_is_noticed_and_put_right(
-    careful: ControllerFunction, method: Method
-) -> None:
+def test_a_changed_robot_is_noticed_and_put_right(careful: Function, method: Method) -> None:
     mass = walking.bravo7().model.mass.copy()
     found = run(faulty(careful, CHANGE_ROBOT), method)
     check(found, "changed the robot: model.mass[3] from")
@@ -173,9 +168,7 @@ def test_a_changed_robot_is_noticed_and_put_right(
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("fault", [CHANGE_STATE, CHANGE_CONTACTS])
-def test_state_and_contacts_are_copies(
-    careful: ControllerFunction, fault: int, method: Method
-) -> None:
+def test_state_and_contacts_are_copies(careful: Function, fault: int, method: Method) -> None:
     well, changed = (run(faulty(careful, each), method) for each in (WELL, fault))
     assert changed.completed, changed.message
     np.testing.assert_array_equal(changed.position, well.position)
@@ -185,7 +178,7 @@ def test_state_and_contacts_are_copies(
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("fault", [WRITE_TORQUE, WRITE_FAR, READ_MEMORY])
 def test_indices_are_checked_unless_one_opts_out(
-    careful: ControllerFunction, fault: int, method: Method
+    careful: Function, fault: int, method: Method
 ) -> None:
     found = run(faulty(careful, fault), method)
     check(found, "IndexError", "checked=True", until=AFTER + 2e-3)
@@ -209,14 +202,14 @@ def test_indices_are_checked_unless_one_opts_out(
     ],
 )
 def test_the_checked_mode_names_controller_array_and_index(
-    careless: ControllerFunction, fault: int, words: str, method: Method
+    careless: Function, fault: int, words: str, method: Method
 ) -> None:
     found = run(faulty(careless, fault), method, checked=True)
     check(found, words, "t = 0.02", until=AFTER + 2e-3)
     assert "'misbehave'" in found.message or fault == RAISE
 
 
-def test_the_checked_mode_computes_the_same(careless: ControllerFunction) -> None:
+def test_the_checked_mode_computes_the_same(careless: Function) -> None:
     """Compiled and in Python: the same law, called at the same instants."""
     plain = run(faulty(careless, WELL), TimeStepping())
     checked = run(faulty(careless, WELL), TimeStepping(), checked=True)
@@ -289,7 +282,7 @@ def test_python_changes_neither_contacts_nor_robot(method: Method) -> None:
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("plain", [False, True])
 def test_progress_that_raises_ends_the_run_with_its_data(
-    careful: ControllerFunction, plain: bool, method: Method
+    careful: Function, plain: bool, method: Method
 ) -> None:
     error = OSError("the terminal is gone")
 
@@ -312,7 +305,7 @@ def test_progress_that_raises_ends_the_run_with_its_data(
     assert 0.0 < found.time[-1] < 300.0
 
 
-def test_a_finished_run_is_finished_though_progress_raises(careful: ControllerFunction) -> None:
+def test_a_finished_run_is_finished_though_progress_raises(careful: Function) -> None:
     def progress(time: float) -> None:
         if time >= 0.1:
             raise OSError("the terminal is gone")
@@ -324,7 +317,7 @@ def test_a_finished_run_is_finished_though_progress_raises(careful: ControllerFu
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 def test_looking_up_more_often_changes_no_digit(
-    careful: ControllerFunction, method: Method, monkeypatch: pytest.MonkeyPatch
+    careful: Function, method: Method, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def walk() -> hs.Run:
         return run(hs.ComputedTorque(walking.bravo7(), walking.gait()), method)

@@ -64,17 +64,21 @@ def in_one_block(bundle: _Some) -> tuple[_Some, Integers, Integers]:
     between = [np.concatenate((end - ZONE + near, end - 1 - near)) for end in ends[:-1]]
     return (
         bundle.stored(lambda _, array: _inside(words, next(begins), array)),
-        words[ZONE:-ZONE],
+        _words(words, ZONE, (words.size - 2 * ZONE,), words.dtype),
         np.array(between, dtype=np.int64).ravel(),
     )
 
 
 def _inside(words: Integers, place: int, array: NDArray[Any]) -> NDArray[Any]:
     """Copy an array to a place among words."""
-    # A slice of no words would lie at the beginning.
-    inside: NDArray[Any] = np.ndarray(array.shape, array.dtype, words, place * words.itemsize)
+    inside = _words(words, place, array.shape, array.dtype)
     inside[...] = array
     return inside
+
+
+def _words(words: Integers, place: int, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """Return some of the words; a slice of none would lie at the beginning."""
+    return np.ndarray(shape, dtype, words, place * words.itemsize)
 
 
 def trespasses(name: str, array: NDArray[Any]) -> Iterator[str]:
