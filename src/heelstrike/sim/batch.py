@@ -275,6 +275,8 @@ def simulate_batch(
         rows = sum(method.rows_in(duration, record_every) for duration in durations)
         check_runs(entries["robot"][0], rows, count, record_every)
     _, compile_s = compiled_loop(method.kernels, method.work)
+    for law in chosen:
+        law.function.finish()
     crew = _Crew(settings, durations, method, chosen, recorded=record_every is not None)
     with _shown(progress, count) as show:
         crew.work(min(workers, count), show)
@@ -392,15 +394,14 @@ def _check_robots(robots: Sequence[Any]) -> None:
 
 
 def _law(controller: Any) -> Law:
-    """Return the law that a controller is, compiled."""
-    law = law_of(controller)
+    """Return the law that a controller is, which must be one that can be compiled."""
+    law = law_of(controller, begin=True)
     if law is None or not law.function.compiles:
         raise ControllerError(
             f"{type(controller).__name__} runs in Python, so a batch of it would run one at a "
             "time. Write it as a function and compile that with heelstrike.controller, or call "
             "simulate for each run"
         )
-    law.function.finish()
     return law
 
 

@@ -18,7 +18,7 @@ from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.controller.control import ReadyLaw, set_members
+from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, law_of, no_torque
@@ -250,13 +250,7 @@ class Simulation:
 
     @parameters.setter
     def parameters(self, parameters: Bundle) -> None:
-        mine = self._numbers.parameters
-        try:
-            set_members(mine, parameters)
-        except (AttributeError, ValueError) as error:
-            raise ControllerError(
-                f"{self._name}: these are no parameters of it: {error}"
-            ) from error
+        self._numbers.set_parameters(parameters)
 
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.

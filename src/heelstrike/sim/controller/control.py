@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.guard import guarded_bundle, in_one_block
@@ -96,6 +97,7 @@ class ReadyLaw:
         self, robot: Robot, law: Law, tree: Workspace | None = None,
         contacts: Contacts | None = None,
     ) -> None:  # fmt: skip
+        self._robot, self._law = robot, law
         extents = extents_of(robot)
         numbers, memory = law.numbers(robot)
         self.parameters, parameters, between_parameters = in_one_block(numbers)
@@ -119,21 +121,26 @@ class ReadyLaw:
             spare_at=self._spare.address, conduct=WATCHED if self._shown else TRUSTED, **shown,
         )  # fmt: skip
 
+    def set_parameters(self, parameters: Bundle) -> None:
+        """Put other parameters in the place of its own.
+
+        Raises
+        ------
+        ControllerError
+            If they are not such as its own.
+        """
+        numbers, _ = self._law.with_parameters(parameters).numbers(self._robot)
+        try:
+            self.parameters.become(numbers)
+        except ValueError as error:
+            raise ControllerError(
+                f"controller {self._law.function.name!r} can only be given parameters of the same "
+                f"shapes: {error}"
+            ) from error
+
     def arrays(self) -> Iterator[tuple[str, Any]]:
         """Name the arrays with guard words round them."""
         bundles = {"parameters": self.parameters, "memory": self.memory, **self._shown}
         for name, bundle in bundles.items():
             yield from bundle.storage(f"{name}.")
         yield from self._spare.storage("memory.")
-
-
-def set_members(bundle: Bundle, values: Bundle) -> None:
-    """Put the numbers of a bundle in the place of those of another that can be set."""
-    for name, member in bundle.declared.items():
-        value = getattr(values, name)
-        if member.role == "part":
-            set_members(getattr(bundle, name), value)
-        elif member.role == "array":
-            getattr(bundle, name)[...] = value
-        else:
-            setattr(bundle, name, value)

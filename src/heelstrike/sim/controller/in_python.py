@@ -92,12 +92,14 @@ class AskedLaw:
         return self._torque.copy()
 
     def snapshot(self) -> NDArray[np.int64]:
-        """Return its memory."""
-        return self._control.kept.copy()
+        """Return its parameters and its memory."""
+        return np.concatenate((self._control.parameters, self._control.kept))
 
     def restore(self, numbers: NDArray[np.int64]) -> None:
-        """Take up a memory."""
-        self._control.kept[:] = numbers
+        """Take up what :meth:`snapshot` returned."""
+        place = self._control.parameters.size
+        self._control.parameters[:] = numbers[:place]
+        self._control.kept[:] = numbers[place:]
 
     def _shown(self, name: str, value: Any) -> Any:
         """Return the same array, or a bundle of the same arrays, each knowing what it is."""
