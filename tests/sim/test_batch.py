@@ -301,7 +301,7 @@ def test_progress_counts_and_a_pipe_stays_quiet(capfd: pytest.CaptureFixture[str
         ({"state": hs.State(np.zeros((2, 8)), np.zeros((2, 9)))}, "run 0: state.q must have 9"),
         ({"state": 3.0}, "State"),
         ({"parameters": np.zeros((2, 2, 2))}, "parameters"),
-        ({"parameters": {"kp": np.zeros((2, 3))}}, r"kp has shape \(3,\)"),
+        ({"parameters": {"kp": np.zeros((2, 3))}}, "k[pd] has shape"),
         ({"parameters": {"gain": np.zeros(2)}}, "has no gain"),
         ({"parameters": {"kp": np.zeros((2, 6)), "kd": np.zeros((3, 6))}}, "one entry a run"),
         ({"parameters": {"latest": [1.0, np.nan]}}, "latest must be finite"),

@@ -14,6 +14,9 @@ import walking
 
 import heelstrike as hs
 from heelstrike import dynamics
+from heelstrike.compiler.compilation import made_of
+from heelstrike.control.computed_torque import computed_torque
+from heelstrike.sim.controller import stance
 from heelstrike.sim.method import Method
 
 METHODS = [hs.TimeStepping(), hs.EventDriven(rtol=1e-6), hs.Compliant()]
@@ -121,6 +124,17 @@ def test_a_law_is_copied_by_pickle(outside: Any) -> None:
     law = pickle.loads(pickle.dumps(outside.stand(gains(outside))))
     assert law.function is outside.stand
     assert law.parameters.lean == 0.05
+
+
+def test_machine_code_is_good_for_the_queries_it_was_made_with(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    called = computed_torque._separate._function
+    before = made_of(called)
+    assert made_of(called) == before
+    other = stance.point_foot_torque.py_func.__code__  # type: ignore[attr-defined]
+    monkeypatch.setattr(stance.flat_foot_torque.py_func, "__code__", other)  # type: ignore[attr-defined]
+    assert made_of(called) != before
 
 
 class Answers(hs.Bundle):
