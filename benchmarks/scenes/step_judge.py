@@ -82,8 +82,8 @@ class _Steps:
         if self.scheme is Scheme.LINEARLY_IMPLICIT:
             stiffness, damping = model.stiffness.copy(), model.damping.copy()
             if controller is not None:
-                stiffness[model.actuator_joint] += controller.kp
-                damping[model.actuator_joint] += controller.kd
+                stiffness[model.actuator_joint] += controller.parameters.kp
+                damping[model.actuator_joint] += controller.parameters.kd
             matrix = matrix + np.diag(self.h * damping + self.h**2 * stiffness)
             known = known - self.h * stiffness * self.before
         self.metric = Metric(matrix)

@@ -33,6 +33,10 @@ if _plain_code.is_asked_for():  # before anything else is imported
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.compiler.bundle import Bundle as Bundle
+    from heelstrike.compiler.bundle import array as array
+    from heelstrike.compiler.bundle import cell as cell
+    from heelstrike.compiler.bundle import number as number
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
@@ -42,6 +46,7 @@ if TYPE_CHECKING:
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import ComputedTorque as ComputedTorque
     from heelstrike.control import Encoder as Encoder
+    from heelstrike.control import controller as controller
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -87,6 +92,7 @@ __version__ = "0.1.0"
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
     "Batch": "heelstrike.sim",
+    "Bundle": "heelstrike.compiler.bundle",
     "Compliant": "heelstrike.sim",
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
@@ -118,11 +124,14 @@ _HOME = {
     "TimeStepping": "heelstrike.sim",
     "ViewError": "heelstrike.errors",
     "WriteError": "heelstrike.errors",
+    "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
+    "cell": "heelstrike.compiler.bundle",
     "compare": "heelstrike.experiments.comparison",
     "contact_forward_dynamics": "heelstrike.contact",
     "contact_inverse_dynamics": "heelstrike.contact",
     "contact_kinematics": "heelstrike.contact",
+    "controller": "heelstrike.control",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "human": "heelstrike.robot",
     "inspect_robot": "heelstrike.robot",
@@ -130,6 +139,7 @@ _HOME = {
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
+    "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",

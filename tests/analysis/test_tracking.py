@@ -12,7 +12,6 @@ from synthetic_runs import make_run, pendulum
 import heelstrike as hs
 from heelstrike.analysis import reference_motion, tracking_error
 from heelstrike.analysis.tracking import EARLIEST, LATEST
-from heelstrike.control import computed_torque
 
 
 class Watched:
@@ -25,8 +24,8 @@ class Watched:
 
     def torque(self, t: float, state: hs.State, contacts: object) -> np.ndarray:
         torque = self.inner.torque(t, state, contacts)  # type: ignore[arg-type]
-        self.stance.append(int(self.inner._memory[computed_torque.STANCE]))
-        self.start.append(float(self.inner._memory[computed_torque.START]))
+        self.stance.append(self.inner.remembered.stance)
+        self.start.append(self.inner.remembered.start)
         return torque
 
 
@@ -83,9 +82,9 @@ def test_reference_of_a_late_step_goes_on_and_then_rests() -> None:
 
 def test_constants_are_those_of_the_controller() -> None:
     gait = walking.gait()
-    parameters = hs.ComputedTorque(walking.bravo7(), gait).compiled().parameters
-    assert parameters[computed_torque.EARLIEST] == EARLIEST * gait.step_duration
-    assert parameters[computed_torque.LATEST] == pytest.approx(LATEST * gait.step_duration)
+    parameters = hs.ComputedTorque(walking.bravo7(), gait).parameters
+    assert parameters.earliest == EARLIEST * gait.step_duration
+    assert parameters.latest == pytest.approx(LATEST * gait.step_duration)
 
 
 def test_error_is_measured_minus_reference() -> None:

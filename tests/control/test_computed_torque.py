@@ -17,8 +17,10 @@ from robot_cases import builtin_xml
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.control import Encoder
+from heelstrike.control import computed_torque as law
 from heelstrike.robot import read_mjcf
 from heelstrike.sim import Contacts
+from heelstrike.sim.controller.robot import extents_of
 
 
 def nothing_touches() -> Contacts:
@@ -256,26 +258,21 @@ def test_what_encoders_tell_the_law() -> None:
 
 def test_readings_are_rounded_and_due_once_a_period() -> None:
     from heelstrike.compiler.compilation import uncompiled
-    from heelstrike.control import computed_torque as law
 
     read = uncompiled(law.read_encoders)
-    robot = walking.bravo7()
-    nu = robot.nu
-    parameters, memory, samples = (
-        np.zeros(law.HEADER),
-        np.zeros(law.MEMORY_HEADER),
-        np.zeros(4 * nu),
-    )
-    parameters[law.ENCODER_PERIOD], parameters[law.ENCODER_RESOLUTION] = 0.01, 0.25
-    q = np.zeros(robot.nv)
+    parameters = hs.ComputedTorque(
+        walking.bravo7(), walking.gait(), encoder=Encoder(period=0.01, resolution=0.25)
+    ).parameters
+    memory = law.Memory.allocate(nu=6)
+    state = law.ControlState.allocate(**extents_of(walking.bravo7()))
     for k, t in enumerate([0.0, 0.005, 0.01, 0.02, 0.03, 0.04]):
-        q[robot.model.actuator_joint] = 0.3 * k + np.arange(nu)
-        read(t, q, robot.model, parameters, memory, samples)
-        assert memory[law.SAMPLED] == (0.0 if t == 0.005 else t)
-        assert memory[law.SAMPLES] == [1, 1, 2, 3, 4, 4][k]
+        state.joint_position[:] = 0.3 * k + np.arange(6)
+        read(t, state, parameters, memory)
+        assert memory.sampled == (0.0 if t == 0.005 else t)
+        assert memory.samples == [1, 1, 2, 3, 4, 4][k]
     # 1.5, 1.2, 0.9 and 0.6, to quarters; the joints differ by whole numbers.
-    expected = np.array([1.5, 1.25, 1.0, 0.5])[:, None] + np.arange(nu)
-    np.testing.assert_allclose(samples.reshape(4, nu), expected, atol=1e-12)
+    expected = np.array([1.5, 1.25, 1.0, 0.5])[:, None] + np.arange(6)
+    np.testing.assert_allclose(memory.readings, expected, atol=1e-12)
 
 
 def test_a_light_touch_is_a_touchdown() -> None:
@@ -284,10 +281,9 @@ def test_a_light_touch_is_a_touchdown() -> None:
     touching = nothing_touches()
     touching.force[robot.feet[1 - gait.stance_foot].contacts[1], 0] = 1e-3
     controller.torque(0.6, gait.initial_state, touching)
-    from heelstrike.control import computed_torque as law
-
-    assert controller._memory[law.STANCE] == 1 - gait.stance_foot
-    assert controller._memory[law.START] == 0.6
+    memory = controller.remembered
+    assert memory.stance == 1 - gait.stance_foot
+    assert memory.start == 0.6
 
 
 def test_a_joint_without_a_motor_is_named() -> None:
@@ -298,12 +294,11 @@ def test_a_joint_without_a_motor_is_named() -> None:
 
 def test_the_estimate_is_exact_for_cubics() -> None:
     from heelstrike.compiler.compilation import uncompiled
-    from heelstrike.control.computed_torque import estimated_velocity
 
     period, t = 0.01, 0.3
     instants = t - period * np.arange(4)
     samples = (2.0 - instants + 3.0 * instants**2 - 4.0 * instants**3)[:, None]
-    slope = uncompiled(estimated_velocity)(samples, 4, period, 0)
+    slope = uncompiled(law.estimated_velocity)(samples, 4, period, 0)
     assert slope == pytest.approx(-1.0 + 6.0 * t - 12.0 * t**2, rel=1e-10)
 
 

@@ -17,10 +17,8 @@ from scipy.optimize import brentq, linprog
 import heelstrike as hs
 from heelstrike.analysis.energy import energy_balance
 from heelstrike.dynamics import bias_force, contact_positions, point_jacobian
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import read_mjcf
-from heelstrike.robot.model import Model
-from heelstrike.sim import CompiledController, Contacts, Event, EventKind, Scheme, controller_kernel
+from heelstrike.sim import Event, EventKind, Scheme
 
 Floats = NDArray[np.float64]
 
@@ -53,7 +51,7 @@ def slide(
     speed: float,
     duration: float,
     method: object,
-    controller: CompiledController | None = None,
+    controller: hs.control.Law | None = None,
 ) -> hs.Run:
     run = hs.simulate(
         robot,
@@ -145,19 +143,8 @@ def test_a_pendulum_is_held_up_to_the_breakaway_torque(method: object) -> None:
     assert angle - rest > 0.01
 
 
-@controller_kernel
-def growing(
-    t: float,
-    q: Floats,
-    v: Floats,
-    contacts: Contacts,
-    model: Model,
-    tree: Workspace,
-    scratch: Workspace,
-    parameters: Floats,
-    memory: Floats,
-    torque: Floats,
-) -> None:
+@hs.controller
+def growing(t: float, torque: Floats) -> None:
     """Push with a force that grows by 1 N/s."""
     torque[0] = t
 
@@ -165,7 +152,7 @@ def growing(
 @pytest.mark.parametrize("method", METHODS[:2], ids=lambda method: type(method).__name__)
 def test_a_growing_force_breaks_it_away(method: object) -> None:
     """At t = F; from then on x = (t − F)³ / 6 m."""
-    controller = CompiledController(growing, np.zeros(0), np.zeros(0))
+    controller = growing()
     run = slide(sled(friction=0.5), 0.0, 0.0, 1.0, method, controller)
     ((kind, time),) = joint_events(run)
     assert kind is EventKind.JOINT_SLIP

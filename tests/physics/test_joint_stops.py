@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 
 import heelstrike as hs
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import read_mjcf
-from heelstrike.robot.model import Model
-from heelstrike.sim import CompiledController, Contacts, Event, EventKind, controller_kernel
+from heelstrike.sim import Event, EventKind
 
 Floats = NDArray[np.float64]
 
@@ -110,19 +108,8 @@ def test_time_stepping_converges_to_the_stop_at_first_order() -> None:
     assert np.polyfit(np.log(step), np.log(errors), 1)[0] >= 0.9, errors
 
 
-@controller_kernel
-def growing(
-    t: float,
-    q: Floats,
-    v: Floats,
-    contacts: Contacts,
-    model: Model,
-    tree: Workspace,
-    scratch: Workspace,
-    parameters: Floats,
-    memory: Floats,
-    torque: Floats,
-) -> None:
+@hs.controller
+def growing(t: float, torque: Floats) -> None:
     """Exert a force that grows by 1 N/s from -1 N."""
     torque[0] = t - 1.0
 
@@ -138,7 +125,7 @@ def test_a_stop_lets_go_when_its_force_vanishes() -> None:
     )
     run = hs.simulate(
         robot,
-        CompiledController(growing, np.zeros(0), np.zeros(0)),
+        growing(),
         state=hs.State(np.zeros(1), np.zeros(1)),
         duration=2.0,
         method=TIGHT,

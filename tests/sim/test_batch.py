@@ -12,8 +12,9 @@ import pytest
 import walking
 
 import heelstrike as hs
+from heelstrike.control import ControlState
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim import CompiledController, Contacts, RunStatus, controller_kernel
+from heelstrike.sim import Contacts, RunStatus
 from heelstrike.sim.batch import Batch
 from heelstrike.sim.method import Method
 from heelstrike.sim.setting import Setting
@@ -126,24 +127,22 @@ def test_one_entry_serves_all_runs() -> None:
         np.testing.assert_array_equal(position, run.position[-1])
 
 
-@controller_kernel
-def spring(
-    t: float,
-    q: Floats,
-    v: Floats,
-    contacts: Contacts,
-    model: Model,
-    tree: Any,
-    scratch: Any,
-    parameters: Floats,
-    memory: Floats,
-    torque: Floats,
-) -> None:
+class Gains(hs.Bundle):
+    kp: float = hs.number(float)
+    kd: float = hs.number(float)
+
+
+class Calls(hs.Bundle):
+    number: int = hs.cell(int)
+
+
+@hs.controller
+def spring(state: ControlState, parameters: Gains, memory: Calls, torque: Floats) -> None:
     """A user's own controller: springs and dampers on the joints, which it counts the calls of."""
-    memory[0] += 1.0
+    memory.number += 1
     for i in range(torque.shape[0]):
-        joint = model.actuator_joint[i]
-        torque[i] = -parameters[0] * q[joint] - parameters[1] * v[joint]
+        torque[i] = -parameters.kp * state.joint_position[i]
+        torque[i] -= parameters.kd * state.joint_velocity[i]
 
 
 class PlainSpring:
@@ -156,13 +155,16 @@ class PlainSpring:
 def test_a_users_compiled_controller_joins_the_loop_and_its_numbers_vary() -> None:
     robot = walking.bravo7()
     start = robot.reference_state()
-    gains = np.array([[300.0, 10.0], [200.0, 5.0], [100.0, 1.0]])
-    own = CompiledController(spring, gains[0], np.zeros(1))
-    batch = hs.simulate_batch(robot, own, state=start, duration=0.5, parameters=gains)
-    for row, position in zip(gains, batch.position, strict=True):
-        alone = hs.simulate(
-            robot, dataclasses.replace(own, parameters=row), state=start, duration=0.5
-        )
+    gains = [Gains(kp=300.0, kd=10.0), Gains(kp=200.0, kd=5.0), Gains(kp=100.0, kd=1.0)]
+    own = spring(gains[0])
+    named = {"kp": [300.0, 200.0, 100.0], "kd": [10.0, 5.0, 1.0]}
+    batch, same = (
+        hs.simulate_batch(robot, own, state=start, duration=0.5, parameters=parameters)
+        for parameters in (gains, named)
+    )
+    np.testing.assert_array_equal(same.position, batch.position)
+    for each, position in zip(gains, batch.position, strict=True):
+        alone = hs.simulate(robot, spring(each), state=start, duration=0.5)
         np.testing.assert_array_equal(position, alone.position[-1])
     python = hs.simulate(robot, PlainSpring(), state=start, duration=0.5)
     np.testing.assert_allclose(batch.position[0], python.position[-1], atol=1e-12)
@@ -247,32 +249,26 @@ def test_progress_that_raises_when_all_is_done_is_only_told() -> None:
     assert batch.completed.all()
 
 
-@controller_kernel
-def failing(
-    t: float,
-    q: Floats,
-    v: Floats,
-    contacts: Contacts,
-    model: Model,
-    tree: Any,
-    scratch: Any,
-    parameters: Floats,
-    memory: Floats,
-    torque: Floats,
-) -> None:
+class Fault(hs.Bundle):
+    place: int = hs.number(int)
+    time: float = hs.number(float)
+
+
+@hs.controller
+def failing(t: float, parameters: Fault, torque: Floats) -> None:
     """A controller of which some raise, and some write beyond their arrays."""
-    if t >= parameters[1]:
-        torque[int(parameters[0])] = 1.0
+    if t >= parameters.time:
+        torque[parameters.place] = 1.0
 
 
 def test_a_controller_that_fails_ends_its_own_run_only() -> None:
-    numbers = np.array([[0.0, 0.05], [7.0, 0.05], [0.0, 0.05], [7.0, 0.02]])
+    faults = {"place": [0, 7, 0, 7], "time": [0.05, 0.05, 0.05, 0.02]}
     batch = hs.simulate_batch(
         walking.bravo7(),
-        CompiledController(failing, numbers[0], np.zeros(0)),
+        failing(Fault(place=0, time=0.0)),
         state=walking.gait().initial_state,
         duration=0.1,
-        parameters=numbers,
+        parameters=faults,
         threads=1,
     )
     failed = RunStatus.CONTROLLER_FAILED
@@ -305,7 +301,10 @@ def test_progress_counts_and_a_pipe_stays_quiet(capfd: pytest.CaptureFixture[str
         ({"state": hs.State(np.zeros((2, 8)), np.zeros((2, 9)))}, "run 0: state.q must have 9"),
         ({"state": 3.0}, "State"),
         ({"parameters": np.zeros((2, 2, 2))}, "parameters"),
-        ({"parameters": np.zeros((2, 3))}, "parameters, but there are 3"),
+        ({"parameters": {"kp": np.zeros((2, 3))}}, "k[pd] has shape"),
+        ({"parameters": {"gain": np.zeros(2)}}, "has no gain"),
+        ({"parameters": {"kp": np.zeros((2, 6)), "kd": np.zeros((3, 6))}}, "one entry a run"),
+        ({"parameters": {"latest": [1.0, np.nan]}}, "latest must be finite"),
         ({"pushes": [hs.Push(0, force=(1, 0), start=0, duration=1), []]}, "mixes"),
         ({"pushes": 3.0}, "Push"),
         ({"record_every": 0}, "record_every"),
@@ -335,7 +334,7 @@ def test_robots_must_be_built_alike() -> None:
 
 
 def test_python_controllers_are_sent_to_simulate() -> None:
-    with pytest.raises(hs.ControllerError, match="controller_kernel"):
+    with pytest.raises(hs.ControllerError, match="a function"):
         hs.simulate_batch(
             walking.bravo7(), PlainSpring(), state=walking.gait().initial_state, duration=0.1
         )

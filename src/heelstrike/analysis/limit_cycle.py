@@ -18,7 +18,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller.interface import CompiledController, Controller
+from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ class LimitCycle:
 def find_limit_cycle(
     robot: Robot,
     state: State,
-    controller: Controller | CompiledController | None = None,
+    controller: Controller | None = None,
     *,
     ground: Ground | None = None,
     method: EventDriven | None = None,

@@ -22,7 +22,7 @@ from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.controller.interface import CompiledController, Controller
+from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate
@@ -187,7 +187,7 @@ class PoincareMap:
     def __init__(
         self,
         section: Section,
-        controller: Controller | CompiledController | None,
+        controller: Controller | None,
         method: EventDriven,
         landing: Sequence[int] | None,
         symmetry: Callable[[State], State] | None,

@@ -7,13 +7,14 @@ compiled code as in Python.
 
 What a bundle holds is declared once, where its class is written: shapes by the names of their
 extents, from which follow its allocation, its compiled type, its checks and its contents by name.
+Kernels written into the class are its methods, in compiled code as in Python.
 """
 
 from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, ClassVar, TypeVar
@@ -23,10 +24,12 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.datamodel import models
-from numba.core.typing.templates import AttributeTemplate
+from numba.core.typing.templates import AbstractTemplate, AttributeTemplate
 from numba.extending import (
     NativeValue,
     infer_getattr,
+    intrinsic,
+    lower_builtin,
     lower_getattr_generic,
     lower_setattr_generic,
     register_model,
@@ -55,7 +58,7 @@ class Member:
     shape : tuple of str and int
         Extents of an array: ``"nv"``, ``"2 nc"``, ``"nc + 1"``, 3.
     address : bool
-        Whether it holds places in this process, which mean nothing in another.
+        Whether it holds places in this process, or a part what is another's: nothing to keep.
     """
 
     role: str
@@ -84,9 +87,9 @@ def number(of: type) -> Any:
     return Member("number", of)
 
 
-def part(kind: type[Bundle]) -> Any:
+def part(kind: type[Bundle], *, address: bool = False) -> Any:
     """Declare a bundle within a bundle."""
-    return Member("part", kind)
+    return Member("part", kind, address=address)
 
 
 def extent() -> Any:
@@ -129,6 +132,8 @@ class Bundle:
 
     declared: ClassVar[dict[str, Member]] = {}
     """The members that the class declares, by name."""
+    methods: ClassVar[bool] = False
+    """Whether the class has kernels for methods."""
 
     named: ClassVar[frozenset[str]] = frozenset()
     """The extents that it declares to be read by name."""
@@ -137,14 +142,15 @@ class Bundle:
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Member)}
         cls.named = cls.named | {name for name, value in own.items() if value.role == "extent"}
         cls.declared = cls.declared | {k: v for k, v in own.items() if k not in cls.named}
+        cls.methods = cls.methods or any(hasattr(value, "py_func") for value in vars(cls).values())
         cells = [name for name, member in cls.declared.items() if member.role == "cell"]
         for name in own:
             if name in cls.named:
                 setattr(cls, name, _extent_property(name))
-            elif name in cells:
-                setattr(cls, name, _cell_property(cells.index(name), own[name]))
             else:
                 delattr(cls, name)
+        for place, name in enumerate(cells):
+            setattr(cls, name, _cell_property(place, cls.declared[name]))
 
     def __init__(self, **members: Any) -> None:
         own = self.__dict__
@@ -184,10 +190,14 @@ class Bundle:
         dtype : type, optional
             Of its arrays of floats, for other numbers than these: ``object`` for symbols.
         **given : int, array, number or Bundle
-            The extents by name, and members that are not to be zeros. Parts are allocated with the
-            same extents.
+            The extents by name, and members that are not to be zeros; a whole number may be both.
+            Parts are allocated with the same extents.
         """
-        extents = {name: value for name, value in given.items() if name not in cls.declared}
+        extents = {
+            name: value
+            for name, value in given.items()
+            if name not in cls.declared or cls.declared[name] == Member("number", int)
+        }
         members = {name: value for name, value in given.items() if name in cls.declared}
         for name, member in cls.declared.items():
             if name in members or member.role == "cell":
@@ -278,10 +288,51 @@ class Bundle:
         if self._cell_count():
             yield f"{prefix}cells", self.__dict__["_cells"]
         for name, member in self.declared.items():
-            if member.role == "part":
+            if member.role == "part" and not member.address:
                 yield from getattr(self, name).storage(f"{prefix}{name}.")
             elif member.role == "array" and not member.address:
                 yield prefix + name, getattr(self, name)
+
+    def stored(
+        self: _Some,
+        place: Callable[[str, np.ndarray[Any, Any]], np.ndarray[Any, Any]],
+        prefix: str = "",
+    ) -> _Some:
+        """Return a copy whose storage is what `place(name, array)` makes of that of this one."""
+        cells = self.__dict__["_cells"]
+        if self._cell_count():
+            cells = place(f"{prefix}cells", cells)
+        members = self.members()
+        for name, member in self.declared.items():
+            if member.role == "part" and not member.address:
+                members[name] = members[name].stored(place, f"{prefix}{name}.")
+            elif member.role == "array" and not member.address:
+                members[name] = place(prefix + name, members[name])
+        copy = type(self)(**members)
+        copy.__dict__["_cells"] = cells
+        return copy
+
+    def check(self, extents: Mapping[str, int]) -> None:
+        """Refuse to be one for other extents.
+
+        Raises
+        ------
+        TypeError
+            That names the array.
+        """
+        known = dict(extents)
+        for name, member in self.declared.items():
+            if member.role == "part":
+                getattr(self, name).check(known)
+            elif member.role == "array":
+                _check_shape(
+                    f"{type(self).__name__}.{name}", member, getattr(self, name).shape, known
+                )
+
+    @classmethod
+    def settable(cls: type[_Some]) -> type[_Some]:
+        """Return a class of the same members whose numbers are cells, and so can be set."""
+        return _settable(cls)  # type: ignore[arg-type]
 
     def contents(self) -> dict[str, np.ndarray[Any, Any]]:
         """Copy what is its own in its storage, by name: read-only arrays are shared with others."""
@@ -310,6 +361,14 @@ class Bundle:
 
 def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
     return kind(**members)
+
+
+@lru_cache
+def _settable(cls: Any) -> Any:
+    numbers = {
+        name: cell(member.kind) for name, member in cls.declared.items() if member.role == "number"
+    }
+    return type(cls.__name__, (cls,), {"__module__": cls.__module__, **numbers})
 
 
 def _cell_property(place: int, member: Member) -> property:
@@ -371,14 +430,15 @@ def _check_shape(
 
 
 class BundleType(types.Type):
-    """Type of a bundle: its members and theirs, and of what array an extent is which one."""
+    """Type of a bundle: its members, of what array an extent is which one, and its class."""
 
     def __init__(
         self,
-        name: str,
+        cls: Any,
         members: tuple[tuple[str, Any, bool], ...],
         extents: dict[str, tuple[str, int]],
     ) -> None:
+        name, self.cls = cls.__name__, cls
         self.members = {member: kind for member, kind, _ in members}
         self.cells = {member for member, _, changes in members if changes}
         self.extents = extents
@@ -399,7 +459,7 @@ class BundleType(types.Type):
 @lru_cache
 def _bundle_type(cls: Any) -> BundleType:
     return BundleType(
-        cls.__name__,
+        cls,
         tuple(
             (name, _member_type(member), member.role == "cell")
             for name, member in cls.declared.items()
@@ -445,7 +505,63 @@ class _BundleAttribute(AttributeTemplate):
     key = BundleType
 
     def generic_resolve(self, kind: BundleType, name: str) -> Any:  # type: ignore[override]
-        return types.int64 if name in kind.extents else kind.members.get(name)
+        if name in kind.extents:
+            return types.int64
+        if name in kind.members:
+            return kind.members[name]
+        return _method(kind, name) if hasattr(getattr(kind.cls, name, None), "py_func") else None
+
+
+@lru_cache
+def _method(kind: BundleType, name: str) -> Any:
+    """Type of a kernel of the class of a bundle, bound to the bundle."""
+    function = getattr(kind.cls, name)._numba_type_
+
+    class Method(AbstractTemplate):
+        key = f"{kind.name}.{name}"
+
+        def generic(self, arguments: Any, keywords: Any) -> Any:
+            return function.get_call_type(self.context, (kind, *arguments), keywords).as_method()
+
+    @lower_builtin(Method.key, kind, types.VarArg(types.Any))
+    def call(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return context.get_function(function, signature)(builder, values)
+
+    return types.BoundFunction(Method, kind)
+
+
+@lru_cache
+def bundle_at(cls: Any) -> Any:
+    """Return an intrinsic that returns the bundle of a class whose table is at an address."""
+    kind = cls.compiled_type()
+
+    def define(context: Any, address: Any) -> Any:
+        del context, address
+
+        def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            del context, signature
+            return builder.inttoptr(values[0], _WORD.as_pointer())
+
+        return kind(types.int64), generate
+
+    # What compiled code is made of is known by these: its members, and where its methods stand.
+    define.__name__ = define.__qualname__ = kind.name
+    define.__module__ = cls.__module__ if cls.methods else __name__
+    return intrinsic(define)
+
+
+def _address_of(context: Any, bundle: Any) -> Any:
+    del context
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        del context, signature
+        return builder.ptrtoint(values[0], _WORD)
+
+    return types.int64(bundle), generate
+
+
+address_of: Any = intrinsic(_address_of)
+"""``address_of(bundle)``: where its table is."""
 
 
 def _word(builder: Any, table: Any, place: int) -> Any:

@@ -12,17 +12,22 @@ import os
 import types
 import warnings
 from collections.abc import Callable, Mapping
-from functools import cache, cached_property, update_wrapper
+from functools import cache, cached_property, partial, update_wrapper
 from typing import Any, TypeVar
 
 import numba
+from numba import njit
 
-from heelstrike.compiler.documented_numba import DocumentedNumba
+from heelstrike.compiler.documented_numba import OPTIONS, DocumentedNumba
+from heelstrike.compiler.fingerprint import is_ours as is_ours
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 SWITCH = "HEELSTRIKE_DOCUMENTED_NUMBA"
 """Set to 1 in the environment, it has kernels compiled by Numba's documented names only."""
+
+CompileError = (numba.errors.NumbaError, RuntimeError, TypeError)
+"""What compiling a function raises that cannot be compiled."""
 
 
 class CompilerWarning(UserWarning):
@@ -71,6 +76,10 @@ class Kernel:
         """What Numba takes it for where another kernel names it."""
         return type_of(self._part)
 
+    def __get__(self, instance: Any, owner: Any = None) -> Any:
+        """Bind it to the bundle whose method it is."""
+        return self if instance is None else partial(self, instance)
+
     def __call__(self, *arguments: Any) -> Any:
         """Call it from Python."""
         if self._called:
@@ -103,6 +112,16 @@ def dissolved_kernel(function: Function) -> Function:
     compiled: Any = Kernel(function, dissolved=True)
     result: Function = compiled
     return result
+
+
+def within_bounds(function: Any) -> Any:
+    """Compile a function of somebody's to be called by kernels, its indices checked.
+
+    What Numba has compiled already stays as it is.
+    """
+    if _is_compiled(function):
+        return function
+    return njit(**OPTIONS, boundscheck=True)(function)
 
 
 def compiled_for(

@@ -79,19 +79,23 @@ class DocumentedNumba:
         entry: Callable[..., Any] = compiled
         return entry
 
-    def separate(self, signature: Any, function: Callable[..., Any]) -> tuple[Any, int]:
+    def separate(
+        self, signature: Any, function: Callable[..., Any], *, boundscheck: bool = False
+    ) -> tuple[Any, int]:
         """Compile a function for the C calling convention; return it and its address.
 
         What is returned is compiled once more if it is called in another way.
         """
         decorator = partial(cfunc, signature)
-        made = self.compile(lambda: self._kept(decorator, function, "cfunc", OPTIONS))
+        options = OPTIONS | ({"boundscheck": True} if boundscheck else {})
+        kind = f"cfunc{boundscheck:d}"
+        made = self.compile(lambda: self._kept(decorator, function, kind, options))
         _alive.append(made)
-        return self.kept(function), int(made.address)
+        return self.kept(function, boundscheck=boundscheck), int(made.address)
 
     def is_kept(self, signature: Any, function: Callable[..., Any]) -> bool:  # noqa: ARG002
         """Whether :meth:`separate` would find machine code, or has no disk to look on."""
-        place = self._place(function, "cfunc")
+        place = self._place(function, "cfunc0")
         return place is None or any(place.rglob("*.nbc"))
 
     def _kept(self, decorator: Any, function: Any, kind: str, options: dict[str, Any]) -> Any:

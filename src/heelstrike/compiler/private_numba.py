@@ -101,9 +101,11 @@ class PrivateNumba(DocumentedNumba):
         entry: Callable[..., Any] = compiled.overloads[tuple(signature.args)].entry_point
         return entry
 
-    def separate(self, signature: Any, function: Callable[..., Any]) -> tuple[Any, int]:
+    def separate(
+        self, signature: Any, function: Callable[..., Any], *, boundscheck: bool = False
+    ) -> tuple[Any, int]:
         """Compile a function for the C calling convention; return it and its address."""
-        compiled = self.kept(function, address=True)
+        compiled = self.kept(function, address=True, boundscheck=boundscheck)
         self.compile(lambda: compiled.compile(signature))
         compiled.disable_compile()
         result = compiled.get_compile_result(signature)

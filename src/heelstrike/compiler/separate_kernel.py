@@ -52,6 +52,8 @@ class SeparateKernel(types.WrapperAddressProtocol):
         The kernel. Its name in its module must be that of the :class:`SeparateKernel`.
     signature : callable
         Gives its Numba signature.
+    boundscheck : bool
+        Whether an index beyond an array raises IndexError.
 
     Attributes
     ----------
@@ -60,13 +62,20 @@ class SeparateKernel(types.WrapperAddressProtocol):
         Read-only: all who call it share it.
     """
 
-    def __init__(self, function: Callable[..., Any], signature: Callable[[], Any]) -> None:
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        signature: Callable[[], Any],
+        *,
+        boundscheck: bool = False,
+    ) -> None:
         self._place = np.zeros(1, dtype=np.int64)
         self.address: NDArray[np.int64] = self._place[:]
         self.address.flags.writeable = False
         self.__module__ = function.__module__
         self._function = function
         self._signature = signature
+        self._boundscheck = boundscheck
         self._compiled: Any = None
         self._helper: subprocess.Popen[bytes] | None = None
         self._lock = threading.Lock()
@@ -92,7 +101,9 @@ class SeparateKernel(types.WrapperAddressProtocol):
                 # Whether it succeeded shows in what it left on disk.
                 _wait_for(self._helper)
                 self._helper = None
-            compiled, self._place[0] = numba_in_use().separate(self._signature(), self._function)
+            compiled, self._place[0] = numba_in_use().separate(
+                self._signature(), self._function, boundscheck=self._boundscheck
+            )
             self._compiled = compiled
             return compiled
 

@@ -1,5 +1,15 @@
-"""Controllers."""
+"""Controllers: the stock ones, and how to write others."""
 
 from heelstrike.control.computed_torque import ComputedTorque, Encoder
+from heelstrike.sim.controller.law import ControllerFunction, Law, controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
-__all__ = ["ComputedTorque", "Encoder"]
+__all__ = [
+    "ComputedTorque",
+    "ControlState",
+    "ControlledRobot",
+    "ControllerFunction",
+    "Encoder",
+    "Law",
+    "controller",
+]

@@ -22,7 +22,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
-from heelstrike.sim import CompiledController, Controller, Run, simulate
+from heelstrike.sim import Controller, Run, simulate
 from heelstrike.sim.method import Method
 from heelstrike.sim.status import RunStatus
 
@@ -167,7 +167,7 @@ class Comparison:
 
 def compare(
     robot: Robot,
-    controller: Controller | CompiledController | None = None,
+    controller: Controller | None = None,
     *,
     methods: Sequence[Method] | Mapping[str, Method],
     state: State,

@@ -8,12 +8,7 @@ from heelstrike.sim.compliant.contact_law import (
     KelvinVoigt,
     RegularisedFriction,
 )
-from heelstrike.sim.controller.interface import (
-    CompiledController,
-    Contacts,
-    Controller,
-    controller_kernel,
-)
+from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.files.run_file import load_run
 from heelstrike.sim.method import Method
@@ -28,7 +23,6 @@ __all__ = [
     "Batch",
     "BristleFriction",
     "Certificates",
-    "CompiledController",
     "Compliant",
     "Contacts",
     "Controller",
@@ -48,7 +42,6 @@ __all__ = [
     "SolverCount",
     "TimeStepping",
     "Timing",
-    "controller_kernel",
     "load_run",
     "load_snapshot",
     "simulate",

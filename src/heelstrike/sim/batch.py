@@ -6,24 +6,26 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from copy import deepcopy
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.controller.interface import CompiledController, Controller, compiled_form
+from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.frame import compiled_loop
 from heelstrike.sim.memory import Memory, Record, allocate_memory
 from heelstrike.sim.method import Method
@@ -147,13 +149,11 @@ class Batch:
 
 def simulate_batch(
     robot: Robot | Sequence[Robot],
-    controller: (
-        Controller | CompiledController | Sequence[Controller | CompiledController] | None
-    ) = None,
+    controller: Controller | Sequence[Controller] | None = None,
     *,
     state: State | Sequence[State],
     duration: ArrayLike,
-    parameters: ArrayLike | None = None,
+    parameters: Bundle | Sequence[Bundle] | Mapping[str, ArrayLike] | None = None,
     pushes: Push | Sequence[Push] | Sequence[Sequence[Push]] = (),
     ground: Ground | Sequence[Ground] | None = None,
     method: Method | None = None,
@@ -175,14 +175,15 @@ def simulate_batch(
         Robots may differ in every number, but must have as many coordinates, actuators and contact
         points.
     controller : controller, sequence of n, or None
-        Stock controllers, and others in compiled form (`CompiledController`). Each run has a memory
+        Stock controllers, and those made with :func:`heelstrike.controller`. Each run has a memory
         of its own. A Python controller would run one at a time: call `simulate` instead.
     state : State, or sequence of n
         Where the runs start: `q` (nq,) or (n, nq), `v` (nv,) or (n, nv).
     duration : float, or (n,) float
         Time to simulate in seconds.
-    parameters : (p,) or (n, p) float, optional
-        Numbers of the controller, in the place of its own `CompiledController.parameters`.
+    parameters : Bundle, sequence of n, or mapping of str to (n, ...) array, optional
+        Numbers of the controller, in the place of its own; a mapping names those that differ from
+        run to run.
     pushes : Push, sequence of Push, or sequence of n sequences of Push
         Forces from outside; a plain sequence acts in every run.
     ground : Ground, or sequence of n
@@ -235,7 +236,7 @@ def simulate_batch(
         "controller": _listed(controller),
         "state": _states(state),
         "duration": _durations(duration),
-        "parameters": _rows(parameters),
+        "parameters": _parameters(parameters),
         "pushes": _pushes(pushes),
         "ground": _listed(ground),
     }
@@ -261,22 +262,31 @@ def simulate_batch(
             method.set_clock(setting, Clock())
             return setting
 
-    compiled = [_compiled(every["robot"][0], each) for each in entries["controller"]]
-    controllers = _Entries(compiled)
+    laws = _Entries([_law(each) for each in entries["controller"]])
 
-    def controller_of(index: int) -> CompiledController:
+    def law_at(index: int) -> Law:
+        law: Law = laws[index]
         numbers = every["parameters"][index]
-        own: CompiledController = controllers[index]
-        return own if numbers is None else replace(own, parameters=numbers)
+        with _naming(index, count):
+            if isinstance(numbers, Mapping):
+                try:
+                    numbers = law.parameters.replaced(**numbers)
+                except TypeError as error:
+                    raise SimulationError(f"parameters: {error}") from error
+            law = law if numbers is None else law.with_parameters(numbers)
+            law.numbers(every["robot"][index])
+        return law
 
-    _check_parameters(compiled, entries["parameters"])
     settings = [setting_of(index) for index in range(count)]
     durations = [every["duration"][index] for index in range(count)]
+    chosen = [law_at(index) for index in range(count)]
     if record_every is not None:
         rows = sum(method.rows_in(duration, record_every) for duration in durations)
         check_runs(entries["robot"][0], rows, count, record_every)
     _, compile_s = compiled_loop(method.kernels, method.work)
-    crew = _Crew(settings, durations, method, controller_of, recorded=record_every is not None)
+    for law in chosen:
+        law.function.finish()
+    crew = _Crew(settings, durations, method, chosen, recorded=record_every is not None)
     with _shown(progress, count) as show:
         crew.work(min(workers, count), show)
     timing = Timing(compile_s, perf_counter() - begin - compile_s)
@@ -324,16 +334,29 @@ def _durations(duration: ArrayLike) -> Sequence[float]:
     return listed
 
 
-def _rows(parameters: ArrayLike | None) -> Sequence[Floats | None]:
+def _parameters(parameters: Any) -> Sequence[Bundle | Mapping[str, Floats] | None]:
+    """Parameters run by run: bundles, or members by name."""
     if parameters is None:
         return [None]
-    values = np.asarray(parameters, dtype=np.float64)
-    if values.ndim not in (1, 2) or not np.all(np.isfinite(values)):
+    bundles = _listed(parameters)
+    if all(isinstance(each, Bundle) for each in bundles):
+        return bundles
+    if not isinstance(parameters, Mapping):
         raise SimulationError(
-            f"parameters must be finite numbers of shape (p,) or (runs, p), got shape "
-            f"{values.shape}"
+            "parameters are a bundle, one bundle a run, or a mapping of names to arrays with one "
+            f"entry a run; got {type(parameters).__name__}"
         )
-    return list(np.atleast_2d(values))
+    columns = {name: np.asarray(values, dtype=np.float64) for name, values in parameters.items()}
+    shapes = {name: values.shape for name, values in columns.items()}
+    if len({shape[:1] for shape in shapes.values()} | {()}) != 2:
+        raise SimulationError(f"parameters must have one entry a run, got arrays of shape {shapes}")
+    for name, values in columns.items():
+        if not np.all(np.isfinite(values)):
+            raise SimulationError(f"parameters: {name} must be finite")
+    rows = zip(*columns.values(), strict=True)
+    return [
+        {name: np.array(value) for name, value in zip(columns, row, strict=True)} for row in rows
+    ]
 
 
 def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
@@ -379,26 +402,16 @@ def _check_robots(robots: Sequence[Any]) -> None:
                 )
 
 
-def _compiled(robot: Robot, controller: Any) -> CompiledController:
-    compiled = compiled_form(robot, controller)
-    if compiled is None:
+def _law(controller: Any) -> Law:
+    """Return the law that a controller is, which must be one that can be compiled."""
+    law = law_of(controller, begin=True)
+    if law is None or not law.function.compiles:
         raise ControllerError(
             f"{type(controller).__name__} runs in Python, so a batch of it would run one at a "
-            "time. Compile it with controller_kernel and hand over a CompiledController, or call "
+            "time. Write it as a function and compile that with heelstrike.controller, or call "
             "simulate for each run"
         )
-    return compiled
-
-
-def _check_parameters(compiled: Sequence[CompiledController], rows: Sequence[Any]) -> None:
-    if rows[0] is None:
-        return
-    for controller in compiled:
-        if len(controller.parameters) != len(rows[0]):
-            raise SimulationError(
-                f"the controller has {len(controller.parameters)} parameters, but there are "
-                f"{len(rows[0])} in each row of `parameters`"
-            )
+    return law
 
 
 @contextmanager
@@ -441,12 +454,12 @@ class _Crew:
         settings: list[Setting],
         durations: Sequence[float],
         method: Method,
-        controller_of: Callable[[int], CompiledController],
+        laws: Sequence[Law],
         *,
         recorded: bool,
     ) -> None:
         self._settings, self._durations, self._method = settings, durations, method
-        self._controller_of = controller_of
+        self._laws = laws
         self._recorded = recorded
         self._lock = threading.Lock()
         self._stop = threading.Event()
@@ -525,7 +538,7 @@ class _Crew:
     ) -> Record | None:
         """Simulate one run; return its record if the next may use it."""
         ending = simulation_to_the_end(
-            setting, self._method, self._controller_of(index), self._durations[index],
+            setting, self._method, self._laws[index], self._durations[index],
             memory=memory, record=record, keep_rows=self._recorded, stopped=self._stop.is_set,
         )  # fmt: skip
         self._q[index] = ending.state.q

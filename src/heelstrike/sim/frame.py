@@ -31,7 +31,7 @@ from heelstrike.robot.model import Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.controller.interface import CONTROLLER_TYPE
+from heelstrike.sim.controller.law import CONTROLLER_TYPE
 from heelstrike.sim.memory import Memory, Record
 from heelstrike.sim.recording import center_height, limit_torque, sound
 

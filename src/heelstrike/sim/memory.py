@@ -11,9 +11,9 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
-from heelstrike.dynamics.workspace import Workspace, workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller.guard import guarded, guarded_bundle
+from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.programs import straight_line_programs, usual_points
 from heelstrike.sim.push import Push, Pushes, pushes_on
@@ -71,8 +71,8 @@ class Memory(Bundle):
         What an implicit scheme adds to the diagonal of the mass matrix.
     bodies : ArticulatedBodies
         What the loops solve with instead of the factor; see :mod:`heelstrike.sim.programs`.
-    tree, scratch : Workspace
-        Kinematics of the state now; a second one for controllers.
+    tree : Workspace
+        Kinematics of the state now.
     contacts : Contacts
         Contact points now; their forces are those of the last solve.
     friction, restitution : (capacity,) float
@@ -152,7 +152,6 @@ class Memory(Bundle):
     added: Floats = array("nv")
     bodies: ArticulatedBodies = part(ArticulatedBodies)
     tree: Workspace = part(Workspace)
-    scratch: Workspace = part(Workspace)
     contacts: Contacts = part(Contacts)
     friction: Floats = array("capacity")
     restitution: Floats = array("capacity")
@@ -214,12 +213,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     return Memory.allocate(
         nl=nv, nq=robot.nq, nv=nv, nu=nu, nc=nc, nd=len(dry), capacity=capacity, usual=len(usual),
         axes=2, components=2,
-        q=guarded(np.zeros(nv)),
-        v=guarded(np.zeros(nv)),
         torque=guarded(np.zeros(nu)),
-        tree=guarded_bundle(workspace(nv)),
-        scratch=guarded_bundle(workspace(nv)),
-        contacts=guarded_bundle(Contacts.allocate(nc=nc, axes=2, components=2)),
         friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
         dry_joint=dry.astype(np.int64),
         resting=np.full(len(dry), -1, dtype=np.int64),

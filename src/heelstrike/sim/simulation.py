@@ -8,30 +8,20 @@ from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
-from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.controller.checked import CheckedController
-from heelstrike.sim.controller.control import TRUSTED, WATCHED, control_with
-from heelstrike.sim.controller.interface import (
-    CompiledController,
-    Contacts,
-    Controller,
-    Partaking,
-    compiled_form,
-    hold_torque,
-    is_stock,
-    name_of,
-    read_only,
-)
+from heelstrike.sim.controller.control import ReadyLaw
+from heelstrike.sim.controller.in_python import AskedLaw
+from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
+from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
 from heelstrike.sim.memory import Memory, Record, allocate_memory, allocate_record
@@ -131,7 +121,7 @@ class Simulation:
     def __init__(
         self,
         robot: Robot,
-        controller: Controller | CompiledController | None = None,
+        controller: Controller | None = None,
         *,
         state: State | Snapshot,
         method: Method | None = None,
@@ -147,6 +137,7 @@ class Simulation:
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
             stop_when_fallen=stop_when_fallen, pushes=pushes, checked=checked,
         )  # fmt: skip
+        law_of(controller, begin=True)
         self._begin(setting, checked_method(method))
         self._control_with(controller)
         if isinstance(state, Snapshot):
@@ -244,28 +235,22 @@ class Simulation:
         self._ground, self._setting = ground, setting
 
     @property
-    def controller(self) -> Controller | CompiledController | None:
+    def controller(self) -> Controller | None:
         """What decides the torques; one that is set begins anew."""
         return self._controller
 
     @controller.setter
-    def controller(self, controller: Controller | CompiledController | None) -> None:
+    def controller(self, controller: Controller | None) -> None:
         self._control_with(controller)
 
     @property
-    def parameters(self) -> Floats:
-        """Numbers of a compiled controller; others may be set, of the same shape."""
-        return self._control.parameters.copy()
+    def parameters(self) -> Bundle:
+        """Numbers of a law; what is written into them, or all when others are set, acts at once."""
+        return self._numbers.parameters
 
     @parameters.setter
-    def parameters(self, parameters: ArrayLike) -> None:
-        values = np.asarray(parameters, dtype=np.float64)
-        if values.shape != self._control.parameters.shape:
-            raise ControllerError(
-                f"{self._name} has parameters of shape {self._control.parameters.shape}, "
-                f"got {values.shape}"
-            )
-        self._control.parameters[:] = values
+    def parameters(self, parameters: Bundle) -> None:
+        self._numbers.set_parameters(parameters)
 
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
@@ -425,7 +410,7 @@ class Simulation:
             raise
         except BaseException as error:
             self.error = error
-            if isinstance(controller, CheckedController) and isinstance(error, ControllerError):
+            if isinstance(controller, AskedLaw) and isinstance(error, ControllerError):
                 return RunStatus.CONTROLLER_FAILED, f"{error} (at {self._now})"
             return RunStatus.CONTROLLER_FAILED, (
                 f"{self._name} raised {_raised(error)} at {self._now} (the exception is in "
@@ -500,41 +485,40 @@ class Simulation:
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
         record.rows = record.events = 0
 
-    def _control_with(self, controller: Controller | CompiledController | None) -> None:
+    def _control_with(self, controller: Controller | None) -> None:
         """Begin with a controller."""
         robot, setting = self.robot, self._setting
-        compiled = compiled_form(robot, controller)
+        law = law_of(controller)
         self._controller = controller
         self._python: Any = None
         self._shown = read_only(self._memory.contacts)
         memory = self._memory
         memory.stiffness[:] = robot.model.stiffness
         memory.damping[:] = robot.model.damping
-        if compiled is not None:
-            driven = robot.model.actuator_joint
-            if compiled.stiffness is not None:
-                memory.stiffness[driven] += compiled.stiffness
-            if compiled.damping is not None:
-                memory.damping[driven] += compiled.damping
-            if setting.checked and controller is not None:
-                self._python = CheckedController(robot, compiled)
+        if law is None:
+            law, self._python = Law(no_torque), controller
+            self._name = f"{type(controller).__name__}.torque"
         else:
-            self._python = controller
+            driven = robot.model.actuator_joint
+            if law.stiffness is not None:
+                memory.stiffness[driven] += law.stiffness
+            if law.damping is not None:
+                memory.damping[driven] += law.damping
+            self._name = f"controller {law.function.name!r}"
+            if controller is not None and (setting.checked or not law.function.compiles):
+                self._python = AskedLaw(robot, law, checked=setting.checked)
+                law = Law(no_torque)
+        ready = ReadyLaw(robot, law, memory.tree, memory.contacts)
+        self._kernel = law.function.finish()
+        self._control = ready.control
+        self._numbers = self._python.numbers if isinstance(self._python, AskedLaw) else ready
         if self._python is None:
-            assert compiled is not None
-            self._name = f"controller {name_of(compiled)!r}"
-            self._kernel = compiled.kernel
-            self._control = control_with(compiled.parameters, compiled.memory)
-            self._control.conduct = TRUSTED if is_stock(compiled) else WATCHED
             self._control.continuous = setting.control_period is None and controller is not None
         else:
-            self._name = f"{type(self._python).__name__}.torque"
-            self._kernel = hold_torque
-            self._control = control_with((), ())
             self._control.in_python = 1
             if setting.control_period is None and self.method.python_period is not None:
                 self._clock.control_period = self.method.python_period
-        self._watch = Watch(robot, self._control, memory)
+        self._watch = Watch(robot, ready, memory)
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course hangs on.
@@ -595,7 +579,6 @@ class Simulation:
         except (KeyError, ValueError) as error:
             raise SimulationError(f"the snapshot is damaged: {error}") from error
         self._memory, self._pushes, self._ground = memory, pushes, ground
-        self._watch = Watch(self.robot, self._control, memory)
 
     def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
         """Name the bundles that change as a simulation goes on."""
@@ -668,7 +651,7 @@ class Simulation:
 
 def simulate(
     robot: Robot,
-    controller: Controller | CompiledController | None = None,
+    controller: Controller | None = None,
     *,
     duration: float,
     progress: Callable[[float], None] | None = None,
@@ -745,7 +728,7 @@ class Ending:
 def simulation_to_the_end(
     setting: Setting,
     method: Method,
-    controller: CompiledController,
+    law: Law,
     duration: float,
     *,
     memory: Memory,
@@ -756,7 +739,7 @@ def simulation_to_the_end(
     """Simulate as :func:`simulate` does, in memory that is given, until `stopped` says so."""
     simulation = Simulation.__new__(Simulation)
     simulation._begin(setting, method, memory, record, keep_rows=keep_rows)
-    simulation._control_with(controller)
+    simulation._control_with(law)
     until = method.instant(simulation._clock, duration)
     simulation._advance(until, NEVER, stopped=stopped)
     status, message = simulation._decide_last()

@@ -12,11 +12,9 @@ import heelstrike as hs
 from heelstrike.errors import SimulationError
 from heelstrike.robot import read_mjcf
 from heelstrike.sim import (
-    CompiledController,
     Contacts,
     EventKind,
     RunStatus,
-    controller_kernel,
 )
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
@@ -262,19 +260,25 @@ def test_a_robot_left_alone_falls() -> None:
     assert run.status is RunStatus.FELL
 
 
-@controller_kernel
-def counting(t, q, v, contacts, model, tree, scratch, parameters, memory, torque):  # type: ignore[no-untyped-def]
+class Calls(hs.Bundle):
+    """How often a controller has been asked."""
+
+    number: int = hs.cell(int)
+
+
+@hs.controller
+def counting(memory: Calls, torque: np.ndarray) -> None:
     """Ask for as many 1/1024 newton metres as it remembers calls."""
-    memory[0] += 1.0
+    memory.number += 1
     for i in range(torque.shape[0]):
-        torque[i] = memory[0] / 1024.0
+        torque[i] = memory.number / 1024.0
 
 
 def test_a_controller_remembers_one_call_for_every_step() -> None:
     """However often the integration asks within its steps and in those that it rejects."""
     run = hs.simulate(
         walking.bravo7(),
-        CompiledController(counting, np.zeros(0), np.zeros(1)),
+        counting(),
         state=walking.gait().initial_state,
         duration=0.05,
         method=Compliant(),

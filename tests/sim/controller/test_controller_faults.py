@@ -11,14 +11,9 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.sim import (
-    CompiledController,
-    Compliant,
-    EventDriven,
-    RunStatus,
-    TimeStepping,
-    controller_kernel,
-)
+from heelstrike.control import ControllerFunction as Function
+from heelstrike.control import Law
+from heelstrike.sim import Compliant, EventDriven, RunStatus, TimeStepping
 from heelstrike.sim.method import Method
 
 METHODS = [TimeStepping(), EventDriven(max_step=1e-3), Compliant()]
@@ -39,47 +34,61 @@ CHANGE_STATE = 9
 CHANGE_CONTACTS = 10
 
 
+class Fault(hs.Bundle):
+    """What it shall do wrong."""
+
+    which: np.ndarray = hs.array(1)
+
+
+class Calls(hs.Bundle):
+    """How often it was called, and something else."""
+
+    number: np.ndarray = hs.array(1)
+    more: np.ndarray = hs.array("nu")
+
+
 def misbehave(  # type: ignore[no-untyped-def]
-    t, q, v, contacts, model, tree, scratch, parameters, memory, torque
+    t, state, contacts, robot, parameters: Fault, memory: Calls, torque
 ):
     """Brake the joints, and misbehave when it is time."""
-    fault = int(parameters[0])
+    fault = int(parameters.which[0])
     if t < AFTER:
         fault = WELL
-    for i in range(torque.shape[0]):
-        torque[i] = -v[model.actuator_joint[i]]
-    memory[0] += 1.0
+    for i in range(robot.nu):
+        torque[i] = -state.joint_velocity[i]
+    memory.number[0] += 1.0
     if fault == WRITE_TORQUE:
         torque[torque.shape[0] + 1] = 1.0
     elif fault == WRITE_MEMORY:
-        memory[memory.shape[0]] = 1.0
+        memory.number[memory.number.shape[0]] = 1.0
     elif fault == WRITE_PARAMETERS:
-        parameters[parameters.shape[0] + 2] = 1.0
+        parameters.which[parameters.which.shape[0] + 2] = 1.0
     elif fault == WRITE_BEFORE:
         torque[-torque.shape[0] - 1] = 1.0
     elif fault == WRITE_FAR:
         torque[torque.shape[0] + 40] = 1.0
     elif fault == READ_MEMORY:
-        torque[2] = memory[memory.shape[0] + 1]
+        torque[2] = memory.number[memory.number.shape[0] + 1]
     elif fault == RAISE:
         raise ValueError("battery empty")
     elif fault == CHANGE_ROBOT:
-        model.mass[3] *= 2.0
+        robot.model.mass[3] *= 2.0
     elif fault == CHANGE_STATE:
-        q[2] += 1e-3
+        state.q[2] += 1e-3
+        state.kinematics.origin[2, 1] += 1e-3
     elif fault == CHANGE_CONTACTS:
         contacts.force[1, 0] += 1.0
 
 
 @pytest.fixture(scope="module")
-def careless() -> Any:
+def careless() -> Function:
     """The controller as somebody compiles it who leaves Numba's defaults as they are."""
-    return numba.njit(misbehave)
+    return hs.controller(numba.njit(misbehave))
 
 
 @pytest.fixture(scope="module")
-def kernel() -> Any:
-    return controller_kernel(misbehave)
+def careful() -> Function:
+    return hs.controller(misbehave)
 
 
 def run(controller: Any, method: Method, **options: Any) -> hs.Run:
@@ -93,8 +102,8 @@ def run(controller: Any, method: Method, **options: Any) -> hs.Run:
     )
 
 
-def faulty(kernel: Any, fault: int) -> CompiledController:
-    return CompiledController(kernel, np.array([float(fault)]), np.zeros(1))
+def faulty(function: Function, fault: int) -> Law:
+    return function(Fault(which=np.array([float(fault)])))
 
 
 def check(found: hs.Run, *words: str, until: float = 0.1) -> None:
@@ -113,13 +122,13 @@ def check(found: hs.Run, *words: str, until: float = 0.1) -> None:
     ("fault", "place"),
     [
         (WRITE_TORQUE, "torque[7] of shape (6,)"),
-        (WRITE_MEMORY, "memory[1] of shape (1,)"),
-        (WRITE_PARAMETERS, "parameters[3] of shape (1,)"),
+        (WRITE_MEMORY, "memory.number[1] of shape (1,)"),
+        (WRITE_PARAMETERS, "parameters.which[3] of shape (1,)"),
         (WRITE_BEFORE, "torque[-1] of shape (6,)"),
     ],
 )
 def test_what_is_written_next_to_an_array_ends_the_run_at_once(
-    careless: Any, fault: int, place: str, method: Method
+    careless: Function, fault: int, place: str, method: Method
 ) -> None:
     found = run(faulty(careless, fault), method)
     check(
@@ -129,29 +138,29 @@ def test_what_is_written_next_to_an_array_ends_the_run_at_once(
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 def test_what_is_written_farther_off_is_seen_when_the_loop_comes_back(
-    careless: Any, method: Method
+    careless: Function, method: Method
 ) -> None:
     check(run(faulty(careless, WRITE_FAR), method), "torque[46] of shape (6,)")
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_what_is_read_beyond_an_array_is_no_number(careless: Any, method: Method) -> None:
+def test_what_is_read_beyond_an_array_is_no_number(careless: Function, method: Method) -> None:
     found = run(faulty(careless, READ_MEMORY), method)
     actuator = walking.bravo7().actuator_names[2]
     check(found, "not finite", repr(actuator), until=AFTER + 2e-3)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_what_compiled_code_raises_ends_the_run(kernel: Any, method: Method) -> None:
-    found = run(faulty(kernel, RAISE), method)
+def test_what_compiled_code_raises_ends_the_run(careful: Function, method: Method) -> None:
+    found = run(faulty(careful, RAISE), method)
     check(found, "controller 'misbehave' raised ValueError: battery empty", until=AFTER + 2e-3)
     assert isinstance(found.error, ValueError)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
-def test_a_changed_robot_is_noticed_and_put_right(kernel: Any, method: Method) -> None:
+def test_a_changed_robot_is_noticed_and_put_right(careful: Function, method: Method) -> None:
     mass = walking.bravo7().model.mass.copy()
-    found = run(faulty(kernel, CHANGE_ROBOT), method)
+    found = run(faulty(careful, CHANGE_ROBOT), method)
     check(found, "changed the robot: model.mass[3] from")
     assert f"{mass[3]:.9g}" in found.message
     np.testing.assert_array_equal(walking.bravo7().model.mass, mass)
@@ -159,16 +168,19 @@ def test_a_changed_robot_is_noticed_and_put_right(kernel: Any, method: Method) -
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("fault", [CHANGE_STATE, CHANGE_CONTACTS])
-def test_state_and_contacts_are_not_the_controllers(
-    kernel: Any, fault: int, method: Method
-) -> None:
-    check(run(faulty(kernel, fault), method), "changed the state or the contacts")
+def test_state_and_contacts_are_copies(careful: Function, fault: int, method: Method) -> None:
+    well, changed = (run(faulty(careful, each), method) for each in (WELL, fault))
+    assert changed.completed, changed.message
+    np.testing.assert_array_equal(changed.position, well.position)
+    np.testing.assert_array_equal(changed.contact_force, well.contact_force)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("fault", [WRITE_TORQUE, WRITE_FAR, READ_MEMORY])
-def test_indices_are_checked_unless_one_opts_out(kernel: Any, fault: int, method: Method) -> None:
-    found = run(faulty(kernel, fault), method)
+def test_indices_are_checked_unless_one_opts_out(
+    careful: Function, fault: int, method: Method
+) -> None:
+    found = run(faulty(careful, fault), method)
     check(found, "IndexError", "checked=True", until=AFTER + 2e-3)
     assert isinstance(found.error, IndexError)
 
@@ -178,26 +190,26 @@ def test_indices_are_checked_unless_one_opts_out(kernel: Any, fault: int, method
     ("fault", "words"),
     [
         (WRITE_TORQUE, "writes to torque[7], beyond its shape (6,)"),
-        (WRITE_MEMORY, "writes to memory[1], beyond its shape (1,)"),
-        (WRITE_PARAMETERS, "writes to parameters[3]"),
+        (WRITE_MEMORY, "writes to memory.number[1], beyond its shape (1,)"),
+        (WRITE_PARAMETERS, "writes to parameters.which[3]"),
         (WRITE_BEFORE, "writes to torque[-7], beyond its shape (6,)"),
         (WRITE_FAR, "writes to torque[46], beyond its shape (6,)"),
-        (READ_MEMORY, "reads memory[2], beyond its shape (1,)"),
-        (CHANGE_ROBOT, "writes to model.mass[3]"),
-        (CHANGE_STATE, "writes to q[2]"),
+        (READ_MEMORY, "reads memory.number[2], beyond its shape (1,)"),
+        (CHANGE_ROBOT, "writes to robot.model.mass[3]"),
+        (CHANGE_STATE, "writes to state.q[2]"),
         (CHANGE_CONTACTS, "writes to contacts.force[1, 0]"),
         (RAISE, "battery empty"),
     ],
 )
 def test_the_checked_mode_names_controller_array_and_index(
-    careless: Any, fault: int, words: str, method: Method
+    careless: Function, fault: int, words: str, method: Method
 ) -> None:
     found = run(faulty(careless, fault), method, checked=True)
     check(found, words, "t = 0.02", until=AFTER + 2e-3)
     assert "'misbehave'" in found.message or fault == RAISE
 
 
-def test_the_checked_mode_computes_the_same(careless: Any) -> None:
+def test_the_checked_mode_computes_the_same(careless: Function) -> None:
     """Compiled and in Python: the same law, called at the same instants."""
     plain = run(faulty(careless, WELL), TimeStepping())
     checked = run(faulty(careless, WELL), TimeStepping(), checked=True)
@@ -220,20 +232,6 @@ def test_the_checked_mode_takes_stock_controllers() -> None:
     )
     assert checked.completed, checked.message
     np.testing.assert_allclose(checked.torque, plain.torque, rtol=1e-9, atol=1e-9)
-
-
-def test_what_loops_cannot_call_is_refused() -> None:
-    numbers = np.zeros(1)
-    with pytest.raises(hs.ControllerError, match="controller_kernel"):
-        run(CompiledController(lambda *_: None, numbers, numbers), TimeStepping())
-    with pytest.raises(hs.ControllerError, match="cannot be compiled"):
-        run(CompiledController(numba.njit(lambda t: t), numbers, numbers), TimeStepping())
-
-
-def test_numbers_of_a_controller_are_vectors(careless: Any) -> None:
-    square = np.zeros((2, 2))
-    with pytest.raises(hs.ControllerError, match=r"memory .* \(2, 2\)"):
-        run(CompiledController(careless, np.zeros(1), square), TimeStepping())
 
 
 class Plain:
@@ -284,14 +282,14 @@ def test_python_changes_neither_contacts_nor_robot(method: Method) -> None:
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 @pytest.mark.parametrize("plain", [False, True])
 def test_progress_that_raises_ends_the_run_with_its_data(
-    kernel: Any, plain: bool, method: Method
+    careful: Function, plain: bool, method: Method
 ) -> None:
     error = OSError("the terminal is gone")
 
     def progress(_: float) -> None:
         raise error
 
-    controller = Plain(lambda _: None) if plain else faulty(kernel, WELL)
+    controller = Plain(lambda _: None) if plain else faulty(careful, WELL)
     found = hs.simulate(
         walking.bravo7(),
         controller,
@@ -307,19 +305,19 @@ def test_progress_that_raises_ends_the_run_with_its_data(
     assert 0.0 < found.time[-1] < 300.0
 
 
-def test_a_finished_run_is_finished_though_progress_raises(kernel: Any) -> None:
+def test_a_finished_run_is_finished_though_progress_raises(careful: Function) -> None:
     def progress(time: float) -> None:
         if time >= 0.1:
             raise OSError("the terminal is gone")
 
-    found = run(faulty(kernel, WELL), TimeStepping(), progress=progress)
+    found = run(faulty(careful, WELL), TimeStepping(), progress=progress)
     assert found.completed
     assert "the terminal is gone" in found.message
 
 
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 def test_looking_up_more_often_changes_no_digit(
-    kernel: Any, method: Method, monkeypatch: pytest.MonkeyPatch
+    careful: Function, method: Method, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def walk() -> hs.Run:
         return run(hs.ComputedTorque(walking.bravo7(), walking.gait()), method)

@@ -13,15 +13,11 @@ from numpy.typing import NDArray
 
 import heelstrike as hs
 from heelstrike.control.joint_feedback import JointFeedback
-from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import read_mjcf
-from heelstrike.robot.model import Model
 from heelstrike.sim import (
-    CompiledController,
     Contacts,
     EventKind,
     RunStatus,
-    controller_kernel,
 )
 from heelstrike.sim.event_driven.method import EVENTS_WITHOUT_END, LOOKS
 from heelstrike.sim.event_driven.phase import allocate_phase
@@ -172,28 +168,23 @@ def test_python_and_compiled_controllers_agree_when_sampled() -> None:
     np.testing.assert_array_equal(default.position[-1], plain.position[-1])
 
 
-@controller_kernel
-def counting(
-    t: float,
-    q: Floats,
-    v: Floats,
-    contacts: Contacts,
-    model: Model,
-    tree: Workspace,
-    scratch: Workspace,
-    parameters: Floats,
-    memory: Floats,
-    torque: Floats,
-) -> None:
+class Calls(hs.Bundle):
+    """How often a controller has been asked."""
+
+    number: int = hs.cell(int)
+
+
+@hs.controller
+def counting(memory: Calls, torque: Floats) -> None:
     """Exert what it remembers having been asked, plus one."""
-    memory[0] += 1.0
+    memory.number += 1
     for i in range(torque.shape[0]):
-        torque[i] = 1e-6 * memory[0]
+        torque[i] = 1e-6 * memory.number
 
 
 def test_a_controller_remembers_only_accepted_steps() -> None:
     """Within a step every call sees the memory of its beginning, so the torque is that of row 0."""
-    controller = CompiledController(counting, np.zeros(0), np.zeros(1))
+    controller = counting()
     run = hs.simulate(
         walking.bravo7(),
         controller,

@@ -150,7 +150,7 @@ class BulletPeer(Peer):
         assert feedback is not None
         model, driven = self.scenario.robot.model, self._driven
         rest = self.start.q[driven]
-        speed = (self.commands[0] - feedback.kp * rest) / feedback.kd
+        speed = (self.commands[0] - feedback.parameters.kp * rest) / feedback.parameters.kd
         limit = np.full(len(driven), NO_LIMIT)
         if len(self.commands) == 1:  # otherwise it is not all of the torque
             limit = np.minimum(model.torque_upper, NO_LIMIT)
@@ -160,8 +160,8 @@ class BulletPeer(Peer):
             pybullet.PD_CONTROL,
             targetPositions=rest - model.reference[driven],
             targetVelocities=speed,
-            positionGains=feedback.kp,
-            velocityGains=feedback.kd,
+            positionGains=feedback.parameters.kp,
+            velocityGains=feedback.parameters.kd,
             forces=limit,
             physicsClientId=self._client,
         )

@@ -135,9 +135,9 @@ def _skeleton(scenario: Scenario) -> Any:
     if feedback is not None:
         for i, driven in enumerate(model.actuator_joint):
             joint = skeleton.getJoint(int(driven))
-            joint.setSpringStiffness(0, float(feedback.kp[i]))
+            joint.setSpringStiffness(0, float(feedback.parameters.kp[i]))
             joint.setRestPosition(0, float(-model.reference[driven]))
-            joint.setDampingCoefficient(0, float(feedback.kd[i] + model.damping[driven]))
+            joint.setDampingCoefficient(0, float(feedback.parameters.kd[i] + model.damping[driven]))
     skeleton.disableSelfCollisionCheck()
     return skeleton
 

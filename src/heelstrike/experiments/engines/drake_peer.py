@@ -139,7 +139,7 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
     pose = math.RigidTransform
     damping = model.damping.copy()
     if feedback is not None:
-        damping[model.actuator_joint] += feedback.kd
+        damping[model.actuator_joint] += feedback.parameters.kd
     bodies: list[Any] = []
     joints: list[Any] = []
     for i, link in enumerate(links(robot)):
@@ -175,7 +175,7 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
         if feedback is not None:
             spring = tree.RevoluteSpring if model.axis[driven, 0] else tree.PrismaticSpring
             rest = float(-model.reference[driven])
-            plant.AddForceElement(spring(joints[driven], rest, float(feedback.kp[i])))
+            plant.AddForceElement(spring(joints[driven], rest, float(feedback.parameters.kp[i])))
     return bodies
 
 
@@ -184,12 +184,16 @@ def _commands(scenario: Scenario) -> Any:
     feedback = scenario.feedback
     if feedback is None:
         return primitives.ConstantVectorSource(np.zeros(scenario.robot.nu))
-    if len(feedback.begins) == 1 and feedback.coefficients.shape[2] == 1:
+    if len(feedback.parameters.begins) == 1 and feedback.parameters.coefficients.shape[2] == 1:
         return primitives.ConstantVectorSource(feedback.command([0.0])[0])
     pieces = [
-        np.array([[polynomial.Polynomial(row)] for row in piece]) for piece in feedback.coefficients
+        np.array([[polynomial.Polynomial(row)] for row in piece])
+        for piece in feedback.parameters.coefficients
     ]
-    breaks = [*feedback.begins, max(2.0 * scenario.duration, 2.0 * feedback.begins[-1])]
+    breaks = [
+        *feedback.parameters.begins,
+        max(2.0 * scenario.duration, 2.0 * feedback.parameters.begins[-1]),
+    ]
     return primitives.TrajectorySource(trajectories.PiecewisePolynomial(pieces, breaks))
 
 

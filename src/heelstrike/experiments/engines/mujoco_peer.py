@@ -158,7 +158,7 @@ def _spec(scenario: Scenario) -> Any:
     for i, actuator in enumerate(spec.actuators):
         if feedback is not None:
             actuator.biastype = mujoco.mjtBias.mjBIAS_AFFINE
-            actuator.biasprm[:3] = 0.0, -feedback.kp[i], -feedback.kd[i]
+            actuator.biasprm[:3] = 0.0, -feedback.parameters.kp[i], -feedback.parameters.kd[i]
         actuator.ctrllimited = 0
         actuator.forcelimited = int(np.isfinite(limits.torque_upper[i]))
         if actuator.forcelimited:

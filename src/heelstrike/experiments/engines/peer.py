@@ -261,6 +261,6 @@ def _commands(scenario: Scenario, step: float, steps: int) -> Floats:
     feedback = scenario.feedback
     if feedback is None:
         return np.zeros((1, scenario.robot.nu))
-    if feedback.coefficients.shape[2] == 1 and len(feedback.begins) == 1:
+    if feedback.parameters.coefficients.shape[2] == 1 and len(feedback.parameters.begins) == 1:
         return feedback.command([0.0])  # it never changes
     return feedback.command(step * np.arange(steps))

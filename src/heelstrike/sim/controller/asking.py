@@ -1,4 +1,4 @@
-"""How compiled loops ask a compiled controller for torques."""
+"""How compiled loops ask a controller for torques."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.compilation import dissolved_kernel
-from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.controller.control import CHANGED, OVERRAN, WATCHED, Control
-from heelstrike.sim.controller.guard import imprint, intact
+from heelstrike.compiler.bundle import address_of
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import copy_words
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.controller.control import OVERRAN, TRUSTED, Control
+from heelstrike.sim.controller.guard import intact, intact_between
 from heelstrike.sim.memory import Memory
 
 
@@ -19,7 +21,7 @@ def ask(
     memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for its torques; they are no number if it wrote where it may not."""
-    _ask(controller, control, control.kept, time, q, v, model, memory, torque)
+    _ask(controller, control, control.kept, control.kept_at, time, q, v, model, memory, torque)
 
 
 @dissolved_kernel
@@ -30,25 +32,56 @@ def consult(
     """Ask a controller for the torques it would want, were this its next call; it forgets that."""
     for i in range(control.kept.shape[0]):
         control.spare[i] = control.kept[i]
-    _ask(controller, control, control.spare, time, q, v, model, memory, torque)
+    _ask(controller, control, control.spare, control.spare_at, time, q, v, model, memory, torque)
 
 
 @dissolved_kernel
 def _ask(
-    controller: Any, control: Control, kept: Floats, time: float, q: Floats, v: Floats,
-    model: Model, memory: Memory, torque: Floats,
+    controller: Any, control: Control, kept: Integers, kept_at: int, time: float, q: Floats,
+    v: Floats, model: Model, memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
-    watched = control.conduct == WATCHED
-    before = imprint(q, v, memory.contacts) if watched else 0
+    state = control.state
+    for i in range(q.shape[0]):
+        state.q[i] = q[i]
+    for i in range(v.shape[0]):
+        state.v[i] = v[i]
+    for i in range(model.actuator_joint.shape[0]):
+        joint = model.actuator_joint[i]
+        state.joint_position[i] = q[joint]
+        state.joint_velocity[i] = v[joint]
+    if control.conduct != TRUSTED:
+        _show_copies(control, memory)
     controller(
-        time, q, v, memory.contacts, model, memory.tree, memory.scratch, control.parameters, kept,
-        torque,
+        time, address_of(state), address_of(control.contacts), address_of(control.robot),
+        control.parameters_at, kept_at, torque,
     )  # fmt: skip
     spoilt = not (intact(torque) and intact(kept) and intact(control.parameters))
+    if control.conduct != TRUSTED and not spoilt:
+        spoilt = not (
+            intact_between(kept, control.between_kept)
+            and intact_between(control.parameters, control.between_parameters)
+        )
     if spoilt:
         control.conduct = OVERRAN
-    if watched and imprint(q, v, memory.contacts) != before:
-        control.conduct = CHANGED
-        spoilt = True
-    if spoilt and torque.size > 0:
-        torque[0] = np.nan
+        if torque.size > 0:
+            torque[0] = np.nan
+
+
+@kernel
+def _show_copies(control: Control, memory: Memory) -> None:
+    """Copy kinematics and contacts: what a controller does to them harms nobody."""
+    tree, own = memory.tree, control.state.kinematics
+    copy_words(tree.angle, own.angle)
+    copy_words(tree.cosine, own.cosine)
+    copy_words(tree.sine, own.sine)
+    copy_words(tree.origin, own.origin)
+    copy_words(tree.pivot, own.pivot)
+    copy_words(tree.motion, own.motion)
+    copy_words(tree.velocity, own.velocity)
+    copy_words(tree.bias_acceleration, own.bias_acceleration)
+    copy_words(tree.inertia, own.inertia)
+    contacts, seen = memory.contacts, control.contacts
+    copy_words(contacts.position, seen.position)
+    copy_words(contacts.normal, seen.normal)
+    copy_words(contacts.gap, seen.gap)
+    copy_words(contacts.force, seen.force)

@@ -12,15 +12,12 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle
-from heelstrike.compiler.compilation import dissolved_kernel
-from heelstrike.robot.model import Floats
-from heelstrike.sim.controller.interface import Contacts
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.compiler.words import word_at
+from heelstrike.robot.model import Integers
 
 ZONE = 64
 """Guard words on either side of an array."""
@@ -36,59 +33,76 @@ _ZONE = np.full(ZONE, GUARD, dtype=np.int64).tobytes()
 _Some = TypeVar("_Some", bound=Bundle)
 
 
-def guarded(values: ArrayLike) -> Floats:
-    """Copy numbers into an array of the same shape with guard words round it."""
-    array = np.asarray(values, dtype=np.float64)
-    block = np.full(array.size + 2 * ZONE, GUARD, dtype=np.int64)
-    # A slice of no words would lie at the beginning.
-    inside: Floats = np.ndarray(array.shape, np.float64, block, ZONE * block.itemsize)
+def guarded(array: NDArray[Any]) -> NDArray[Any]:
+    """Copy an array of 64-bit numbers into one of the same shape with guard words round it."""
+    words = np.full(array.size + 2 * ZONE, GUARD, dtype=np.int64)
+    return _inside(words, ZONE, array)
+
+
+def guarded_bundle(bundle: _Some) -> _Some:
+    """Copy a bundle, each array with guard words round it."""
+    return bundle.stored(lambda _, array: guarded(array))
+
+
+def in_one_block(bundle: _Some) -> tuple[_Some, Integers, Integers]:
+    """Copy a bundle into one block of words, with guard words round each array.
+
+    Returns
+    -------
+    bundle : Bundle
+        The copy.
+    block : (n,) int
+        Its words from the first to the last, with the guard words between its arrays.
+    between : (k,) int
+        Where in the block the guard words are that are next to an array.
+    """
+    sizes = [array.size for _, array in bundle.storage()] or [0]
+    ends = np.cumsum(np.add(sizes, ZONE))
+    words = np.full(ends[-1] + ZONE, GUARD, dtype=np.int64)
+    begins = iter((ends - sizes).tolist())
+    near = np.arange(NEAR)
+    between = [np.concatenate((end - ZONE + near, end - 1 - near)) for end in ends[:-1]]
+    return (
+        bundle.stored(lambda _, array: _inside(words, next(begins), array)),
+        _words(words, ZONE, (words.size - 2 * ZONE,), words.dtype),
+        np.array(between, dtype=np.int64).ravel(),
+    )
+
+
+def _inside(words: Integers, place: int, array: NDArray[Any]) -> NDArray[Any]:
+    """Copy an array to a place among words."""
+    inside = _words(words, place, array.shape, array.dtype)
     inside[...] = array
     return inside
 
 
-def guarded_bundle(bundle: _Some) -> _Some:
-    """Copy a bundle of arrays of floats, each with guard words round it."""
-    return type(bundle)(**{name: guarded(array) for name, array in bundle.members().items()})
+def _words(words: Integers, place: int, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+    """Return some of the words; a slice of none would lie at the beginning."""
+    return np.ndarray(shape, dtype, words, place * words.itemsize)
 
 
-def trespasses(name: str, array: Floats) -> Iterator[str]:
+def trespasses(name: str, array: NDArray[Any]) -> Iterator[str]:
     """Tell where a controller wrote round a guarded array, and mend it."""
     words: Any = array.base
-    if words[:ZONE].tobytes() == _ZONE and words[ZONE + array.size :].tobytes() == _ZONE:
-        return
-    for place in np.flatnonzero(words != GUARD).tolist():
-        if not ZONE <= place < ZONE + array.size:
-            yield f"{name}{_index(place - ZONE, array)} of shape {array.shape}"
-    words[:ZONE] = GUARD
-    words[ZONE + array.size :] = GUARD
+    first = (array.ctypes.data - words.ctypes.data) // words.itemsize
+    for begin, offset in ((first - ZONE, -ZONE), (first + array.size, array.size)):
+        zone = words[begin : begin + ZONE]
+        if zone.tobytes() != _ZONE:
+            for place in np.flatnonzero(zone != GUARD).tolist():
+                yield f"{name}{_index(place + offset, array)} of shape {array.shape}"
+            zone[:] = GUARD
 
 
-def _index(place: int, array: Floats) -> list[int]:
+def _index(place: int, array: NDArray[Any]) -> list[int]:
     """Index of the word so many after the first of an array."""
     if array.ndim < 2 or not array.shape[1]:
         return [place]
     return [place // array.shape[1], place % array.shape[1]]
 
 
-def _word_at(context: Any, array: Any, place: Any) -> Any:
-    del context, place
-    signature = types.int64(array, types.int64)
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        data = context.make_array(signature.args[0])(context, builder, values[0]).data
-        words = builder.bitcast(data, ir.IntType(64).as_pointer())
-        return builder.load(builder.gep(words, [values[1]]))
-
-    return signature, generate
-
-
-word_at: Any = intrinsic(_word_at)
-"""``word_at(array, place)``: bits of the word so many after the first, inside the array or not."""
-
-
 @dissolved_kernel
-def intact(array: Floats) -> bool:
-    """Whether the guard words next to a guarded array are what they were."""
+def intact(array: Any) -> bool:
+    """Whether the guard words next to a guarded array, or block, are what they were."""
     size = array.size
     for i in range(NEAR):
         if word_at(array, size + i) != GUARD or word_at(array, -1 - i) != GUARD:
@@ -96,18 +110,10 @@ def intact(array: Floats) -> bool:
     return True
 
 
-@dissolved_kernel
-def imprint(q: Floats, v: Floats, contacts: Contacts) -> int:
-    """Sum of the bits of state and contacts: another number when one of them has changed."""
-    total = 0
-    for i in range(q.size):
-        total += word_at(q, i)
-    for i in range(v.size):
-        total += word_at(v, i)
-    for i in range(contacts.gap.size):
-        total += word_at(contacts.gap, i)
-        for k in range(2):
-            total += word_at(contacts.position, 2 * i + k)
-            total += word_at(contacts.normal, 2 * i + k)
-            total += word_at(contacts.force, 2 * i + k)
-    return total
+@kernel
+def intact_between(block: Integers, between: Integers) -> bool:
+    """Whether the guard words next to the arrays within a block are what they were."""
+    same = True
+    for i in range(between.shape[0]):
+        same = same and block[between[i]] == GUARD
+    return same

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller.control import CHANGED, OVERRAN, TRUSTED, Control
+from heelstrike.sim.controller.control import OVERRAN, TRUSTED, ReadyLaw
 from heelstrike.sim.controller.guard import trespasses
 from heelstrike.sim.memory import Memory
 
@@ -20,26 +20,17 @@ class Watch:
     ----------
     robot : Robot
         The robot, whose numbers are copied.
-    control : Control
-        The controller's own numbers.
+    law : ReadyLaw
+        The controller.
     memory : Memory
         Memory of the simulation.
     """
 
-    def __init__(self, robot: Robot, control: Control, memory: Memory) -> None:
+    def __init__(self, robot: Robot, law: ReadyLaw, memory: Memory) -> None:
         self._robot = robot
-        self._control = control
+        self._control = law.control
         self._numbers = numbers_of(robot)
-        self._arrays = {
-            "torque": memory.torque,
-            "parameters": control.parameters,
-            "memory": control.kept,
-            "q": memory.q,
-            "v": memory.v,
-        }
-        for name in ("contacts", "tree", "scratch"):
-            for field, values in getattr(memory, name).members().items():
-                self._arrays[f"{name}.{field}"] = values
+        self._arrays = [("torque", memory.torque), *law.arrays()]
 
     def misdeed(self) -> str | None:
         """Say what the controller did that it may not, and undo what can be undone."""
@@ -49,16 +40,11 @@ class Watch:
         changed = restored(self._robot, self._numbers)
         if changed:
             return f"changed the robot: {changed}"
-        arrays = [*self._arrays.items(), ("memory", control.spare)]
-        places = [place for name, values in arrays for place in trespasses(name, values)]
+        places = [place for name, values in self._arrays for place in trespasses(name, values)]
         if places:
             more = f" (and {len(places) - 1} more)" if len(places) > 1 else ""
             return f"wrote beyond its arrays, to {places[0]}{more}"
-        if control.conduct == OVERRAN:
-            return "wrote beyond its arrays"
-        if control.conduct == CHANGED:
-            return "changed the state or the contacts it was shown, which are the simulation's"
-        return None
+        return "wrote beyond its arrays" if control.conduct == OVERRAN else None
 
 
 def numbers_of(robot: Robot) -> dict[str, Any]:

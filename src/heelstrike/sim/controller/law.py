@@ -1,0 +1,368 @@
+"""``@controller``: control laws as functions of named parameters and memory."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable, Mapping
+from functools import cached_property, update_wrapper
+from typing import Any, get_type_hints, overload
+
+import numpy as np
+from numba import types
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.compiler.bundle import Bundle, bundle_at
+from heelstrike.compiler.compilation import CompileError, is_ours, kernel, within_bounds
+from heelstrike.compiler.separate_kernel import SeparateKernel
+from heelstrike.errors import ControllerError
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.controller.in_python import AskedLaw
+from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState, extents_of
+
+# Time, then where state, contacts, robot, parameters and memory are, and the torques: the same
+# for all, so that one compiled loop serves every controller.
+CONTROLLER_SIGNATURE = types.void(types.float64, *[types.int64] * 5, types.float64[::1])
+CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
+
+
+class ControllerFunction:
+    """What :func:`controller` makes of a function: called with parameters, it returns a law.
+
+    Parameters
+    ----------
+    function : callable
+        The function, or one that Numba has compiled.
+    compiles : bool
+        Whether it runs inside the compiled loop.
+    scope : mapping of str to object
+        Where the names in its annotations are looked up first.
+    """
+
+    def __init__(
+        self, function: Callable[..., None], compiles: bool, scope: Mapping[str, Any]
+    ) -> None:
+        self.python: Callable[..., None] = getattr(function, "py_func", function)
+        update_wrapper(self, self.python)
+        self.function = function
+        self.compiles = compiles
+        self.is_ours = is_ours(self.python)
+        self.arguments = list(inspect.signature(self.python).parameters)
+        strange = [name for name in self.arguments if name not in ARGUMENTS]
+        if strange or "torque" not in self.arguments:
+            raise ControllerError(
+                f"controller {self.name!r} takes ({', '.join(self.arguments)}); it can take "
+                f"{', '.join(ARGUMENTS)}, of which all but torque may be left out"
+            )
+        self.parameters = self._bundle("parameters", scope)
+        self.memory = self._bundle("memory", scope)
+
+    def _bundle(self, name: str, scope: Mapping[str, Any]) -> type[Bundle]:
+        """Class of the parameters or of the memory, as the function is annotated."""
+        if name not in self.arguments:
+            return Bundle
+
+        def annotated() -> None: ...
+
+        hint = inspect.signature(self.python).parameters[name].annotation
+        annotated.__annotations__ = {name: hint}
+        try:
+            found: Any = get_type_hints(annotated, self.python.__globals__, dict(scope))[name]
+        except NameError as error:
+            found = error
+        if not (isinstance(found, type) and issubclass(found, Bundle)):
+            raise ControllerError(
+                f"controller {self.name!r} must say what its {name} are: annotate the argument "
+                f"with a class of heelstrike.Bundle, as in {name}: {name.capitalize()}; got "
+                f"{found!r}"
+            )
+        bundle: type[Bundle] = found
+        return bundle
+
+    @property
+    def name(self) -> str:
+        """What it is called in messages."""
+        return self.python.__name__
+
+    def __call__(
+        self,
+        parameters: Bundle | None = None,
+        *,
+        memory: Mapping[str, Any] | None = None,
+        robot: Robot | None = None,
+        stiffness: ArrayLike | None = None,
+        damping: ArrayLike | None = None,
+    ) -> Law:
+        """Return the law with these parameters; see :class:`Law`."""
+        return Law(
+            self, parameters, memory=memory, robot=robot, stiffness=stiffness, damping=damping
+        )
+
+    def __reduce__(self) -> str:
+        """Copies and pickles are the one of that name, in any process: machine code stays here."""
+        return self.python.__qualname__
+
+    def begin(self) -> None:
+        """Have another process compile it meanwhile, where that is worth it."""
+        if self.is_ours and self.compiles:
+            self._separate.begin()
+
+    def finish(self) -> Any:
+        """Compile it, or load its machine code, in the form that loops call.
+
+        Raises
+        ------
+        ControllerError
+            If it cannot be compiled.
+        """
+        try:
+            return self._separate.finish()
+        except CompileError as error:
+            raise ControllerError(
+                f"controller {self.name!r} cannot be compiled; @controller(compile=False) runs it "
+                f"in Python. {error}"
+            ) from error
+
+    @cached_property
+    def _separate(self) -> SeparateKernel:
+        # Stock controllers have tests that see to their indices.
+        function = kernel(self.function) if self.is_ours else within_bounds(self.function)
+        return SeparateKernel(
+            _called_by_address(self, function),
+            lambda: CONTROLLER_SIGNATURE,
+            boundscheck=not self.is_ours,
+        )
+
+
+def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., None]:
+    """Return what loops call: it finds the bundles at their addresses and calls the function."""
+    kinds: dict[str, Any] = {
+        "state": ControlState,
+        "contacts": Contacts,
+        "robot": ControlledRobot,
+        "parameters": law.parameters.settable(),
+        "memory": law.memory.settable(),
+    }
+    given = (f"{name}_at({name})" if name in kinds else name for name in law.arguments)
+    text = f"def call({', '.join(ARGUMENTS)}): function({', '.join(given)})"
+    scope = {f"{name}_at": bundle_at(kind) for name, kind in kinds.items()}
+    scope |= {"function": function, "__name__": law.python.__module__}
+    # Machine code is kept beside the file of the function, under its name.
+    place = law.python.__code__
+    exec(compile(text, place.co_filename, "exec"), scope)
+    call: Any = scope["call"]
+    call.__code__ = call.__code__.replace(co_firstlineno=place.co_firstlineno)
+    call.__name__, call.__qualname__ = law.python.__name__, law.python.__qualname__
+    called: Callable[..., None] = call
+    return called
+
+
+@overload
+def controller(function: Callable[..., None], /) -> ControllerFunction: ...
+
+
+@overload
+def controller(*, compile: bool = True) -> Callable[[Callable[..., None]], ControllerFunction]: ...
+
+
+def controller(function: Callable[..., None] | None = None, /, *, compile: bool = True) -> Any:
+    """Make a function a control law that runs inside the compiled loop.
+
+    The function takes ``(t, state, contacts, robot, parameters, memory, torque)``, or those of them
+    that it needs, and writes the joint torques (nu,), in N m, into `torque`. `parameters` and
+    `memory` are bundles of its own, which their annotations name. What the function makes when it
+    is called with parameters is a controller for :func:`heelstrike.simulate`.
+
+    Its own indices are checked, those of the functions it calls are not: an index beyond an array
+    raises IndexError, which like any exception ends the run; ``simulate(..., checked=True)`` names
+    the array and the index. To do without, hand over a function compiled with ``numba.njit``.
+
+    Parameters
+    ----------
+    function : callable
+        ``t`` is the time in s; ``state`` has `q` (nq,), `v` (nv,), `joint_position` (nu,) and
+        `joint_velocity` (nu,), copies of the robot's; ``contacts`` has `position`, `normal`, `gap`
+        and `force` of the contact points; ``robot`` has the sizes `nq`, `nv`, `nu`, `nc`, `nl`, its
+        `model`, and queries such as ``robot.gravity_force(state, torque)``, see
+        :class:`~heelstrike.control.ControlledRobot`.
+    compile : bool
+        False runs the function as it is, in Python, where a debugger can stop in it.
+
+    Raises
+    ------
+    ControllerError
+        If the arguments of the function are others, or its bundles are not known.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import heelstrike as hs
+    >>> class Gains(hs.Bundle):
+    ...     kp: np.ndarray = hs.array("nu")
+    ...     kd: np.ndarray = hs.array("nu")
+    >>> @hs.controller(compile=False)
+    ... def stand(state, robot, parameters: Gains, torque):
+    ...     robot.gravity_force(state, torque)
+    ...     torque -= parameters.kp * state.joint_position + parameters.kd * state.joint_velocity
+    >>> robot = hs.load_robot("bravo7")
+    >>> law = stand(Gains(kp=np.full(6, 600.0), kd=np.full(6, 10.0)))
+    >>> start = robot.reference_state()
+    >>> hs.simulate(robot, law, state=start, duration=0.01, control_period=0.005).completed
+    True
+    """
+    scope = sys._getframe(1).f_locals
+
+    def make(function: Callable[..., None]) -> ControllerFunction:
+        return ControllerFunction(function, compile, scope)
+
+    return make if function is None else make(function)
+
+
+class Law:
+    """A controller: a function made by :func:`controller`, with its parameters.
+
+    Parameters
+    ----------
+    function : ControllerFunction
+        What decides the torques.
+    parameters : Bundle, optional
+        Its numbers; required if the function takes parameters.
+    memory : mapping of str to number or array, optional
+        What its memory begins with, by name of the members; what is not named begins as zero.
+        Extents of arrays that are not the robot's are given likewise.
+    robot : Robot, optional
+        Needed only to call :meth:`torque` oneself.
+    stiffness, damping : (nu,) float, optional
+        Gains −∂Γ/∂q and −∂Γ/∂v of each actuator on its own joint (N m, N m s), for schemes that
+        take stiff forces implicitly.
+
+    Raises
+    ------
+    ControllerError
+        If the parameters are not those that the function takes.
+    """
+
+    def __init__(
+        self,
+        function: ControllerFunction,
+        parameters: Bundle | None = None,
+        *,
+        memory: Mapping[str, Any] | None = None,
+        robot: Robot | None = None,
+        stiffness: ArrayLike | None = None,
+        damping: ArrayLike | None = None,
+    ) -> None:
+        parameters = Bundle() if parameters is None else parameters
+        if not isinstance(parameters, function.parameters):
+            wanted = "none" if function.parameters is Bundle else function.parameters.__name__
+            raise ControllerError(
+                f"controller {function.name!r} takes {wanted} as parameters, got "
+                f"{type(parameters).__name__}"
+            )
+        self.function = function
+        self.parameters: Any = parameters
+        self.memory = dict(memory or {})
+        self.robot = robot
+        self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
+        self.damping = None if damping is None else np.asarray(damping, dtype=np.float64)
+        self._asked: AskedLaw | None = None
+
+    def with_parameters(self, parameters: Bundle) -> Law:
+        """Return the same law with other parameters."""
+        return Law(
+            self.function, parameters, memory=self.memory, robot=self.robot,
+            stiffness=self.stiffness, damping=self.damping,
+        )  # fmt: skip
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return its parameters, and a memory to begin with, for a robot; all can be set.
+
+        Raises
+        ------
+        ControllerError
+            If they do not fit the robot.
+        """
+        extents = extents_of(robot)
+        try:
+            self.parameters.check(extents)
+            memory = self.function.memory.settable().allocate(**extents | self.memory)
+            memory.check(extents)
+        except TypeError as error:
+            raise ControllerError(
+                f"controller {self.function.name!r} does not fit robot {robot.name!r}: {error}"
+            ) from error
+        return type(self.parameters).settable()(**self.parameters.members()), memory
+
+    def reset(self) -> None:
+        """Forget what :meth:`torque` has been asked; runs begin anew by themselves."""
+        self._asked = None
+
+    def torque(self, t: float, state: State, contacts: Contacts | None) -> NDArray[np.float64]:
+        """Return the joint torques (nu,), in N m; at t = 0 it begins anew.
+
+        Raises
+        ------
+        ControllerError
+            If the law was made without `robot`.
+        """
+        if self.robot is None:
+            raise ControllerError(
+                f"controller {self.function.name!r} does not know its robot; make it with robot=, "
+                "or simulate with it"
+            )
+        if self._asked is None or t <= 0.0:
+            self._asked = AskedLaw(self.robot, self, compiled=self.function.compiles)
+        return self._asked.torque(t, state, contacts)
+
+    @property
+    def remembered(self) -> Any:
+        """Memory of the calls of :meth:`torque`; None before the first."""
+        return None if self._asked is None else self._asked.numbers.memory
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave what holds places in this process."""
+        return self.__dict__ | {"_asked": None}
+
+
+@controller
+def no_torque(torque: Floats) -> None:
+    """Apply no torque."""
+    for i in range(torque.shape[0]):
+        torque[i] = 0.0
+
+
+def law_of(controller: Controller | None, *, begin: bool = False) -> Law | None:
+    """Return the law that a controller is; None if it is an object of Python.
+
+    Parameters
+    ----------
+    controller : Controller or None
+        None applies no torque.
+    begin : bool
+        Whether a stock one shall be compiled by another process meanwhile.
+
+    Raises
+    ------
+    ControllerError
+        If it is no controller at all.
+    """
+    if controller is None:
+        return Law(no_torque)
+    if isinstance(controller, Law):
+        if begin:
+            controller.function.begin()
+        return controller
+    if isinstance(controller, ControllerFunction):
+        raise ControllerError(
+            f"controller {controller.name!r} has no parameters yet: call it with them, as in "
+            f"{controller.name}({'...' if 'parameters' in controller.arguments else ''})"
+        )
+    if not callable(getattr(controller, "torque", None)):
+        raise ControllerError(
+            f"a controller needs a method torque(t, state, contacts), "
+            f"{type(controller).__name__} has none"
+        )
+    return None
