@@ -33,7 +33,7 @@ def _copy_words(context: Any, source: Any, target: Any) -> Any:
         pairs = zip(signature.args, values, strict=True)
         found = [context.make_array(kind)(context, builder, value) for kind, value in pairs]
         byte = ir.IntType(8).as_pointer()
-        copy = builder.module.declare_intrinsic("llvm.memcpy", (byte, byte, ir.IntType(64)))
+        copy = builder.module.declare_intrinsic("llvm.memcpy", [byte, byte, ir.IntType(64)])
         ends = [builder.bitcast(array.data, byte) for array in reversed(found)]
         size = builder.mul(found[0].nitems, found[0].itemsize)
         builder.call(copy, [*ends, size, ir.Constant(ir.IntType(1), 0)])
