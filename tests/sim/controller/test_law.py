@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import pickle
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 import walking
+from robot_cases import builtin_xml
 
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.compiler.compilation import made_of
 from heelstrike.control.computed_torque import computed_torque
+from heelstrike.robot import read_mjcf
 from heelstrike.sim.controller import stance
 from heelstrike.sim.method import Method
 
@@ -205,6 +208,40 @@ def test_queries_answer_as_the_functions_of_dynamics_do(compiled: bool) -> None:
     assert set(expected) == set(Answers.declared)
     for name, value in expected.items():
         np.testing.assert_allclose(getattr(found, name), value, atol=1e-11, err_msg=name)
+
+
+@hs.controller
+def upright(state: Any, robot: Any, torque: Any) -> None:
+    """Torques that would bear the weight, were all coordinates zero."""
+    seen = robot.estimate
+    for j in range(robot.nq):
+        seen.q[j] = 0.0
+    robot.update(seen)
+    robot.gravity_force(seen, torque)
+
+
+def test_an_estimated_state_is_asked_about_like_the_true_one() -> None:
+    robot = walking.bravo7()
+    state = walking.gait().initial_state
+    torque = upright(robot=robot).torque(0.0, state, None)
+    still = dynamics.bias_force(robot, np.zeros(9), np.zeros(9))
+    np.testing.assert_allclose(torque, still[robot.model.actuator_joint], atol=1e-11)
+    assert np.abs(still - dynamics.bias_force(robot, state.q, 0.0 * state.v)).max() > 1.0
+
+
+@hs.controller
+def stand_flat(state: Any, robot: Any, torque: Any) -> None:
+    """Hold the joints still, on a flat foot."""
+    robot.flat_foot_torque(state, 0, torque, torque)
+
+
+def test_a_robot_that_no_flat_foot_holds_gets_no_torque() -> None:
+    robot = walking.bravo7()
+    assert np.all(np.isfinite(stand_flat(robot=robot).torque(0.0, robot.reference_state(), None)))
+    xml = re.sub(r'\s*<motor name="\w+_ankle".*', "", builtin_xml("bravo7"))
+    loose = read_mjcf(xml, name="bravo7")
+    torque = stand_flat(robot=loose).torque(0.0, loose.reference_state(), None)
+    assert np.all(np.isnan(torque))
 
 
 def test_what_is_no_controller_is_refused() -> None:
