@@ -123,6 +123,18 @@ def test_parameters_are_set_as_a_whole_or_one_by_one(outside: Any) -> None:
         one.parameters = outside.Gains(kp=np.ones(1), kd=np.ones(1), lean=0.0)
 
 
+def test_memory_begins_as_asked_and_gains_are_told(outside: Any) -> None:
+    law = outside.stand(gains(outside), memory={"calls": 1000}, stiffness=7.0, damping=np.ones(6))
+    plain, told = simulation(outside.stand(gains(outside))), simulation(law)
+    driven = walking.bravo7().model.actuator_joint
+    assert np.all((told._memory.stiffness - plain._memory.stiffness)[driven] == 7.0)
+    assert np.all((told._memory.damping - plain._memory.damping)[driven] == 1.0)
+    for each in (plain, told):
+        each.step()
+    difference = plain.record.torque[0] - told.record.torque[0]
+    np.testing.assert_allclose(difference, 1.0, atol=1e-9)
+
+
 def test_a_law_is_copied_by_pickle(outside: Any) -> None:
     law = pickle.loads(pickle.dumps(outside.stand(gains(outside))))
     assert law.function is outside.stand
@@ -281,5 +293,9 @@ def test_parameters_must_be_those_of_the_function_and_fit_the_robot(outside: Any
         simulation(outside.stand(few))
     with pytest.raises(hs.ControllerError, match=r"call it with them, as in stand\(\.\.\.\)"):
         simulation(outside.stand)
+    with pytest.raises(hs.ControllerError, match="memory of controller 'stand' has no steps"):
+        outside.stand(gains(outside), memory={"steps": 1})
+    with pytest.raises(hs.ControllerError, match=r"damping must be one number or 6"):
+        simulation(outside.stand(gains(outside), damping=np.ones(2)))
     with pytest.raises(hs.ControllerError, match="does not know its robot"):
         outside.stand(gains(outside)).torque(0.0, walking.bravo7().reference_state(), None)
