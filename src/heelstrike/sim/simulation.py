@@ -491,7 +491,7 @@ class Simulation:
         law = law_of(controller)
         self._controller = controller
         self._python: Any = controller if law is None else None
-        if law is not None and controller is not None:  # a law of somebody's
+        if law is not None and controller is not None:
             in_python = setting.checked or not law.function.compiles
             self._python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
         memory = self._memory
