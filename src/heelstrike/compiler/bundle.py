@@ -330,6 +330,18 @@ class Bundle:
                 )
 
     @classmethod
+    def extents(cls) -> set[str]:
+        """Names of the extents of its arrays, and of those of its parts."""
+        found = {
+            _parsed(each)[1]
+            for member in cls.declared.values()
+            for each in member.shape
+            if isinstance(each, str)
+        }
+        parts: Any = (member.kind for member in cls.declared.values() if member.role == "part")
+        return found.union(*(part.extents() for part in parts))
+
+    @classmethod
     def settable(cls: type[_Some]) -> type[_Some]:
         """Return a class of the same members whose numbers are cells, and so can be set."""
         return _settable(cls)  # type: ignore[arg-type]

@@ -490,28 +490,24 @@ class Simulation:
         robot, setting = self.robot, self._setting
         law = law_of(controller)
         self._controller = controller
-        self._python: Any = None
-        self._shown = read_only(self._memory.contacts)
+        self._python: Any = controller if law is None else None
+        if law is not None and controller is not None:
+            in_python = setting.checked or not law.function.compiles
+            self._python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
         memory = self._memory
+        compiled = Law(no_torque) if law is None or self._python is not None else law
+        ready = ReadyLaw(robot, compiled, memory.tree, memory.contacts)
+        self._numbers = self._python.numbers if isinstance(self._python, AskedLaw) else ready
+        self._kernel, self._control = compiled.function.finish(), ready.control
+        self._name = f"{type(controller).__name__}.torque"
+        self._shown = read_only(memory.contacts)
         memory.stiffness[:] = robot.model.stiffness
         memory.damping[:] = robot.model.damping
-        if law is None:
-            law, self._python = Law(no_torque), controller
-            self._name = f"{type(controller).__name__}.torque"
-        else:
-            driven = robot.model.actuator_joint
-            if law.stiffness is not None:
-                memory.stiffness[driven] += law.stiffness
-            if law.damping is not None:
-                memory.damping[driven] += law.damping
+        if law is not None:
             self._name = f"controller {law.function.name!r}"
-            if controller is not None and (setting.checked or not law.function.compiles):
-                self._python = AskedLaw(robot, law, checked=setting.checked)
-                law = Law(no_torque)
-        ready = ReadyLaw(robot, law, memory.tree, memory.contacts)
-        self._kernel = law.function.finish()
-        self._control = ready.control
-        self._numbers = self._python.numbers if isinstance(self._python, AskedLaw) else ready
+            driven = robot.model.actuator_joint
+            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
+            memory.damping[driven] += 0.0 if law.damping is None else law.damping
         if self._python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import pickle
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 import walking
+from robot_cases import builtin_xml
 
 import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.compiler.compilation import made_of
 from heelstrike.control.computed_torque import computed_torque
+from heelstrike.robot import read_mjcf
 from heelstrike.sim.controller import stance
 from heelstrike.sim.method import Method
 
@@ -120,6 +123,18 @@ def test_parameters_are_set_as_a_whole_or_one_by_one(outside: Any) -> None:
         one.parameters = outside.Gains(kp=np.ones(1), kd=np.ones(1), lean=0.0)
 
 
+def test_memory_begins_as_asked_and_gains_are_told(outside: Any) -> None:
+    law = outside.stand(gains(outside), memory={"calls": 1000}, stiffness=7.0, damping=np.ones(6))
+    plain, told = simulation(outside.stand(gains(outside))), simulation(law)
+    driven = walking.bravo7().model.actuator_joint
+    assert np.all((told._memory.stiffness - plain._memory.stiffness)[driven] == 7.0)
+    assert np.all((told._memory.damping - plain._memory.damping)[driven] == 1.0)
+    for each in (plain, told):
+        each.step()
+    difference = plain.record.torque[0] - told.record.torque[0]
+    np.testing.assert_allclose(difference, 1.0, atol=1e-9)
+
+
 def test_a_law_is_copied_by_pickle(outside: Any) -> None:
     law = pickle.loads(pickle.dumps(outside.stand(gains(outside))))
     assert law.function is outside.stand
@@ -207,6 +222,40 @@ def test_queries_answer_as_the_functions_of_dynamics_do(compiled: bool) -> None:
         np.testing.assert_allclose(getattr(found, name), value, atol=1e-11, err_msg=name)
 
 
+@hs.controller
+def upright(state: Any, robot: Any, torque: Any) -> None:
+    """Torques that would bear the weight, were all coordinates zero."""
+    seen = robot.estimate
+    for j in range(robot.nq):
+        seen.q[j] = 0.0
+    robot.update(seen)
+    robot.gravity_force(seen, torque)
+
+
+def test_an_estimated_state_is_asked_about_like_the_true_one() -> None:
+    robot = walking.bravo7()
+    state = walking.gait().initial_state
+    torque = upright(robot=robot).torque(0.0, state, None)
+    still = dynamics.bias_force(robot, np.zeros(9), np.zeros(9))
+    np.testing.assert_allclose(torque, still[robot.model.actuator_joint], atol=1e-11)
+    assert np.abs(still - dynamics.bias_force(robot, state.q, 0.0 * state.v)).max() > 1.0
+
+
+@hs.controller
+def stand_flat(state: Any, robot: Any, torque: Any) -> None:
+    """Hold the joints still, on a flat foot."""
+    robot.flat_foot_torque(state, 0, torque, torque)
+
+
+def test_a_robot_that_no_flat_foot_holds_gets_no_torque() -> None:
+    robot = walking.bravo7()
+    assert np.all(np.isfinite(stand_flat(robot=robot).torque(0.0, robot.reference_state(), None)))
+    xml = re.sub(r'\s*<motor name="\w+_ankle".*', "", builtin_xml("bravo7"))
+    loose = read_mjcf(xml, name="bravo7")
+    torque = stand_flat(robot=loose).torque(0.0, loose.reference_state(), None)
+    assert np.all(np.isnan(torque))
+
+
 def test_what_is_no_controller_is_refused() -> None:
     def strange(t, q, torque):  # type: ignore[no-untyped-def]
         torque[0] = q[0]
@@ -244,5 +293,9 @@ def test_parameters_must_be_those_of_the_function_and_fit_the_robot(outside: Any
         simulation(outside.stand(few))
     with pytest.raises(hs.ControllerError, match=r"call it with them, as in stand\(\.\.\.\)"):
         simulation(outside.stand)
+    with pytest.raises(hs.ControllerError, match="memory of controller 'stand' has no steps"):
+        outside.stand(gains(outside), memory={"steps": 1})
+    with pytest.raises(hs.ControllerError, match=r"damping must be one number or 6"):
+        simulation(outside.stand(gains(outside), damping=np.ones(2)))
     with pytest.raises(hs.ControllerError, match="does not know its robot"):
         outside.stand(gains(outside)).torque(0.0, walking.bravo7().reference_state(), None)

@@ -262,9 +262,14 @@ class Law:
                 f"controller {function.name!r} takes {wanted} as parameters, got "
                 f"{type(parameters).__name__}"
             )
+        self.memory = dict(memory or {})
+        strange = self.memory.keys() - function.memory.declared - function.memory.extents()
+        if strange:
+            raise ControllerError(
+                f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
+            )
         self.function = function
         self.parameters: Any = parameters
-        self.memory = dict(memory or {})
         self.robot = robot
         self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
         self.damping = None if damping is None else np.asarray(damping, dtype=np.float64)
@@ -285,6 +290,12 @@ class Law:
         ControllerError
             If they do not fit the robot.
         """
+        for name, gains in (("stiffness", self.stiffness), ("damping", self.damping)):
+            if gains is not None and gains.shape not in ((), (robot.nu,)):
+                raise ControllerError(
+                    f"controller {self.function.name!r}: {name} must be one number or {robot.nu} "
+                    f"(one an actuator), got shape {gains.shape}"
+                )
         extents = extents_of(robot)
         try:
             self.parameters.check(extents)
