@@ -127,7 +127,7 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
     ),
     "how code is called": (
         [("compiler/straight_line.py", "kind.layout != ", "kind.layout == ")],
-        {"loop", "solvers"},
+        {"loop"},
     ),
     "what compiles": (
         [("compiler/private_numba.py", ", InlineClosureLikes)\n\n", ")\n\n")],

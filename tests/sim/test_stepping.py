@@ -58,9 +58,9 @@ def simulation(method: str, controller: str = "stock", **options: Any) -> hs.Sim
 def assert_same(one: hs.Run, other: hs.Run, since: float = -1.0) -> None:
     """Rows and events of one run are those of another from a time on, to the last bit."""
     for name in ("time", "position", "velocity", "torque", "contact_force", "gap", "residual"):
-        mine, its = (getattr(run, name)[run.time > since] for run in (one, other))
+        mine, its = (getattr(run, name)[run.time > since + 1e-9] for run in (one, other))
         np.testing.assert_array_equal(mine, its, name)
-    mine, its = ([e for e in run.events if e.time > since] for run in (one, other))
+    mine, its = ([e for e in run.events if e.time > since + 1e-9] for run in (one, other))
     assert mine == its
 
 

@@ -16,7 +16,7 @@ from robot_cases import builtin_xml
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.compiler.compilation import made_of
+from heelstrike.compiler.compilation import numba_in_use
 from heelstrike.control.computed_torque import computed_torque
 from heelstrike.robot import read_mjcf
 from heelstrike.sim.controller import stance
@@ -145,11 +145,11 @@ def test_machine_code_is_good_for_the_queries_it_was_made_with(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     called = computed_torque._separate._function
-    before = made_of(called)
-    assert made_of(called) == before
+    before = numba_in_use().made_of(called)
+    assert numba_in_use().made_of(called) == before
     other = stance.point_foot_torque.py_func.__code__  # type: ignore[attr-defined]
     monkeypatch.setattr(stance.flat_foot_torque.py_func, "__code__", other)  # type: ignore[attr-defined]
-    assert made_of(called) != before
+    assert numba_in_use().made_of(called) != before
 
 
 class Answers(hs.Bundle):
