@@ -8,6 +8,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel, ground_contact
 from heelstrike.dynamics.articulated import articulate, carry_along, solve_articulated
+from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import (
     bias_force,
     factorize,
@@ -17,6 +18,7 @@ from heelstrike.dynamics.kernels import (
     point_position,
     solve_lower,
 )
+from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.memory import Memory
@@ -45,35 +47,18 @@ def contact_velocity(
     link: int, position: Floats, normal: Floats, tree: Workspace
 ) -> tuple[float, float]:
     """Normal and tangential velocity of a point of a link."""
-    x = position[0] - tree.pivot[0]
-    z = position[1] - tree.pivot[1]
-    vx = tree.velocity[link, 1] + tree.velocity[link, 0] * z
-    vz = tree.velocity[link, 2] - tree.velocity[link, 0] * x
-    return normal[0] * vx + normal[1] * vz, normal[1] * vx - normal[0] * vz
+    return into_frame(normal, velocity_at(tree.velocity, link, place_of(tree, position)))
 
 
 @kernel
 def contact_rows(model: Model, memory: Memory, contact: int, place: int) -> None:
     """Write the Jacobian rows (normal, tangent) of a contact point as candidate `place`."""
-    tree = memory.tree
-    jacobian = memory.jacobian
-    x = memory.contacts.position[contact, 0] - tree.pivot[0]
-    z = memory.contacts.position[contact, 1] - tree.pivot[1]
-    nx = memory.contacts.normal[contact, 0]
-    nz = memory.contacts.normal[contact, 1]
-    normal_row = 2 * place
-    tangent_row = normal_row + 1
-    for j in range(model.parent.shape[0]):
-        jacobian[normal_row, j] = 0.0
-        jacobian[tangent_row, j] = 0.0
-    j = model.contact_link[contact]
-    memory.leaf[place] = j
-    while j >= 0:
-        jx = tree.motion[j, 1] + tree.motion[j, 0] * z
-        jz = tree.motion[j, 2] - tree.motion[j, 0] * x
-        jacobian[normal_row, j] = nx * jx + nz * jz
-        jacobian[tangent_row, j] = nz * jx - nx * jz
-        j = model.parent[j]
+    link, contacts = model.contact_link[contact], memory.contacts
+    memory.leaf[place] = link
+    write_point_rows(
+        model, memory.tree, link, contacts.position[contact], contacts.normal[contact],
+        memory.jacobian, 2 * place,
+    )  # fmt: skip
 
 
 @kernel

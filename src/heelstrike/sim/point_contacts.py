@@ -8,7 +8,9 @@ normals are those of :func:`~heelstrike.sim.contact_geometry.locate_contacts`.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.kernels import solve_factorized, solve_upper
+from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 
@@ -30,20 +32,8 @@ def point_delassus(
     """
     for place in range(points.shape[0]):
         contact = points[place]
-        x = position[contact, 0] - tree.pivot[0]
-        z = position[contact, 1] - tree.pivot[1]
-        nx = normal[contact, 0]
-        nz = normal[contact, 1]
-        for j in range(model.parent.shape[0]):
-            rows[2 * place, j] = 0.0
-            rows[2 * place + 1, j] = 0.0
-        j = model.contact_link[contact]
-        while j >= 0:
-            jx = tree.motion[j, 1] + tree.motion[j, 0] * z
-            jz = tree.motion[j, 2] - tree.motion[j, 0] * x
-            rows[2 * place, j] = nx * jx + nz * jz
-            rows[2 * place + 1, j] = nz * jx - nx * jz
-            j = model.parent[j]
+        link = model.contact_link[contact]
+        write_point_rows(model, tree, link, position[contact], normal[contact], rows, 2 * place)
         solve_upper(model, factor, rows[2 * place])
         solve_upper(model, factor, rows[2 * place + 1])
     for row in range(rows.shape[0]):
@@ -76,10 +66,9 @@ def point_velocities(
     for place in range(points.shape[0]):
         contact = points[place]
         i = model.contact_link[contact]
-        vx = link[i, 1] + link[i, 0] * (position[contact, 1] - tree.pivot[1])
-        vz = link[i, 2] - link[i, 0] * (position[contact, 0] - tree.pivot[0])
-        velocity[contact, 0] = normal[contact, 0] * vx + normal[contact, 1] * vz
-        velocity[contact, 1] = normal[contact, 1] * vx - normal[contact, 0] * vz
+        velocity[contact, 0], velocity[contact, 1] = into_frame(
+            normal[contact], velocity_at(link, i, place_of(tree, position[contact]))
+        )
 
 
 @kernel
@@ -105,10 +94,8 @@ def push_points(
     for place in range(points.shape[0]):
         contact = points[place]
         i = model.contact_link[contact]
-        fx = normal[contact, 0] * impulse[contact, 0] + normal[contact, 1] * impulse[contact, 1]
-        fz = normal[contact, 1] * impulse[contact, 0] - normal[contact, 0] * impulse[contact, 1]
-        x = position[contact, 0] - tree.pivot[0]
-        z = position[contact, 1] - tree.pivot[1]
+        fx, fz = out_of_frame(normal[contact], (impulse[contact, 0], impulse[contact, 1]))
+        x, z = place_of(tree, position[contact])
         link[i, 0] += z * fx - x * fz
         link[i, 1] += fx
         link[i, 2] += fz

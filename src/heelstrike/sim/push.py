@@ -10,6 +10,7 @@ import numpy as np
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import point_position
+from heelstrike.dynamics.places import add_point_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -234,14 +235,7 @@ def add_pushes(model: Model, tree: Workspace, pushes: Pushes, force: Floats) -> 
     """Add the generalised force Jᵀf of the pushes to `force`."""
     for i in range(pushes.link.shape[0]):
         if pushes.share[i] > 0.0:
-            j = pushes.link[i]
-            fx = pushes.share[i] * pushes.force[i, 0]
-            fz = pushes.share[i] * pushes.force[i, 1]
-            position = pushes.position[i]
-            point_position(tree, j, pushes.point[i], position)
-            x = position[0] - tree.pivot[0]
-            z = position[1] - tree.pivot[1]
-            while j >= 0:
-                force[j] += fx * (tree.motion[j, 1] + tree.motion[j, 0] * z)
-                force[j] += fz * (tree.motion[j, 2] - tree.motion[j, 0] * x)
-                j = model.parent[j]
+            link, position = pushes.link[i], pushes.position[i]
+            push = (pushes.share[i] * pushes.force[i, 0], pushes.share[i] * pushes.force[i, 1])
+            point_position(tree, link, pushes.point[i], position)
+            add_point_force(model, tree, link, position, push, force)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import press
+from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
@@ -75,10 +76,8 @@ def free_gap_acceleration(
         scratch[0, 0] = position[0] + radius * normal[0]
         scratch[0, 1] = position[1] + radius * normal[1]
         point_bias_acceleration(memory.tree, model.contact_link[contact], scratch[0], scratch[1])
-        ax = scratch[1, 0]
-        az = scratch[1, 1]
-        along_normal = normal[0] * ax + normal[1] * az
-        along_tangent = normal[1] * ax - normal[0] * az - radius * scratch[1, 2]
+        along_normal, along_tangent = into_frame(normal, (scratch[1, 0], scratch[1, 1]))
+        along_tangent -= radius * scratch[1, 2]
     for j in range(model.parent.shape[0]):
         along_normal += memory.jacobian[2 * place, j] * memory.rate[j]
         along_tangent += memory.jacobian[2 * place + 1, j] * memory.rate[j]
