@@ -59,10 +59,10 @@ def test_delassus_matrix_and_what_impulses_do(
         jacobian = memory.jacobian[: 2 * count]
         inverse = np.linalg.inv(dynamics.mass_matrix(robot, memory.q))
         expected = jacobian @ inverse @ jacobian.T
-        found = memory.delassus[: 2 * count, : 2 * count]
+        found = memory.problem.delassus[: 2 * count, : 2 * count]
         np.testing.assert_allclose(found, expected, atol=ROUNDING * np.abs(expected).max())
-        memory.impulse[: 2 * count] = draw.normal(size=2 * count)
-        change = inverse @ jacobian.T @ memory.impulse[: 2 * count]
+        memory.answer.impulse[: 2 * count] = draw.normal(size=2 * count)
+        change = inverse @ jacobian.T @ memory.answer.impulse[: 2 * count]
         v = draw.normal(size=robot.nv)
         after = v.copy()
         add_impulse(robot.model, memory, count, after)

@@ -150,7 +150,7 @@ def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
     With A = Lᵀ D L it is the square of ``memory.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are
     coordinates, so that the inner loops run over the candidates.
     """
-    half, delassus = memory.half, memory.delassus
+    half, delassus = memory.half, memory.problem.delassus
     straight = memory.programs[EQUATIONS] != 0
     nv = model.parent.shape[0]
     rows = 2 * count
@@ -184,7 +184,7 @@ def assemble_delassus(model: Model, memory: Memory, count: int) -> None:
 @kernel
 def add_impulse(model: Model, memory: Memory, count: int, v: Floats) -> None:
     """Add A⁻¹ Jᵀ λ to a velocity, after :func:`assemble_delassus`."""
-    change, half, impulse = memory.force, memory.half, memory.impulse
+    change, half, impulse = memory.force, memory.half, memory.answer.impulse
     for j in range(model.parent.shape[0]):
         total = 0.0
         for row in range(2 * count):

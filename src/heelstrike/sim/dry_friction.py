@@ -33,8 +33,8 @@ def select_dry_joints(model: Model, count: int, memory: Memory) -> int:
     for place in range(memory.dry_joint.shape[0]):
         joint = memory.dry_joint[place]
         write_unit_row(memory, joint, 2 * count + 1, 1.0)
-        memory.free[2 * count + 1] = memory.next_v[joint]
-        memory.problem_mode[count] = memory.dry_mode[place]
+        memory.problem.free[2 * count + 1] = memory.next_v[joint]
+        memory.answer.mode[count] = memory.dry_mode[place]
         memory.candidate[count] = first + place
         count += 1
     return count

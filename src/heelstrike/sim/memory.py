@@ -108,15 +108,8 @@ class Memory(Bundle):
     root : (nv,) float
     half : (nv, 2 capacity) float
         D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
-    delassus : (2 capacity, 2 capacity) float
-    free, impulse, velocity : (2 capacity,) float
-        The contact problem and its solution.
-    problem_friction : (capacity,) float
-    problem_mode : (capacity,) int
-    residual : (3,) float
-        Residuals of the certificate of the last solve.
     problem, usual_problem : ContactProblem
-        The same, as the solvers take it; and with the matrix of the usual points.
+        The contact problem of the candidates, and with the matrix of the usual points.
     answer : ContactAnswer
         Its solution.
     programs : (5,) int
@@ -126,8 +119,7 @@ class Memory(Bundle):
     usual_place : (nc,) int
         Place of each contact point in `usual_points`, -1 for none.
     point_rows : (2 k, nv) float
-    point_delassus : (2 k, 2 k) float
-        Scratch and Delassus matrix of the usual points.
+        Scratch of the Delassus matrix of the usual points.
     point_velocity, point_impulse : (nc, 2) float
         Velocities and impulses of contact points.
     solver : ContactWorkspace
@@ -171,13 +163,6 @@ class Memory(Bundle):
     leaf: Integers = array("capacity", of=int)
     root: Floats = array("nv")
     half: Floats = array("nv", "2 capacity")
-    delassus: Floats = array("2 capacity", "2 capacity")
-    free: Floats = array("2 capacity")
-    impulse: Floats = array("2 capacity")
-    velocity: Floats = array("2 capacity")
-    problem_friction: Floats = array("capacity")
-    problem_mode: Integers = array("capacity", of=int)
-    residual: Floats = array(3)
     programs: Integers = array("programs", of=int, address=True)
     every_point: Integers = array("nc", of=int)
     problem: ContactProblem = part(ContactProblem)
@@ -186,7 +171,6 @@ class Memory(Bundle):
     usual_points: Integers = array("usual", of=int)
     usual_place: Integers = array("nc", of=int)
     point_rows: Floats = array("2 usual", "nv")
-    point_delassus: Floats = array("2 usual", "2 usual")
     point_velocity: Floats = array("nc", "components")
     point_impulse: Floats = array("nc", "components")
     solver: ContactWorkspace = part(ContactWorkspace)
@@ -220,14 +204,6 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         problem=problem,
         usual_problem=usual_problem,
         answer=answer,
-        delassus=problem.delassus,
-        free=problem.free,
-        problem_friction=problem.friction,
-        point_delassus=usual_problem.delassus,
-        problem_mode=answer.mode,
-        impulse=answer.impulse,
-        velocity=answer.velocity,
-        residual=answer.residual,
         programs=straight_line_programs(robot.model, usual),
         every_point=np.arange(nc),
         usual_points=usual,

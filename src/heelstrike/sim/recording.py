@@ -69,9 +69,9 @@ def note_extremes(model: Model, memory: Memory) -> None:
     tally = memory.tally
     for contact in range(model.contact_link.shape[0]):
         tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
-    tally.complementarity = max(tally.complementarity, memory.residual[0])
-    tally.cone = max(tally.cone, memory.residual[1])
-    tally.non_penetration = max(tally.non_penetration, memory.residual[2])
+    tally.complementarity = max(tally.complementarity, memory.answer.residual[0])
+    tally.cone = max(tally.cone, memory.answer.residual[1])
+    tally.non_penetration = max(tally.non_penetration, memory.answer.residual[2])
 
 
 @kernel
@@ -188,7 +188,7 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
         record.gap[row, i] = contacts.gap[i]
         record.slip[row, i] = memory.slip[i]
     for k in range(3):
-        record.residual[row, k] = memory.residual[k]
+        record.residual[row, k] = memory.answer.residual[k]
     record.rows = row + 1
 
 

@@ -458,7 +458,7 @@ class Simulation:
         if outcome is Outcome.SOLVER_FAILED:
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.residual.tolist()}"
+                f"{self._memory.answer.residual.tolist()}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 

@@ -257,7 +257,7 @@ def sample(
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] = 0.0
         work.dry_impulse[joint] = 0.0
-    memory.residual[1] = cone_residual(model, memory, work)
+    memory.answer.residual[1] = cone_residual(model, memory, work)
     span = work.step
     elapsed = 0.0
     h = work.proposed
@@ -297,7 +297,9 @@ def sample(
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
-        memory.residual[1] = max(memory.residual[1], cone_residual(model, memory, work))
+        memory.answer.residual[1] = max(
+            memory.answer.residual[1], cone_residual(model, memory, work)
+        )
         memory.tally.steps += 1
         work.age += 1
         begin_step(model, memory, work)
@@ -317,7 +319,7 @@ def sample(
     for joint in range(model.parent.shape[0]):
         memory.stop_torque[joint] = work.stop_impulse[joint] / span
         memory.friction_torque[joint] = work.dry_impulse[joint] / span
-    memory.tally.cone = max(memory.tally.cone, memory.residual[1])
+    memory.tally.cone = max(memory.tally.cone, memory.answer.residual[1])
     return DONE
 
 
@@ -380,7 +382,7 @@ def note_forces(
         record.force[row, contact, 0] = force[contact, 0]
         record.force[row, contact, 1] = force[contact, 1]
         record.slip[row, contact] = memory.slip[contact]
-    record.residual[row, 1] = memory.residual[1]
+    record.residual[row, 1] = memory.answer.residual[1]
 
 
 @kernel

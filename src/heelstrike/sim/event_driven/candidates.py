@@ -17,20 +17,20 @@ def solve_candidates(
     """Solve the contact problem of the candidates at the level of accelerations or velocities.
 
     Matrix and free term are those in the memory. Of accelerations, points that slide are prescribed
-    to go on doing so: their friction is known. Forces or impulses go to ``memory.impulse``, modes
-    to ``memory.problem_mode``. Returns the solver's status.
+    to go on doing so: their friction is known. Forces or impulses and modes go to ``memory.answer``.
+    Returns the solver's status.
     """
     for place in range(count):
         contact = memory.candidate[place]
-        memory.problem_friction[place] = memory.friction[contact]
-        memory.problem_mode[place] = STICK
+        memory.problem.friction[place] = memory.friction[contact]
+        memory.answer.mode[place] = STICK
         if accelerations:
             if slide[contact] > 0:
-                memory.problem_mode[place] = SLIDING_FORWARD
+                memory.answer.mode[place] = SLIDING_FORWARD
             elif slide[contact] < 0:
-                memory.problem_mode[place] = SLIDING_BACKWARD
+                memory.answer.mode[place] = SLIDING_BACKWARD
             elif memory.mode[contact] < SLIDING_FORWARD:
-                memory.problem_mode[place] = memory.mode[contact]
+                memory.answer.mode[place] = memory.mode[contact]
     memory.problem.count = count
     return int(solve_contact_kernel(memory.problem, order, memory.solver, memory.answer))
 
@@ -53,15 +53,15 @@ def share_redundant(count: int, memory: Memory, phase: Phase) -> None:
         return
     for place in range(count):
         contact = memory.candidate[place]
-        found = memory.problem_mode[place]
+        found = memory.answer.mode[place]
         if found == OPEN:
             return
         if found != STICK and phase.slide[contact] == 0 and memory.friction[contact] > 0.0:
             return
     for place in range(count):
         contact = memory.candidate[place]
-        phase.force[contact, 0] = memory.impulse[2 * place]
-        phase.force[contact, 1] = memory.impulse[2 * place + 1]
+        phase.force[contact, 0] = memory.answer.impulse[2 * place]
+        phase.force[contact, 1] = memory.answer.impulse[2 * place + 1]
         if phase.value[2 * contact] < 0.0:
             phase.value[2 * contact] = 1.0
         if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0:

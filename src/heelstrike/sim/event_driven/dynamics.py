@@ -304,32 +304,32 @@ def evaluate(
     for place in range(count):
         contact = memory.candidate[place]
         free_gap_acceleration(model, memory, phase, contact, place)
-        memory.impulse[2 * place] = 0.0
-        memory.impulse[2 * place + 1] = 0.0
+        memory.answer.impulse[2 * place] = 0.0
+        memory.answer.impulse[2 * place + 1] = 0.0
         if contact >= first:
-            memory.impulse[2 * place] = model.dry_friction[phase.dry_joint[contact - first]]
+            memory.answer.impulse[2 * place] = model.dry_friction[phase.dry_joint[contact - first]]
     if count > 0:
         size = list_unknowns(
             count, memory.candidate, phase.carrier, phase.holder, phase.slide, memory.friction,
             phase.row, phase.lean,
         )  # fmt: skip
-        constraint_matrix(size, phase.row, phase.lean, 1.0, memory.delassus, phase.system)
+        constraint_matrix(size, phase.row, phase.lean, 1.0, memory.problem.delassus, phase.system)
         for i in range(size):
-            phase.system[i, size] = -memory.free[phase.row[i]]
+            phase.system[i, size] = -memory.problem.free[phase.row[i]]
         rank = solve_system(size, phase.system, phase.column, phase.unknown)
         phase.deficient = 1 if rank < size else 0
         for i in range(size):
-            memory.impulse[phase.row[i]] += phase.unknown[i]
+            memory.answer.impulse[phase.row[i]] += phase.unknown[i]
             if phase.lean[i] != 0.0:
-                memory.impulse[phase.row[i] + 1] += phase.lean[i] * phase.unknown[i]
+                memory.answer.impulse[phase.row[i] + 1] += phase.lean[i] * phase.unknown[i]
         add_impulse(model, memory, count, memory.rate)
     share_forces(
-        count, memory.candidate, memory.impulse, memory.friction, phase.group, phase.holder,
+        count, memory.candidate, memory.answer.impulse, memory.friction, phase.group, phase.holder,
         phase.force,
     )  # fmt: skip
     watch_forces(
-        count, memory.candidate, phase, memory.friction, memory.delassus, memory.free,
-        memory.impulse,
+        count, memory.candidate, phase, memory.friction, memory.problem.delassus,
+        memory.problem.free, memory.answer.impulse,
     )  # fmt: skip
     if count > 0 and phase.deficient == 1:
         share_redundant(count, memory, phase)
@@ -385,12 +385,12 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
                 for j in range(nv):
                     speed += memory.jacobian[phase.row[i], j] * state[nv + j]
                 phase.system[i, size] = -speed
-        constraint_matrix(size, phase.row, phase.lean, 0.0, memory.delassus, phase.system)
+        constraint_matrix(size, phase.row, phase.lean, 0.0, memory.problem.delassus, phase.system)
         solve_system(size, phase.system, phase.column, phase.unknown)
         for i in range(2 * count):
-            memory.impulse[i] = 0.0
+            memory.answer.impulse[i] = 0.0
         for i in range(size):
-            memory.impulse[phase.row[i]] = phase.unknown[i]
+            memory.answer.impulse[phase.row[i]] = phase.unknown[i]
         change = state[:nv] if positions else state[nv:]
         add_impulse(model, memory, count, change)
         if not positions:

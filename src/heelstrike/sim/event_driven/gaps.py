@@ -81,8 +81,8 @@ def free_gap_acceleration(
     for j in range(model.parent.shape[0]):
         along_normal += memory.jacobian[2 * place, j] * memory.rate[j]
         along_tangent += memory.jacobian[2 * place + 1, j] * memory.rate[j]
-    memory.free[2 * place] = along_normal
-    memory.free[2 * place + 1] = along_tangent
+    memory.problem.free[2 * place] = along_normal
+    memory.problem.free[2 * place + 1] = along_tangent
     dry = contact - phase.closed.shape[0] + phase.dry_joint.shape[0]
     if dry >= 0:
         limit = model.dry_friction[phase.dry_joint[dry]]

@@ -83,19 +83,19 @@ def collide(
         normal = row_velocity(2 * count, memory.jacobian, state)
         if normal < 0.0 and phase.plastic[contact] == 0:
             normal += memory.restitution[contact] * normal
-        memory.free[2 * count] = normal - nudge
-        memory.free[2 * count + 1] = row_velocity(2 * count + 1, memory.jacobian, state)
+        memory.problem.free[2 * count] = normal - nudge
+        memory.problem.free[2 * count + 1] = row_velocity(2 * count + 1, memory.jacobian, state)
         memory.candidate[count] = contact
         count += 1
     if count == 0:
         return True, 0.0
     assemble_delassus(model, memory, count)
     status = solve_candidates(count, memory, phase.slide, False, phase.order)
-    note_residual(memory.residual, memory.tally)
+    note_residual(memory.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
     for row in range(2 * count):
-        work = memory.impulse[row] * row_velocity(row, memory.jacobian, state)
+        work = memory.answer.impulse[row] * row_velocity(row, memory.jacobian, state)
         made += work
         through += abs(work)
     add_impulse(model, memory, count, state[nv:])
@@ -104,10 +104,12 @@ def collide(
         row = 2 * place
         normal = row_velocity(row, memory.jacobian, state)
         tangent = row_velocity(row + 1, memory.jacobian, state)
-        made += memory.impulse[row] * normal + memory.impulse[row + 1] * tangent
-        through += abs(memory.impulse[row] * normal) + abs(memory.impulse[row + 1] * tangent)
-        phase.impulse[contact, 0] = memory.impulse[row]
-        phase.impulse[contact, 1] = memory.impulse[row + 1]
+        made += memory.answer.impulse[row] * normal + memory.answer.impulse[row + 1] * tangent
+        through += abs(memory.answer.impulse[row] * normal) + abs(
+            memory.answer.impulse[row + 1] * tangent
+        )
+        phase.impulse[contact, 0] = memory.answer.impulse[row]
+        phase.impulse[contact, 1] = memory.answer.impulse[row + 1]
         phase.closed[contact] = 0
         phase.slide[contact] = 0
         if normal <= REST or phase.plastic[contact] == 1:
@@ -146,7 +148,7 @@ def short_bounces(
         gap_rows(model, memory, phase, contact, count)
         free_gap_acceleration(model, memory, phase, contact, count)
         normal, _ = gap_velocity(contact, model, memory.contacts, memory.tree, phase, state)
-        pull = -memory.free[2 * count]
+        pull = -memory.problem.free[2 * count]
         if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull

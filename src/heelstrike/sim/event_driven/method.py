@@ -279,13 +279,13 @@ def write_row(
         phase.slopes[SLOPES - 1], True,
     )  # fmt: skip
     for k in range(3):
-        memory.residual[k] = 0.0
+        memory.answer.residual[k] = 0.0
     count = phase.closed_count
     if count > 0:
         solve_candidates(count, memory, phase.slide, True, phase.order)
-        note_residual(memory.residual, memory.tally)
+        note_residual(memory.answer.residual, memory.tally)
     row = record.rows
-    copy_row(row, time, phase.trial, memory.torque, contacts, memory.residual, record)
+    copy_row(row, time, phase.trial, memory.torque, contacts, memory.answer.residual, record)
     points = contacts.gap.shape[0]
     first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     dry_force(
@@ -298,16 +298,16 @@ def write_row(
         contact = memory.candidate[place]
         if contact >= first:
             joint = phase.dry_joint[contact - first]
-            record.friction_torque[row, joint] = memory.impulse[2 * place + 1]
+            record.friction_torque[row, joint] = memory.answer.impulse[2 * place + 1]
             continue
         if contact >= points:
             stop = contact - points
             record.stop_torque[row, phase.stop_joint[stop]] += (
-                phase.stop_side[stop] * memory.impulse[2 * place]
+                phase.stop_side[stop] * memory.answer.impulse[2 * place]
             )
             continue
-        record.force[row, contact, 0] = memory.impulse[2 * place]
-        record.force[row, contact, 1] = memory.impulse[2 * place + 1]
+        record.force[row, contact, 0] = memory.answer.impulse[2 * place]
+        record.force[row, contact, 1] = memory.answer.impulse[2 * place + 1]
         _, record.slip[row, contact] = contact_velocity(
             model.contact_link[contact], contacts.position[contact], contacts.normal[contact],
             memory.tree,
@@ -417,19 +417,22 @@ def decide_modes(
             if contact >= dry:
                 continue
             row = 2 * place
-            apart = apart and memory.free[row] >= 0.0
+            apart = apart and memory.problem.free[row] >= 0.0
             lean = -phase.slide[contact] * memory.friction[contact]
-            if memory.delassus[row, row] + lean * memory.delassus[row, row + 1] <= 0.0:
+            if (
+                memory.problem.delassus[row, row] + lean * memory.problem.delassus[row, row + 1]
+                <= 0.0
+            ):
                 # Pressing it harder would push it into the ground: there are other solutions.
                 several = True
                 log_event(record, time, PAINLEVE, contact, 0.0, 0.0)
         if several and apart:
             for place in range(count):
                 if memory.candidate[place] < dry:
-                    memory.problem_mode[place] = OPEN
+                    memory.answer.mode[place] = OPEN
         if count > 0:
-            note_residual(memory.residual, memory.tally)
-        adopt_modes(count, memory.candidate, memory.problem_mode, memory.mode, phase)
+            note_residual(memory.answer.residual, memory.tally)
+        adopt_modes(count, memory.candidate, memory.answer.mode, memory.mode, phase)
         nv = model.parent.shape[0]
         forward_kinematics(model, phase.begin[:nv], memory.tree)
         locate_contacts(model, ground, memory)

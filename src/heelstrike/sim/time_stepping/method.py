@@ -290,11 +290,11 @@ def select_candidates(
             if gap + 0.5 * step * before > activation:
                 continue
             normal += memory.restitution[contact] * before
-        memory.free[2 * count] = normal
-        memory.free[2 * count + 1] = velocity[contact, 1]
+        memory.problem.free[2 * count] = normal
+        memory.problem.free[2 * count + 1] = velocity[contact, 1]
         memory.problem.set[count] = CONE
-        memory.problem_friction[count] = memory.friction[contact]
-        memory.problem_mode[count] = memory.mode[contact]
+        memory.problem.friction[count] = memory.friction[contact]
+        memory.answer.mode[count] = memory.mode[contact]
         memory.candidate[count] = contact
         count += 1
     return count
@@ -323,11 +323,11 @@ def select_stops(
                     continue
             elif not gap <= activation:
                 continue
-            memory.free[2 * count] = normal
-            memory.free[2 * count + 1] = 0.0
+            memory.problem.free[2 * count] = normal
+            memory.problem.free[2 * count + 1] = 0.0
             memory.problem.set[count] = HALF_LINE
-            memory.problem_friction[count] = 0.0
-            memory.problem_mode[count] = memory.stop_mode[joint, end]
+            memory.problem.friction[count] = 0.0
+            memory.answer.mode[count] = memory.stop_mode[joint, end]
             memory.candidate[count] = points + 2 * joint + end
             count += 1
     return count
@@ -377,7 +377,7 @@ def gather_delassus(model: Model, memory: Memory, near: int, count: int) -> None
             memory.programs[DELASSUS],
             (
                 model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.factor, memory.point_rows, memory.point_delassus,
+                memory.factor, memory.point_rows, memory.usual_problem.delassus,
             ),
         )  # fmt: skip
     if near == count == memory.usual_points.shape[0]:
@@ -388,8 +388,8 @@ def gather_delassus(model: Model, memory: Memory, near: int, count: int) -> None
             column = 2 * memory.usual_place[memory.candidate[other]]
             for i in range(2):
                 for j in range(2):
-                    entry = memory.point_delassus[row + i, column + j]
-                    memory.delassus[2 * place + i, 2 * other + j] = entry
+                    entry = memory.usual_problem.delassus[row + i, column + j]
+                    memory.problem.delassus[2 * place + i, 2 * other + j] = entry
     for place in range(near, count):
         add_joint(model, memory, near, place)
 
@@ -401,7 +401,7 @@ def add_joint(model: Model, memory: Memory, near: int, place: int) -> None:
     What a unit impulse along its row does to the joint velocities, A⁻¹ e, goes to that row of
     ``memory.jacobian``.
     """
-    contacts, delassus, velocity = memory.contacts, memory.delassus, memory.point_velocity
+    contacts, delassus, velocity = memory.contacts, memory.problem.delassus, memory.point_velocity
     row, joint, sign = joint_row(model, memory, place)
     change = memory.jacobian[row]
     for j in range(model.parent.shape[0]):
@@ -440,8 +440,8 @@ def push_candidates(model: Model, memory: Memory, near: int, count: int) -> None
         memory.point_impulse[contact, 0] = 0.0
         memory.point_impulse[contact, 1] = 0.0
     for place in range(near):
-        memory.point_impulse[memory.candidate[place], 0] = memory.impulse[2 * place]
-        memory.point_impulse[memory.candidate[place], 1] = memory.impulse[2 * place + 1]
+        memory.point_impulse[memory.candidate[place], 0] = memory.answer.impulse[2 * place]
+        memory.point_impulse[memory.candidate[place], 1] = memory.answer.impulse[2 * place + 1]
     if near > 0:
         play(
             memory.programs[PUSH],
@@ -453,7 +453,7 @@ def push_candidates(model: Model, memory: Memory, near: int, count: int) -> None
     for place in range(near, count):
         row, _, _ = joint_row(model, memory, place)
         for j in range(model.parent.shape[0]):
-            memory.next_v[j] += memory.impulse[row] * memory.jacobian[row, j]
+            memory.next_v[j] += memory.answer.impulse[row] * memory.jacobian[row, j]
 
 
 @dissolved_kernel
@@ -478,7 +478,7 @@ def solve_contacts(
         memory.slip[contact] = 0.0
         memory.mode[contact] = 0
     for i in range(3):
-        memory.residual[i] = 0.0
+        memory.answer.residual[i] = 0.0
     if count == 0:
         return True
     straight = are_usual(memory, near)
@@ -500,19 +500,19 @@ def solve_contacts(
     for place in range(count):
         contact = memory.candidate[place]
         if contact >= dry:
-            impulse = memory.impulse[2 * place + 1]
-            note_dry_joint(contact - dry, impulse, step, memory.problem_mode[place], memory)
+            impulse = memory.answer.impulse[2 * place + 1]
+            note_dry_joint(contact - dry, impulse, step, memory.answer.mode[place], memory)
             continue
         if contact >= points:
             joint = (contact - points) // 2
             sign = 1.0 - 2.0 * ((contact - points) % 2)
-            memory.stop_torque[joint] += sign * memory.impulse[2 * place] / step
-            memory.stop_mode[joint, (contact - points) % 2] = memory.problem_mode[place] != 0
+            memory.stop_torque[joint] += sign * memory.answer.impulse[2 * place] / step
+            memory.stop_mode[joint, (contact - points) % 2] = memory.answer.mode[place] != 0
             continue
-        contacts.force[contact, 0] = memory.impulse[2 * place] / step
-        contacts.force[contact, 1] = memory.impulse[2 * place + 1] / step
-        memory.slip[contact] = memory.velocity[2 * place + 1]
-        memory.mode[contact] = memory.problem_mode[place]
+        contacts.force[contact, 0] = memory.answer.impulse[2 * place] / step
+        contacts.force[contact, 1] = memory.answer.impulse[2 * place + 1] / step
+        memory.slip[contact] = memory.answer.velocity[2 * place + 1]
+        memory.mode[contact] = memory.answer.mode[place]
     return status == SOLVED
 
 
