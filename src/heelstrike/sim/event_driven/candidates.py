@@ -17,8 +17,8 @@ def solve_candidates(
     """Solve the contact problem of the candidates at the level of accelerations or velocities.
 
     Matrix and free term are those in the memory. Of accelerations, points that slide are prescribed
-    to go on doing so: their friction is known. Forces or impulses and modes go to ``memory.answer``.
-    Returns the solver's status.
+    to go on doing so: their friction is known. Forces or impulses and modes go to
+    ``memory.answer``. Returns the solver's status.
     """
     for place in range(count):
         contact = memory.candidate[place]
