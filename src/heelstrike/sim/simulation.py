@@ -133,9 +133,9 @@ class Simulation:
         pushes: Sequence[Push] | Push = (),
         checked: bool = False,
     ) -> None:
-        begin, given = state, ground
-        if isinstance(state, Snapshot):
-            begin, ground = state.state, _ground_of(state) if ground is None else ground
+        begin, given = state.state if isinstance(state, Snapshot) else state, ground
+        if isinstance(state, Snapshot) and ground is None:
+            ground = _ground_of(state)
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
             stop_when_fallen=stop_when_fallen, pushes=pushes, checked=checked,
