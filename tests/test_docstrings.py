@@ -164,6 +164,7 @@ def test_properties_are_described(name: str) -> None:
 
 
 TAKES_ANY = {name for name, function in FUNCTIONS.items() if takes_any(function)}
+TAKES_ANY -= {"heelstrike.Bundle.allocate"}  # takes all extents of a robot, whichever it needs
 BUNDLES = [kind for kind in CLASSES.values() if "declared" in dir(kind)]
 
 
@@ -184,6 +185,7 @@ def calls() -> dict[str, Callable[..., Any]]:
             heelstrike.simulate, robot, state=robot.reference_state(), duration=0.0
         ),
         "heelstrike.robot.Model.made": partial(type(robot.model).made, **_members(robot.model)),
+        "heelstrike.Bundle.replaced": robot.model.replaced,
         "heelstrike.Run.plot": partial(run.plot, "torque"),
         "heelstrike.Run.animate": partial(run.animate, "film.gif"),
         "heelstrike.Run.summary": run.summary,
@@ -203,4 +205,6 @@ def test_no_bundle_takes_a_member_that_it_has_not() -> None:
     model = synthetic_runs.box().model
     with pytest.raises(TypeError, match="no_such_option"):
         type(model)(**_members(model), no_such_option=1)
+    with pytest.raises(TypeError, match="no_such_option"):
+        heelstrike.Bundle.allocate(no_such_option=np.zeros(2))
     assert {kind.__init__ for kind in BUNDLES} <= {type(model).__init__}

@@ -172,3 +172,12 @@ def test_contents_put_back_are_the_bundle_as_it_was() -> None:
     for spoilt in (before | {"row": np.zeros(3)}, {"cells": before["cells"]}):
         with pytest.raises(ValueError, match="missing, or of another shape"):
             bundle.fill(spoilt)
+
+
+@pytest.mark.parametrize(
+    "name", ["table", "address", "members", "storage", "contents", "fill", "become", "dtype"]
+)
+def test_members_are_not_called_like_what_every_bundle_has(name: str) -> None:
+    for member in (array(2), cell(int), number(float), extent()):
+        with pytest.raises(TypeError, match=f"Some.{name}: every bundle has .* by the name"):
+            type("Some", (Bundle,), {name: member})

@@ -261,7 +261,8 @@ def test_files_that_are_no_snapshots_are_refused(tmp_path: Path) -> None:
         hs.load_snapshot(tmp_path / "nothing.npz")
     (tmp_path / "text.npz").write_text("not an archive")
     np.savez(tmp_path / "other.npz", x=np.ones(3))
-    for name in ("text.npz", "other.npz"):
+    np.save(tmp_path / "array.npy", np.ones(3))
+    for name in ("text.npz", "other.npz", "array.npy"):
         with pytest.raises(hs.SimulationError, match="not a snapshot"):
             hs.load_snapshot(tmp_path / name)
     kept = simulation("time stepping").snapshot()

@@ -41,6 +41,9 @@ _WORD = ir.IntType(64)
 _BYTES = 8
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
 
+# Names of no members: where a bundle keeps what is its own, and an argument of `allocate`.
+_TAKEN = ("_cells", "_extents", "_table", "dtype")
+
 _Some = TypeVar("_Some", bound="Bundle")
 
 
@@ -73,17 +76,54 @@ class Member:
 
 
 def array(*shape: str | int, of: type = float, address: bool = False) -> Any:
-    """Declare an array of a bundle by its extents, of ``float`` or ``int``."""
+    """Declare an array of a bundle by its extents.
+
+    Parameters
+    ----------
+    *shape : str or int
+        Extents: numbers, or names as in ``"nu"``, ``"2 nc + 1"``, which the robot knows.
+    of : type
+        ``float`` or ``int``.
+    address : bool
+        Whether it holds places in this process, which are not to be kept.
+
+    Returns
+    -------
+    Member
+        What the class of the bundle makes a member of.
+    """
     return Member("array", of, shape, address)
 
 
 def cell(of: type) -> Any:
-    """Declare a number of a bundle, ``float`` or ``int``, that kernels may change."""
+    """Declare a number of a bundle that kernels may change.
+
+    Parameters
+    ----------
+    of : type
+        ``float`` or ``int``.
+
+    Returns
+    -------
+    Member
+        What the class of the bundle makes a member of.
+    """
     return Member("cell", of)
 
 
 def number(of: type) -> Any:
-    """Declare a number of a bundle, ``float`` or ``int``, that stays as it is."""
+    """Declare a number of a bundle that stays as it is.
+
+    Parameters
+    ----------
+    of : type
+        ``float`` or ``int``.
+
+    Returns
+    -------
+    Member
+        What the class of the bundle makes a member of.
+    """
     return Member("number", of)
 
 
@@ -108,6 +148,15 @@ class Bundle:
     **members : array, number or Bundle
         Every member by its name. Cells may be left out, and are zero then.
 
+    Attributes
+    ----------
+    declared : dict of str to Member
+        The members that the class declares, by name.
+    methods : bool
+        Whether the class has kernels for methods.
+    named : frozenset of str
+        The extents that it declares to be read by name.
+
     Raises
     ------
     TypeError
@@ -131,15 +180,17 @@ class Bundle:
     """
 
     declared: ClassVar[dict[str, Member]] = {}
-    """The members that the class declares, by name."""
     methods: ClassVar[bool] = False
-    """Whether the class has kernels for methods."""
-
     named: ClassVar[frozenset[str]] = frozenset()
-    """The extents that it declares to be read by name."""
 
     def __init_subclass__(cls) -> None:
         own = {name: value for name, value in vars(cls).items() if isinstance(value, Member)}
+        for name in own:
+            if name in _TAKEN or hasattr(Bundle, name):
+                raise TypeError(
+                    f"{cls.__name__}.{name}: every bundle has something else by the name of "
+                    f"{name!r}; call this member something else"
+                )
         cls.named = cls.named | {name for name, value in own.items() if value.role == "extent"}
         cls.declared = cls.declared | {k: v for k, v in own.items() if k not in cls.named}
         cls.methods = cls.methods or any(hasattr(value, "py_func") for value in vars(cls).values())
@@ -192,6 +243,17 @@ class Bundle:
         **given : int, array, number or Bundle
             The extents by name, and members that are not to be zeros; a whole number may be both.
             Parts are allocated with the same extents.
+
+        Returns
+        -------
+        Bundle
+            Of this class.
+
+        Raises
+        ------
+        TypeError
+            If an extent is missing, or something is given that is neither a member nor a whole
+            number. Extents that no array has are ignored: those of a robot fit every bundle.
         """
         extents = {
             name: value
@@ -199,6 +261,9 @@ class Bundle:
             if name not in cls.declared or cls.declared[name] == Member("number", int)
         }
         members = {name: value for name, value in given.items() if name in cls.declared}
+        for name, value in extents.items():
+            if not isinstance(value, int | np.integer):
+                raise TypeError(f"{cls.__name__} has no {name}, and an extent is a whole number")
         for name, member in cls.declared.items():
             if name in members or member.role == "cell":
                 continue
@@ -277,13 +342,34 @@ class Bundle:
         return {name: getattr(self, name) for name in self.declared}
 
     def replaced(self: _Some, **changes: Any) -> _Some:
-        """Return a bundle with some other members, which shares the rest."""
+        """Return a bundle with some other members, which shares the rest.
+
+        Parameters
+        ----------
+        **changes : array, number or Bundle
+            The others, by name.
+
+        Returns
+        -------
+        Bundle
+            Of the same class.
+        """
         return type(self)(**self.members() | changes)
 
     def storage(self, prefix: str = "") -> Iterator[tuple[str, np.ndarray[Any, Any]]]:
         """Yield the arrays behind it by name, ``part.array`` those of its parts.
 
         Addresses are left out; its cells are one array.
+
+        Parameters
+        ----------
+        prefix : str
+            What the names begin with.
+
+        Yields
+        ------
+        tuple of str and array
+            Name and array.
         """
         if self._cell_count():
             yield f"{prefix}cells", self.__dict__["_cells"]
@@ -298,7 +384,20 @@ class Bundle:
         place: Callable[[str, np.ndarray[Any, Any]], np.ndarray[Any, Any]],
         prefix: str = "",
     ) -> _Some:
-        """Return a copy whose storage is what `place(name, array)` makes of that of this one."""
+        """Return a copy whose arrays are made of those of this one.
+
+        Parameters
+        ----------
+        place : callable
+            ``place(name, array)`` returns an array of the same shape.
+        prefix : str
+            What the names begin with.
+
+        Returns
+        -------
+        Bundle
+            The copy.
+        """
         cells = self.__dict__["_cells"]
         if self._cell_count():
             cells = place(f"{prefix}cells", cells)
@@ -314,6 +413,11 @@ class Bundle:
 
     def check(self, extents: Mapping[str, int]) -> None:
         """Refuse to be one for other extents.
+
+        Parameters
+        ----------
+        extents : mapping of str to int
+            Extents by name.
 
         Raises
         ------
@@ -353,6 +457,11 @@ class Bundle:
     def fill(self, contents: Mapping[str, np.ndarray[Any, Any]]) -> None:
         """Put contents of a bundle of the same kind and shapes in the place of its own.
 
+        Parameters
+        ----------
+        contents : mapping of str to array
+            What :meth:`contents` of that one returned.
+
         Raises
         ------
         ValueError
@@ -367,7 +476,13 @@ class Bundle:
             mine[...] = contents[name]
 
     def become(self, other: Bundle) -> None:
-        """Copy what is in a bundle of the same kind and shapes."""
+        """Copy what is in a bundle of the same kind and shapes.
+
+        Parameters
+        ----------
+        other : Bundle
+            That bundle.
+        """
         self.fill(dict(other.storage()))
 
 

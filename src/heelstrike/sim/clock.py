@@ -25,7 +25,8 @@ class Clock(Bundle):
     control_period : float
         Seconds between two calls, zero for at every step.
     calls : int
-        How often the controller has been called.
+        How often the controller has been called; of one that goes by time and was set later, how
+        often it would have been.
     answered : int
         Whether a controller in Python has been, for this instant.
     record_every : int

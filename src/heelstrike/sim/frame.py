@@ -134,7 +134,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 prepare(model, ground, memory, work)
                 due = clock.time >= clock.calls * clock.control_period
                 if clock.control_every > 0:
-                    due = clock.index % clock.control_every == 0
+                    due = clock.calls == 0 or clock.index % clock.control_every == 0
                 if due:
                     if control.in_python == 0:
                         ask(

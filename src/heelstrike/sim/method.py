@@ -157,6 +157,19 @@ class Method(ABC):
             return time
         return clock.start + round((time - clock.start) / self.step_length) * self.step_length
 
+    def forget_ground(self, robot: Robot, work: Any, clock: Clock) -> None:  # noqa: B027
+        """Forget what touches the ground, because another has been laid.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        work : Bundle
+            Its bundle.
+        clock : Clock
+            Clock of the simulation.
+        """
+
     def rows_in(self, duration: float, record_every: int) -> int:
         """Return about how many rows the record of a time has.
 

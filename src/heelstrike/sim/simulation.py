@@ -5,7 +5,7 @@ from __future__ import annotations
 import time as clock_time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Unpack
+from typing import Any, NoReturn, Unpack
 
 import numpy as np
 
@@ -113,7 +113,8 @@ class Simulation:
     >>> import heelstrike as hs
     >>> robot = hs.load_robot("compass_gait")
     >>> simulation = hs.Simulation(robot, state=robot.reference_state(), stop_when_fallen=False)
-    >>> simulation.step()
+    >>> simulation.step().value, simulation.time
+    ('completed', 0.001)
     >>> simulation.advance(0.01).value, simulation.time
     ('completed', 0.01)
     """
@@ -132,7 +133,9 @@ class Simulation:
         pushes: Sequence[Push] | Push = (),
         checked: bool = False,
     ) -> None:
-        begin = state.state if isinstance(state, Snapshot) else state
+        begin, given = state.state if isinstance(state, Snapshot) else state, ground
+        if isinstance(state, Snapshot) and ground is None:
+            ground = _ground_of(state)
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
             stop_when_fallen=stop_when_fallen, pushes=pushes, checked=checked,
@@ -142,9 +145,20 @@ class Simulation:
         self._control_with(controller)
         if isinstance(state, Snapshot):
             self.restore(state)
-            if ground is not None:
-                self.ground = ground
+            if given is not None:
+                self.ground = given
+            if stop_when_fallen is not None and (
+                not stop_when_fallen or not np.isfinite(self._clock.fallen_height)
+            ):
+                self._clock.fallen_height = setting.fallen_height
             self.apply(setting.pushes)
+
+    def __reduce__(self) -> NoReturn:
+        """Copies would share memory that compiled code finds by address."""
+        raise TypeError(
+            "a simulation cannot be copied or pickled: begin another one with "
+            "state=simulation.snapshot()"
+        )
 
     def _begin(
         self, setting: Setting, method: Method, memory: Memory | None = None,
@@ -220,8 +234,6 @@ class Simulation:
     def ground(self, ground: Ground) -> None:
         if not isinstance(ground, Ground):
             raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-        setting = replace(self._setting, ground=ground)
-        self.method.check(setting)
         at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
         deep = at.gap < min(-LAID, float(np.min(self.contacts.gap, initial=0.0)) - LAID)
         if np.any(deep):
@@ -232,7 +244,11 @@ class Simulation:
                 f"{float(np.max(-at.gap[deep] / at.normal[deep, 1])):.3g} m, or lay it before "
                 "the robot is there"
             )
-        self._ground, self._setting = ground, setting
+        self.method.check(replace(self._setting, ground=ground, state=self.state))
+        mine, its = self._ground.numbers(), ground.numbers()
+        if not all(np.array_equal(mine[name], its[name]) for name in mine):
+            self.method.forget_ground(self.robot, self._work, self._clock)
+        self._ground = ground
 
     @property
     def controller(self) -> Controller | None:
@@ -263,10 +279,20 @@ class Simulation:
         Raises
         ------
         SimulationError
-            If the robot has no such link.
+            If the robot has no such link, or the push would be over.
         """
-        self._pushes += checked_pushes(self.robot, push)
-        self._memory = self._memory.replaced(pushes=pushes_on(self.robot, self._pushes))
+        added = checked_pushes(self.robot, push)
+        for each in added:
+            if each.end < self.time:
+                raise SimulationError(
+                    f"the push on {each.link!r} would be over since t = {each.end:.6g} s: now is "
+                    f"{self._now}. Let it start later"
+                )
+        self._pushes += added
+        pushes = pushes_on(self.robot, self._pushes)
+        share = self._memory.pushes.share  # of those that act
+        pushes.share[: len(share)] = share
+        self._memory = self._memory.replaced(pushes=pushes)
 
     def step(self) -> RunStatus:
         """Take one step of the method; return how the simulation goes.
@@ -302,10 +328,11 @@ class Simulation:
             If the simulation has come to its end, the time is past, or there is no room for the
             record.
         """
-        if not np.isfinite(until) or until < self.time:
+        instant = self.method.instant(self._clock, until) if np.isfinite(until) else -np.inf
+        if instant < self.time:
             raise SimulationError(f"until must be a time from now, {self._now}, on; got {until}")
-        self.method.check_span(self._setting, until - self.time)
-        return self._advance(self.method.instant(self._clock, until), NEVER, progress)
+        self.method.check_span(self._setting, max(until - self.time, 0.0))
+        return self._advance(instant, NEVER, progress)
 
     def _advance(
         self, until: float, pause: int, progress: Callable[[float], None] | None = None,
@@ -320,6 +347,7 @@ class Simulation:
         self._clock.forked = 0
         self._fork = None
         self._complaint = ""
+        self.error = None
         try:
             self.status, self.message = self._go(pause, progress, stopped)
         except KeyboardInterrupt as interrupt:
@@ -395,7 +423,7 @@ class Simulation:
         except KeyboardInterrupt:
             raise
         except BaseException as error:
-            self.error = error
+            self.error = error if self.error is None else self.error
             self._complaint = f"progress raised {_raised(error)}"
 
     def _ask(self) -> tuple[RunStatus, str] | None:
@@ -486,19 +514,18 @@ class Simulation:
         record.rows = record.events = 0
 
     def _control_with(self, controller: Controller | None) -> None:
-        """Begin with a controller."""
-        robot, setting = self.robot, self._setting
+        """Begin with a controller, or stay with the one before if this one cannot be used."""
+        robot, setting, memory, clock = self.robot, self._setting, self._memory, self._clock
         law = law_of(controller)
-        self._controller = controller
-        self._python: Any = controller if law is None else None
+        python: Any = controller if law is None else None
         if law is not None and controller is not None:
             in_python = setting.checked or not law.function.compiles
-            self._python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
-        memory = self._memory
-        compiled = Law(no_torque) if law is None or self._python is not None else law
+            python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
+        compiled = Law(no_torque) if law is None or python is not None else law
         ready = ReadyLaw(robot, compiled, memory.tree, memory.contacts)
-        self._numbers = self._python.numbers if isinstance(self._python, AskedLaw) else ready
-        self._kernel, self._control = compiled.function.finish(), ready.control
+        self._kernel = compiled.function.finish()
+        self._controller, self._python, self._control = controller, python, ready.control
+        self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
         self._name = f"{type(controller).__name__}.torque"
         self._shown = read_only(memory.contacts)
         memory.stiffness[:] = robot.model.stiffness
@@ -508,12 +535,17 @@ class Simulation:
             driven = robot.model.actuator_joint
             memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
             memory.damping[driven] += 0.0 if law.damping is None else law.damping
-        if self._python is None:
+        self.method.set_clock(setting, clock)
+        if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
             self._control.in_python = 1
             if setting.control_period is None and self.method.python_period is not None:
-                self._clock.control_period = self.method.python_period
+                clock.control_period = self.method.python_period
+        # It is due at once, and then at the whole periods, as if it had been called all the time.
+        period = clock.control_period
+        clock.calls = int(clock.time / period + 1e-9) if period > 0.0 else 0
+        clock.answered = 0
         self._watch = Watch(robot, ready, memory)
 
     def snapshot(self) -> Snapshot:
@@ -550,6 +582,8 @@ class Simulation:
         SimulationError, ControllerError
             If it is one of another robot, method or controller, or damaged.
         """
+        if not isinstance(snapshot, Snapshot):
+            raise SimulationError(f"restore takes a Snapshot, got {type(snapshot).__name__}")
         for what, mine in self._identity().items():
             its = snapshot.identity.get(what)
             if its != mine:
@@ -557,6 +591,7 @@ class Simulation:
         self._put_back(snapshot)
         self._recorded_until = snapshot.time
         self._records.clear()
+        self._fork = None
         self.status, self.message, self.error = (
             RunStatus.COMPLETED,
             f"restored at {self._now}",
@@ -564,16 +599,25 @@ class Simulation:
         )
 
     def _put_back(self, snapshot: Snapshot) -> None:
+        """Take up what a snapshot holds, or leave everything as it is."""
+        before: list[tuple[Bundle, dict[str, Any]]] = []
         try:
+            float(snapshot.arrays["time"])
             pushes = pushes_of_numbers(snapshot.part("push"))
-            ground = Ground.of_numbers(snapshot.part("ground"))
+            ground = _ground_of(snapshot)
             memory = self._memory.replaced(pushes=pushes_on(self.robot, pushes))
-            for name, bundle in self._bundles(memory):
+            bundles = self._bundles(memory)
+            before = [(bundle, bundle.contents()) for _, bundle in bundles]
+            for name, bundle in bundles:
                 bundle.fill(snapshot.part(name))
             if self._python is not None:
                 _partaking(self._python, self._name).restore(snapshot.arrays["controller"].copy())
-        except (KeyError, ValueError) as error:
-            raise SimulationError(f"the snapshot is damaged: {error}") from error
+        except BaseException as error:
+            for bundle, contents in before:
+                bundle.fill(contents)
+            if isinstance(error, KeyError | ValueError):
+                raise SimulationError(f"the snapshot is damaged: {error}") from error
+            raise
         self._memory, self._pushes, self._ground = memory, pushes, ground
 
     def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
@@ -600,12 +644,15 @@ class Simulation:
             return self._run(self.status, self.message)
         now = self.snapshot()
         counts = [(record.rows, record.events) for record in self._records]
-        run = self._run(*self._decide_last(), final=now)
-        self._put_back(now)
-        del self._records[len(counts) :]
-        for record, (rows, events) in zip(self._records, counts, strict=True):
-            record.rows, record.events = rows, events
-        return run
+        own = self._pushes, self._ground, self.error
+        try:
+            return self._run(*self._decide_last(), final=now)
+        finally:
+            self._put_back(now)
+            self._pushes, self._ground, self.error = own
+            del self._records[len(counts) :]
+            for record, (rows, events) in zip(self._records, counts, strict=True):
+                record.rows, record.events = rows, events
 
     @property
     def _can_be_kept(self) -> bool:
@@ -624,12 +671,15 @@ class Simulation:
         finally:
             self._clock.finishing = 0
 
+    def _final(self) -> Snapshot | None:
+        """Return what goes on as if it had not been told to stop here."""
+        if not self._can_be_kept:
+            return None
+        final = self.snapshot() if self._fork is None else self._fork
+        return Snapshot(final.arrays | {"time": np.array(self.time)}, final.identity)
+
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
-        if self._fork is not None:
-            final = self._fork
-        if final is not None:
-            final = Snapshot(final.arrays | {"time": np.array(self.time)}, final.identity)
         return Run(
             robot=self.robot,
             ground=self._ground,
@@ -690,7 +740,7 @@ def simulate(
     check_duration(duration)
     simulation = Simulation(robot, controller, **setup)
     simulation.advance(simulation._recorded_until + duration, progress=progress)
-    final = simulation.snapshot() if simulation._can_be_kept else None
+    final = simulation._final()
     return simulation._run(*simulation._decide_last(), final=final)
 
 
@@ -738,6 +788,7 @@ def simulation_to_the_end(
     simulation._control_with(law)
     until = method.instant(simulation._clock, duration)
     simulation._advance(until, NEVER, stopped=stopped)
+    final = simulation._final() if keep_rows else None
     status, message = simulation._decide_last()
     last = simulation._records[-1]
     state = simulation.state
@@ -748,7 +799,7 @@ def simulation_to_the_end(
         simulation._count_events()
         events = simulation._event_counts
         return Ending(status, message, state, simulation.time, events, None, last)
-    run = simulation._run(status, message)
+    run = simulation._run(status, message, final)
     events = np.bincount([event.kind for event in run.events], minlength=len(EventKind))
     return Ending(status, message, state, simulation.time, events, run, None)
 
@@ -768,6 +819,13 @@ def checked_method(method: Method | None) -> Method:
             f"method must be a way through time such as TimeStepping(), got {type(method).__name__}"
         )
     return method
+
+
+def _ground_of(snapshot: Snapshot) -> Ground:
+    try:
+        return Ground.of_numbers(snapshot.part("ground"))
+    except (KeyError, ValueError) as error:
+        raise SimulationError(f"the snapshot is damaged: {error}") from error
 
 
 def _named(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import os
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +22,8 @@ from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
 _FORMAT = 1
+# What reading an archive raises when its bytes are others.
+_DAMAGED = (ValueError, KeyError, AttributeError, TypeError, EOFError, RuntimeError, OverflowError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +51,10 @@ class Snapshot:
 
     @property
     def state(self) -> State:
-        """Position and velocity of the robot."""
+        """Position and velocity of the robot; of ``run.final``, perhaps one step before its time.
+
+        Where the end of a run cut a step short, it goes on from the beginning of that step.
+        """
         return State(self.arrays["memory.q"], self.arrays["memory.v"])
 
     def part(self, name: str) -> dict[str, NDArray[Any]]:
@@ -119,7 +126,7 @@ def load_snapshot(path: str | os.PathLike[str]) -> Snapshot:
         layout = identity.pop("format")
     except OSError as error:
         raise SimulationError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, KeyError, AttributeError, EOFError, zipfile.BadZipFile) as error:
+    except (*_DAMAGED, zipfile.BadZipFile, zlib.error, struct.error) as error:
         raise SimulationError(f"{path}: not a snapshot of a simulation, or damaged") from error
     if layout != _FORMAT:
         raise SimulationError(

@@ -191,6 +191,11 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
     compile : bool
         False runs the function as it is, in Python, where a debugger can stop in it.
 
+    Returns
+    -------
+    ControllerFunction
+        What makes laws; or, without `function`, what makes a function one.
+
     Raises
     ------
     ControllerError
@@ -276,7 +281,18 @@ class Law:
         self._asked: AskedLaw | None = None
 
     def with_parameters(self, parameters: Bundle) -> Law:
-        """Return the same law with other parameters."""
+        """Return the same law with other parameters.
+
+        Parameters
+        ----------
+        parameters : Bundle
+            Its numbers.
+
+        Returns
+        -------
+        Law
+            The law.
+        """
         return Law(
             self.function, parameters, memory=self.memory, robot=self.robot,
             stiffness=self.stiffness, damping=self.damping,
@@ -284,6 +300,16 @@ class Law:
 
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
         """Return its parameters, and a memory to begin with, for a robot; all can be set.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Returns
+        -------
+        tuple of Bundle
+            Parameters and memory.
 
         Raises
         ------
@@ -312,7 +338,21 @@ class Law:
         self._asked = None
 
     def torque(self, t: float, state: State, contacts: Contacts | None) -> NDArray[np.float64]:
-        """Return the joint torques (nu,), in N m; at t = 0 it begins anew.
+        """Return the joint torques; at t = 0 it begins anew.
+
+        Parameters
+        ----------
+        t : float
+            Time (s).
+        state : State
+            Where the robot is.
+        contacts : Contacts or None
+            How it touches the ground; None for as at the call before.
+
+        Returns
+        -------
+        (nu,) float
+            Torques (N m), in the order of the actuators.
 
         Raises
         ------

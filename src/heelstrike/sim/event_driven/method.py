@@ -217,6 +217,14 @@ class EventDriven(Method):
             check_steps(setting, duration, *self.row_period)
         check_room(setting, duration, *self.row_period)
 
+    def forget_ground(self, robot: Robot, work: Phase, clock: Clock) -> None:
+        """Look for what touches the ground as at the beginning."""
+        for told in (work.closed, work.slide, work.stuck, work.passing):
+            told[: robot.nc] = 0
+        work.accumulation[: robot.nc] = np.inf
+        work.fired[:] = 0
+        clock.begun = 0
+
     def rows_in(self, duration: float, record_every: int) -> int:
         """Return about how many rows the record of a time has."""
         return 1024 if self.output_period is None else super().rows_in(duration, record_every) + 64
