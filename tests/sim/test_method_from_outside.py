@@ -306,3 +306,26 @@ def test_compare(tmp_path: Path) -> None:
     np.testing.assert_allclose(soft.position[falls], hard.position[falls], atol=1e-12)
     assert soft.certificates.penetration > 1e-4 > hard.certificates.penetration
     assert "soft" in str(found)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Turf(hs.KelvinVoigt):
+    """A law from outside: the force of a package's law, from numbers of its own."""
+
+    depth: float = 2e-3
+    load: float = 5.0
+
+    def write(self, numbers: Any) -> None:
+        hs.KelvinVoigt(stiffness=self.load / self.depth, damping=self.damping).write(numbers)
+
+
+def test_a_contact_law_from_outside(tmp_path: Path) -> None:
+    """The weight of the box on its four corners, and how deep they sink in."""
+    law = Turf(damping=100.0, load=9.81 * 2.0 / 4, depth=2e-3)
+    run = drop(hs.Compliant(law=law), duration=1.0, pushes=[])
+    assert run.completed, run.message
+    deepest = -run.gap[-1].min()
+    assert deepest == pytest.approx(law.depth * 4 / np.sum(run.gap[-1] < 0.0), rel=1e-2)
+    path = run.save(tmp_path / "run.nc")
+    assert isinstance(hs.load_run(path).method, UnknownMethod)
+    assert hs.load_run(path, classes=[Turf]).method == run.method

@@ -31,9 +31,9 @@ class Method(ABC):
 
     A new one is a frozen dataclass, and may live outside this package. It has
 
-    - fields, its settings: numbers, text, truth values, members of an enum, None, or frozen
-      dataclasses of such (laws). One that is not a number has a default of its kind, by which a
-      file tells what it is;
+    - fields, its settings, by names that are not used below: numbers, text, truth values, members of
+      an enum, None, or frozen dataclasses of such (laws). One that is neither number nor text has a
+      default of its kind, by which it is made again from a file;
     - `work`, the class of its bundle: settings that kernels read, and all that it remembers;
     - `kernels`, what the frame calls; each is a :func:`~heelstrike.sim.kernel`;
     - :attr:`solves_with`, :meth:`new_work`, :meth:`room` and :attr:`row_period`;
