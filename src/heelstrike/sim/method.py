@@ -31,7 +31,7 @@ class Method(ABC):
 
     A new one is a frozen dataclass, and may live outside this package. It has
 
-    - fields, its settings, by names that are not used below: numbers, text, truth values, members of
+    - fields, its settings, by names not used below: numbers, text, truth values, members of
       an enum, None, or frozen dataclasses of such (laws). One that is neither number nor text has a
       default of its kind, by which it is made again from a file;
     - `work`, the class of its bundle: settings that kernels read, and all that it remembers;
