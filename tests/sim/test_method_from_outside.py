@@ -278,6 +278,18 @@ def test_where_impulses_are_comes_back(run: hs.Run, tmp_path: Path) -> None:
     assert not hs.load_run(run.save(tmp_path / "run.nc")).method.impulses_in_events
 
 
+class Renamed(hs.TimeStepping):
+    """A method of the package under another name."""
+
+
+def test_a_class_with_no_settings_of_its_own_comes_back(run: hs.Run, tmp_path: Path) -> None:
+    method = Renamed(step=2e-3)
+    path = replace(run, method=method).save(tmp_path / "run.nc")
+    again = hs.load_run(path, classes=[Renamed]).method
+    assert type(again) is Renamed
+    assert again == method
+
+
 def test_settings_that_do_not_fit_its_class(run: hs.Run, tmp_path: Path) -> None:
     @dataclass(frozen=True, kw_only=True)
     class Strict(SpringDamper):

@@ -7,6 +7,7 @@ import dataclasses
 import os
 import random
 import time
+import types
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +144,8 @@ class Lawful(hs.TimeStepping):
     law: Any = hs.KelvinVoigt()  # noqa: RUF009 - frozen
 
 
-UNREADABLE = {
+UNREADABLE: dict[str, tuple[Any, str]] = {
+    "no dataclass": (types.SimpleNamespace(), "SimpleNamespace is not a frozen dataclass"),
     "a list": (Gridded(), r"its setting grid is neither number nor text, but \(1.0, 2.0"),
     "a name that is ours": (
         dataclasses.make_dataclass("EventDriven", [], bases=(hs.TimeStepping,), frozen=True)(),

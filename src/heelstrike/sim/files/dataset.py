@@ -224,8 +224,8 @@ def unreadable(thing: Any) -> str:
     """Say why a method, or a law of it, could not be made again of its settings; or nothing."""
     if isinstance(thing, UnknownMethod):
         return ""
-    kind = type(thing)
-    if not (is_dataclass(kind) and vars(kind)["__dataclass_params__"].frozen):
+    kind: Any = type(thing)
+    if not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
         return f"{kind.__name__} is not a frozen dataclass"
     if (METHODS | LAWS).get(kind.__name__, kind) is not kind:
         return f"heelstrike has a {kind.__name__} of its own; call it something else"

@@ -53,8 +53,8 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
     kept = "the run is still in memory, to be saved elsewhere"
     if reason := unreadable(run.method):
         raise RunFileError(
-            f"cannot write {path}: a run by {run.method!r} could not be read again: {reason}; "
-            f"{kept}, as run.to_dataset() or array by array"
+            f"cannot write {path}: a run by {type(run.method).__name__} could not be read again: "
+            f"{reason}; {kept}, as run.to_dataset() or array by array"
         )
     try:
         # HDF5 crashes on a disk that is full. In memory it never meets one.

@@ -207,7 +207,7 @@ class _Stored:
     ) -> None:
         self.source = source
         self.contents = contents
-        self.kinds = METHODS | LAWS | {kind.__name__: kind for kind in classes}
+        self.kinds = {kind.__name__: kind for kind in classes} | METHODS | LAWS
 
     def damaged(self, what: str) -> RunFileError:
         return RunFileError(f"{self.source}: damaged: {what}")
