@@ -24,7 +24,7 @@ SAME_INSTANT = 1e-9
 
 def impulses_in_events(run: Run) -> bool:
     """Whether the impulses of impacts are in the run's events, not in its forces."""
-    return bool(getattr(run.method, "impulses_in_events", False))
+    return run.method.impulses_in_events
 
 
 def mean_over_intervals(run: Run, values: Floats) -> Floats:

@@ -9,6 +9,8 @@ controller, pushes, the record, stopping, keeping and continuing - is the same f
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,8 +29,32 @@ from heelstrike.sim.setting import Setting
 class Method(ABC):
     """A way through time: :class:`~heelstrike.TimeStepping` and its like.
 
-    A new one is a frozen dataclass with the class attributes `kernels` and `work`, and the methods
-    below that have no body here. Its numbers live in its work, where kernels read them.
+    A new one is a frozen dataclass, and may live outside this package. It has
+
+    - fields, its settings, by names not used below: numbers, text, truth values, members of
+      an enum, None, or frozen dataclasses of such (laws). One that is neither number nor text has a
+      default of its kind, by which it is made again from a file;
+    - `work`, the class of its bundle: settings that kernels read, and all that it remembers;
+    - `kernels`, what the frame calls; each is a :func:`~heelstrike.sim.kernel`;
+    - :attr:`solves_with`, :meth:`new_work`, :meth:`room` and :attr:`row_period`;
+    - :attr:`step_length`, if all its steps are of one length;
+    - whatever else below is not so with it.
+
+    The frame sees to the controller, the limits of torques, the record and when to stop. The
+    kernels of the method see to
+
+    - ``prepare``: ``memory.tree`` and ``memory.contacts`` of the state in ``memory.q``,
+      ``memory.v``;
+    - ``decide``: what follows from these and from ``memory.torque``: forces in
+      ``memory.contacts.force`` (N), ``memory.stop_torque``, ``memory.friction_torque``, slip in
+      ``memory.slip``, residuals; pushes in ``memory.pushes``; worst values and events;
+    - ``report``: a row when one is due;
+    - ``move``: ``memory.q``, ``memory.v`` and ``clock.time`` of the next instant, not beyond
+      ``clock.until`` if steps have no length of their own, and one more in ``memory.tally.steps``.
+
+    Everything that they remember from one instant to the next is in memory or work: that is what a
+    snapshot keeps. `heelstrike.sim` has the kernels that the methods of this package are made of;
+    ``docs/methods.md`` shows where to begin.
     """
 
     kernels: ClassVar[Kernels]
@@ -46,6 +72,11 @@ class Method(ABC):
 
     step_length: float | None = None
     """Seconds from one instant to the next, if all steps are of one length."""
+
+    @property
+    def name(self) -> str:
+        """What runs and files call it."""
+        return type(self).__name__
 
     @property
     @abstractmethod
@@ -201,6 +232,27 @@ class Method(ABC):
             In a person's words.
         """
         return ""
+
+
+@dataclass(frozen=True)
+class UnknownMethod:
+    """What a file tells of a method whose class, or that of a law of it, is not known.
+
+    Runs made with it can be looked at, compared and saved again, but not gone on with.
+
+    Parameters
+    ----------
+    name : str
+        Name of its class.
+    settings : mapping
+        Its settings as they are in the file; those of a law begin with the law's name.
+    impulses_in_events : bool
+        Whether impulses of impacts are in the events of a run, not in the forces of its rows.
+    """
+
+    name: str
+    settings: Mapping[str, str | int | float] = field(hash=False)
+    impulses_in_events: bool = False
 
 
 def solver_order(name: str) -> Integers:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.summary import Summary
-    from heelstrike.sim.method import Method
+    from heelstrike.sim.method import Method, UnknownMethod
 
 Floats = NDArray[np.float64]
 
@@ -116,7 +116,8 @@ class Run:
     ----------
     robot : Robot
     ground : Ground
-    method : Method
+    method : Method or UnknownMethod
+        How it went through time; unknown if only its file told so.
     status : RunStatus
         How the run ended.
     message : str
@@ -168,7 +169,7 @@ class Run:
 
     robot: Robot
     ground: Ground
-    method: Method
+    method: Method | UnknownMethod
     status: RunStatus
     message: str
     time: Floats
@@ -196,7 +197,7 @@ class Run:
     def __repr__(self) -> str:
         last = self.time[-1] if len(self.time) else 0.0
         return (
-            f"Run({self.robot.name}, {type(self.method).__name__}, {last:.6g} s, "
+            f"Run({self.robot.name}, {self.method.name}, {last:.6g} s, "
             f"{self.status.value}, {self.steps} steps)"
         )
 

@@ -25,7 +25,7 @@ from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
 from heelstrike.sim.memory import Memory, Record, allocate_memory, allocate_record
-from heelstrike.sim.method import Method
+from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.run import Run, Timing, recorded, tallied
 from heelstrike.sim.setting import (
@@ -814,6 +814,11 @@ def checked_method(method: Method | None) -> Method:
     """Return a way through time, time stepping if none is asked for, or refuse what is none."""
     if method is None:
         return TimeStepping()
+    if isinstance(method, UnknownMethod):
+        raise SimulationError(
+            f"{method.name} is here as data only, as its file tells of it; load the run with the "
+            f"class, or those of its laws: load_run(path, classes=[{method.name}])"
+        )
     if not isinstance(method, Method):
         raise SimulationError(
             f"method must be a way through time such as TimeStepping(), got {type(method).__name__}"

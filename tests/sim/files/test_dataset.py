@@ -260,7 +260,7 @@ def _last_set(value: float) -> Any:
         (None, _replaced("event_contact", _last_set(77)), "contact point that is not there"),
         (None, _replaced("event_kind", _last_set(99)), "99"),
         (None, _attribute(status="splendid"), "status 'splendid' is unknown"),
-        (None, _attribute(method="Magic"), "method 'Magic' is unknown"),
+        (None, _attribute(method="No name"), "the method is called 'No name'"),
         (None, _attribute(method_step=-1.0), "positive"),
         (None, _attribute(method_step="soon"), "not a number"),
         (None, _attribute(heelstrike_format=999), "layout 999"),

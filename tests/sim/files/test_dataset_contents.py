@@ -212,6 +212,7 @@ def test_attributes(data: xarray.Dataset) -> None:
         "method_scheme": "gap_linearised",
         "method_solver": "gauss_seidel",
         "method_activation": 1e-4,
+        "impulses_in_events": 0,
         "ground_slope": 0.0,
         "ground_has_profile": 1,
         "worst_penetration": 1e-3,

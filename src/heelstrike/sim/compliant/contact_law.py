@@ -7,6 +7,9 @@ friction laws take energy out of the robot or store it, and never give back more
 
 Signs: `gap` is negative in the ground, ``penetration = −gap``; `normal_speed` is the rate of the
 gap, positive when leaving; forces act on the robot.
+
+A law from outside derives from one of these four, as a frozen dataclass with settings of its own,
+and says in `write` what numbers of that law they come to: the forces themselves are kernels here.
 """
 
 from __future__ import annotations

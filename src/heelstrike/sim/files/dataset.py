@@ -17,6 +17,7 @@ from heelstrike.sim.compliant.contact_law import (
 )
 from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.event_driven.method import EventDriven
+from heelstrike.sim.method import UnknownMethod
 from heelstrike.sim.run import Run
 from heelstrike.sim.status import EventKind
 from heelstrike.sim.time_stepping.method import TimeStepping
@@ -183,8 +184,9 @@ def _attributes(run: Run) -> dict[str, Any]:
         "robot": run.robot.name,
         "status": run.status.value,
         "message": _writable(run.message),
-        "method": type(run.method).__name__,
+        "method": run.method.name,
         **_settings("method", run.method),
+        "impulses_in_events": int(run.method.impulses_in_events),
         "ground_slope": float(run.ground.slope),
         "ground_has_profile": int(run.ground.profile is not None),
         **{f"worst_{name}": float(getattr(run.certificates, name)) for name in WORST},
@@ -203,6 +205,8 @@ def _attributes(run: Run) -> dict[str, Any]:
 
 def _settings(prefix: str, thing: Any) -> dict[str, str | int | float]:
     """Fields of a frozen dataclass as attributes: enums by name, dataclasses with their own."""
+    if isinstance(thing, UnknownMethod):
+        return {f"{prefix}_{name}": value for name, value in thing.settings.items()}
     settings: dict[str, str | int | float] = {}
     for field in fields(thing) if is_dataclass(thing) else ():
         name, value = f"{prefix}_{field.name}", getattr(thing, field.name)
@@ -211,6 +215,28 @@ def _settings(prefix: str, thing: Any) -> dict[str, str | int | float]:
         else:
             settings[name] = _plain(value)
     return settings
+
+
+_PLAIN = (str, int, float, enum.Enum, np.bool_, np.number)
+
+
+def unreadable(thing: Any) -> str:
+    """Say why a method, or a law of it, could not be made again of its settings; or nothing."""
+    if isinstance(thing, UnknownMethod):
+        return ""
+    kind: Any = type(thing)
+    if not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
+        return f"{kind.__name__} is not a frozen dataclass"
+    if (METHODS | LAWS).get(kind.__name__, kind) is not kind:
+        return f"heelstrike has a {kind.__name__} of its own; call it something else"
+    for field in fields(thing):
+        value = getattr(thing, field.name)
+        if is_dataclass(value):
+            if reason := unreadable(value):
+                return reason
+        elif value is not None and not isinstance(value, _PLAIN):
+            return f"its setting {field.name} is neither number nor text, but {value!r}"
+    return ""
 
 
 def _plain(value: Any) -> str | int | float:

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 from heelstrike.errors import RunFileError, WriteError
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.files.dataset import METHODS, ROBOT_GROUP, to_dataset
+from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset, unreadable
 from heelstrike.sim.files.hdf5_contents import (
     Contents,
     HostileFileError,
@@ -46,14 +47,14 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     RunFileError
-        If the folder does not exist, cannot be written to or is full. The run is as it was, and so
-        is an older file.
+        If the folder does not exist, cannot be written to or is full, or the method is one that
+        could not be read again. The run is as it was, and so is an older file.
     """
     kept = "the run is still in memory, to be saved elsewhere"
-    if METHODS.get(type(run.method).__name__) is not type(run.method):
+    if reason := unreadable(run.method):
         raise RunFileError(
-            f"cannot write {path}: a run by {type(run.method).__name__} could not be read again, "
-            f"only one by {', '.join(METHODS)}; {kept}, as run.to_dataset() or array by array"
+            f"cannot write {path}: a run by {type(run.method).__name__} could not be read again: "
+            f"{reason}; {kept}, as run.to_dataset() or array by array"
         )
     try:
         # HDF5 crashes on a disk that is full. In memory it never meets one.
@@ -94,7 +95,9 @@ def _image(run: Run) -> io.BytesIO:
     return image
 
 
-def load_run(path: str | os.PathLike[str], robot: Robot | None = None) -> Run:
+def load_run(
+    path: str | os.PathLike[str], robot: Robot | None = None, classes: Sequence[type] = ()
+) -> Run:
     """Read a run that was saved with :meth:`Run.save`.
 
     Parameters
@@ -104,6 +107,9 @@ def load_run(path: str | os.PathLike[str], robot: Robot | None = None) -> Run:
     robot : Robot, optional
         Robot to attach to the run, instead of the one the file describes. Its coordinates,
         actuators and contact points must have the names of the file's.
+    classes : sequence of type
+        Methods and contact laws from outside the package that the run may be made with. A method
+        that is not known is loaded as data, an :class:`~heelstrike.sim.method.UnknownMethod`.
 
     Returns
     -------
@@ -137,7 +143,7 @@ def load_run(path: str | os.PathLike[str], robot: Robot | None = None) -> Run:
     except (OSError, ValueError) as error:  # also a path with a null character
         raise RunFileError(f"{source}: cannot be read ({error})") from error
     try:
-        return stored_run(source, found, robot)
+        return stored_run(source, found, robot, classes)
     except MemoryError as error:
         raise RunFileError(f"{source}: the run does not fit into memory") from error
 

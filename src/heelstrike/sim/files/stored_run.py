@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import enum
 import math
-from collections.abc import Mapping
-from dataclasses import MISSING, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,7 @@ from heelstrike.sim.files.dataset import (
 )
 from heelstrike.sim.files.hdf5_contents import Contents
 from heelstrike.sim.files.robot_dataset import stored_robot
+from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.status import EventKind, RunStatus
@@ -38,7 +39,9 @@ _JOINT_EVENTS = (EventKind.JOINT_STOP, EventKind.JOINT_SLIP, EventKind.JOINT_STI
 _EVENTS = ("event_time", "event_kind", "event_contact", "event_impulse")
 
 
-def stored_run(source: Path, contents: Contents, robot: Robot | None = None) -> Run:
+def stored_run(
+    source: Path, contents: Contents, robot: Robot | None = None, classes: Sequence[type] = ()
+) -> Run:
     """Make a run of the contents of a file.
 
     Parameters
@@ -49,13 +52,15 @@ def stored_run(source: Path, contents: Contents, robot: Robot | None = None) -> 
         What is in its root and in the group of the robot.
     robot : Robot, optional
         Robot to attach in the place of the stored one.
+    classes : sequence of type
+        Methods and contact laws from outside the package.
 
     Raises
     ------
     RunFileError
         If anything is missing or cannot be.
     """
-    stored = _Stored(source, contents)
+    stored = _Stored(source, contents, classes)
     if "/@heelstrike_format" not in contents:
         raise RunFileError(f"{source}: this NetCDF file is not a run of heelstrike")
     layout = stored.number("heelstrike_format")
@@ -115,11 +120,10 @@ def _run(stored: _Stored, robot: Robot) -> Run:
         )
         for name, (dims, _, _) in ROWS.items()
     }
-    method = stored.member("method", METHODS)
     return Run(
         robot=robot,
         ground=_ground(stored),
-        method=stored.rebuilt("method", method),
+        method=stored.method(),
         status=status,
         message=stored.text("message"),
         time=time,
@@ -198,9 +202,12 @@ def _events(stored: _Stored, robot: Robot) -> tuple[Event, ...]:
 class _Stored:
     """The contents of a file, each number and text of which is checked as it is asked for."""
 
-    def __init__(self, source: Path, contents: Mapping[str, NDArray[Any]]) -> None:
+    def __init__(
+        self, source: Path, contents: Mapping[str, NDArray[Any]], classes: Sequence[type]
+    ) -> None:
         self.source = source
         self.contents = contents
+        self.kinds = {kind.__name__: kind for kind in classes} | METHODS | LAWS
 
     def damaged(self, what: str) -> RunFileError:
         return RunFileError(f"{self.source}: damaged: {what}")
@@ -263,31 +270,68 @@ class _Stored:
             )
         return members[value]
 
+    def plain(self, name: str) -> str | int | float:
+        """Return an attribute as it was written."""
+        kind = self._attribute(name).dtype.kind
+        if kind == "U":
+            return self.text(name)
+        return int(self._attribute(name)) if kind == "i" else self.number(name)
+
+    def method(self) -> Method | UnknownMethod:
+        """Make the method; of one that is not known, or whose laws are not, return what is told."""
+        name = self.text("method")
+        if not name.isidentifier():
+            raise self.damaged(f"the method is called {name[:60]!r}")
+        kind = self.kinds.get(name)
+        try:
+            if kind is not None and issubclass(kind, Method):
+                made: Method = self.rebuilt("method", kind)
+                return made
+        except _UnknownLawError:
+            pass
+        begin = "/@method_"
+        names = (key.removeprefix(begin) for key in self.contents if key.startswith(begin))
+        return UnknownMethod(
+            name=name,
+            settings={setting: self.plain(f"method_{setting}") for setting in names},
+            impulses_in_events="/@impulses_in_events" in self.contents
+            and self.count("impulses_in_events") != 0,
+        )
+
     def rebuilt(self, prefix: str, kind: Any) -> Any:
         """Make a frozen dataclass from its fields, as `to_dataset` wrote them."""
-        values: dict[str, Any] = {}
-        for field in fields(kind):
-            name = f"{prefix}_{field.name}"
-            default = field.default
-            stored = self.contents.get(f"/@{name}")
-            if stored is None and default is not MISSING:
-                continue  # a setting that did not exist when the file was written
-            if stored is not None and stored.dtype.kind == "U" and str(stored) == NONE:
-                values[field.name] = None
-            elif field.default_factory is not MISSING:
-                values[field.name] = self.rebuilt(name, self.member(name, LAWS))
-            elif isinstance(default, enum.Enum):
-                members = {member.name.lower(): member for member in type(default)}
-                values[field.name] = self.member(name, members)
-            elif isinstance(default, str):
-                values[field.name] = self.text(name)
-            elif isinstance(default, bool):
-                values[field.name] = self.count(name) != 0
-            else:
-                values[field.name] = self.number(name)
+        # A setting that did not exist when the file was written has its default.
+        values = {
+            field.name: self._setting(f"{prefix}_{field.name}", field)
+            for field in fields(kind)
+            if field.init
+            and (f"/@{prefix}_{field.name}" in self.contents or field.default is MISSING)
+        }
         try:
             return kind(**values)
         except HeelstrikeError as error:
             raise self.damaged(str(error)) from error
-        except TypeError as error:  # a setting that may not be None
+        except Exception as error:  # a setting that may not be None; what a class from outside says
             raise self.damaged(f"the settings of {prefix} do not fit: {error}") from error
+
+    def _setting(self, name: str, field: Field[Any]) -> Any:
+        default = field.default
+        stored = self.contents.get(f"/@{name}")
+        if stored is not None and stored.dtype.kind == "U" and str(stored) == NONE:
+            return None
+        if field.default_factory is not MISSING or is_dataclass(default):
+            law = self.text(name)
+            if law not in self.kinds:
+                raise _UnknownLawError
+            return self.rebuilt(name, self.kinds[law])
+        if isinstance(default, enum.Enum):
+            return self.member(name, {member.name.lower(): member for member in type(default)})
+        if isinstance(default, bool):
+            return self.count(name) != 0
+        if isinstance(default, str):
+            return self.text(name)
+        return self.number(name) if isinstance(default, float) else self.plain(name)
+
+
+class _UnknownLawError(Exception):
+    """A method has a law that is not known."""
