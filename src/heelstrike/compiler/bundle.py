@@ -330,7 +330,7 @@ class Bundle:
                 )
 
     @classmethod
-    def extents(cls) -> set[str]:
+    def extent_names(cls) -> set[str]:
         """Names of the extents of its arrays, and of those of its parts."""
         found = {
             _parsed(each)[1]
@@ -339,7 +339,7 @@ class Bundle:
             if isinstance(each, str)
         }
         parts: Any = (member.kind for member in cls.declared.values() if member.role == "part")
-        return found.union(*(part.extents() for part in parts))
+        return found.union(*(part.extent_names() for part in parts))
 
     @classmethod
     def settable(cls: type[_Some]) -> type[_Some]:

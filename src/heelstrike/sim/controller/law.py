@@ -263,7 +263,7 @@ class Law:
                 f"{type(parameters).__name__}"
             )
         self.memory = dict(memory or {})
-        strange = self.memory.keys() - function.memory.declared - function.memory.extents()
+        strange = self.memory.keys() - function.memory.declared - function.memory.extent_names()
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
