@@ -545,20 +545,19 @@ def _method(kind: BundleType, name: str) -> Any:
 @lru_cache
 def bundle_at(cls: Any) -> Any:
     """Return an intrinsic that returns the bundle of a class whose table is at an address."""
-    kind = cls.compiled_type()
+    name = cls.compiled_type().name
 
+    # What compiled code is made of is known by what functions enclose: the class, whose kernels are
+    # methods, and the name, which tells its members.
     def define(context: Any, address: Any) -> Any:
         del context, address
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             del context, signature
-            return builder.inttoptr(values[0], _WORD.as_pointer())
+            return builder.inttoptr(values[0], _WORD.as_pointer(), name=name)
 
-        return kind(types.int64), generate
+        return cls.compiled_type()(types.int64), generate
 
-    # What compiled code is made of is known by these: its members, and where its methods stand.
-    define.__name__ = define.__qualname__ = kind.name
-    define.__module__ = cls.__module__ if cls.methods else __name__
     return intrinsic(define)
 
 
