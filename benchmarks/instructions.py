@@ -146,11 +146,14 @@ def stamping(still: Scenario) -> JointFeedback:
     """
     law, robot = still.feedback, still.robot
     assert law is not None
+    gains = law.parameters
     sign = np.array([1.0 if "right" in name else -1.0 for name in robot.actuator_names])
-    jump = 0.02 * law.kp * sign * ["knee" in name for name in robot.actuator_names]
-    command = law.coefficients[0, :, 0] + np.where(np.arange(200)[:, None] % 2, -jump, jump)
+    jump = 0.02 * gains.kp * sign * ["knee" in name for name in robot.actuator_names]
+    command = gains.coefficients[0, :, 0] + np.where(np.arange(200)[:, None] % 2, -jump, jump)
     begins = 0.005 * np.arange(200)
-    return JointFeedback(robot, 0.0, torque=command[..., None], kp=law.kp, kd=law.kd, begins=begins)
+    return JointFeedback(
+        robot, 0.0, torque=command[..., None], kp=gains.kp, kd=gains.kd, begins=begins
+    )
 
 
 class Loop:

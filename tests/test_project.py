@@ -96,6 +96,17 @@ def test_importing_heelstrike_loads_nothing_heavy() -> None:
     assert HEAVY.isdisjoint(loaded)
 
 
+def test_simulations_do_without_the_integrators_of_scipy() -> None:
+    """They take a third of a second to import, at every start."""
+    script = (
+        "import heelstrike, sys; heelstrike.Simulation; print('scipy.integrate' in sys.modules)"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert told.stdout == "False\n"
+
+
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_no_module_needs_one_operating_system(source: Path) -> None:
     imported: set[str] = set()

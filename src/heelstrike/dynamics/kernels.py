@@ -22,7 +22,15 @@ from math import cos, sin
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.places import place_of, velocity_at
-from heelstrike.dynamics.spatial import momentum_of, plus, power, scaled, spatial, write
+from heelstrike.dynamics.spatial import (
+    linear_momentum_of,
+    momentum_of,
+    plus,
+    power,
+    scaled,
+    spatial,
+    write,
+)
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 
@@ -128,7 +136,7 @@ def inverse_dynamics(model: Model, acceleration: Floats, work: Workspace, force:
         # The recursion above carries the part of the joints; the velocity part is ready.
         a = plus(a, spatial(work.bias_acceleration, i))
         w, vx, vz = spatial(work.velocity, i)
-        _, px, pz = momentum_of(work.inertia, i, (w, vx, vz))
+        px, pz = linear_momentum_of(work.inertia, i, (w, vx, vz))
         moment, fx, fz = momentum_of(work.inertia, i, a)
         write(work.force, i, (moment + vz * px - vx * pz, fx + w * pz, fz - w * px))
     for i in range(model.nl - 1, -1, -1):

@@ -43,8 +43,16 @@ def power(motion: Spatial, force: Spatial) -> float:
 
 
 @kernel
-def momentum_of(inertia: Floats, i: int, motion: Spatial) -> Spatial:
-    """Momentum of the rigid body `i` of (…, 4) that has a motion."""
+def linear_momentum_of(inertia: Floats, i: int, motion: Spatial) -> tuple[float, float]:
+    """Linear momentum (x, z) of the rigid body `i` of (…, 4) that has a motion."""
     mass, hx, hz = inertia[i, 0], inertia[i, 1], inertia[i, 2]
     w, vx, vz = motion
-    return inertia[i, 3] * w + hz * vx - hx * vz, mass * vx + w * hz, mass * vz - w * hx
+    return mass * vx + w * hz, mass * vz - w * hx
+
+
+@kernel
+def momentum_of(inertia: Floats, i: int, motion: Spatial) -> Spatial:
+    """Momentum of the rigid body `i` of (…, 4) that has a motion."""
+    w, vx, vz = motion
+    px, pz = linear_momentum_of(inertia, i, motion)
+    return inertia[i, 3] * w + inertia[i, 2] * vx - inertia[i, 1] * vz, px, pz

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.integrate import DOP853
 
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.sim.event_driven import dormand_prince as dp
@@ -15,6 +16,16 @@ stage_point = uncompiled(dp.stage_point)
 error_norm = uncompiled(dp.error_norm)
 fit_dense = uncompiled(dp.fit_dense)
 interpolate = uncompiled(dp.interpolate)
+
+
+def test_coefficients_are_those_of_scipy() -> None:
+    """To the last bit."""
+    np.testing.assert_array_equal(dp.NODES, [*DOP853.C, 1.0, *DOP853.C_EXTRA])
+    np.testing.assert_array_equal(dp.WEIGHTS[: dp.STAGES, : dp.STAGES], DOP853.A)
+    np.testing.assert_array_equal(dp.WEIGHTS[dp.STAGES, : dp.STAGES], DOP853.B)
+    np.testing.assert_array_equal(dp.WEIGHTS[dp.STAGES + 1 :], DOP853.A_EXTRA)
+    np.testing.assert_array_equal(dp.ERROR[:, : dp.STAGES + 1], [DOP853.E5, DOP853.E3])
+    np.testing.assert_array_equal(dp.DENSE, DOP853.D)
 
 
 def test_every_stage_is_at_its_node() -> None:
