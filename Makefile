@@ -15,12 +15,12 @@ BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 
 OLDEST_NUMBA := $(shell sed -n 's/.*"numba>=\([0-9.]*\)".*/\1/p' pyproject.toml)
-NUMBA_SAMPLE := tests/compiler tests/dynamics/test_c_code.py tests/contact/solvers tests/sim/test_walking.py
+NUMBA_SAMPLE := tests/compiler tests/dynamics/queries/test_c_code.py tests/contact/solvers tests/sim/test_walking.py
 
 PYTEST := $(BIN)/pytest -n $(WORKERS) --dist loadfile
 BLAS_KERNELS ?= $(if $(filter x86_64 amd64 AMD64,$(shell uname -m)),Nehalem Haswell,ARMV8 CORTEXA57)
 SAMPLE := tests/compiler/test_plain_code.py tests/compiler/test_straight_line.py tests/contact \
-	tests/sim/test_contact_geometry.py tests/experiments/test_paper.py
+	tests/sim/contacts/test_geometry.py tests/experiments/test_paper.py
 
 .DEFAULT_GOAL := help
 .PHONY: help walk test test-plain test-blas test-perturbed test-sample test-numba test-documented bench check check-all docs clean

@@ -22,7 +22,7 @@ from heelstrike import load_robot
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.dynamics import bias_force, mass_matrix, point_jacobian
 

@@ -9,9 +9,10 @@ from operators import Mutant
 
 # File, what stands there (once), and what is put there.
 KNOWN: tuple[tuple[str, str, str], ...] = (
-    ("sim/recording.py", "-memory.contacts.gap[contact])", "0.0)"),
-    ("sim/recording.py", "max(tally.cone, memory.answer.residual[1])", "0.0"),
-    ("sim/recording.py", "max(tally.cone, memory.answer.residual[1])", "memory.answer.residual[1]"),
+    ("sim/record/recording.py", "-memory.contacts.gap[contact])", "0.0)"),
+    ("sim/record/recording.py", "max(tally.cone, memory.answer.residual[1])", "0.0"),
+    ("sim/record/recording.py", "max(tally.cone, memory.answer.residual[1])",
+     "memory.answer.residual[1]"),
     ("sim/run.py", "penetration=tally.penetration", "penetration=0.0"),
     ("sim/run.py", "cone=tally.cone", "cone=0.0"),
     ("analysis/summary.py", "slip_max_m=max_slip(run)", "slip_max_m=1e3 * max_slip(run)"),
@@ -35,7 +36,7 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
     ("sim/files/dataset.py", '"axis": ["x", "z"]', '"axis": ["z", "x"]'),
     ("sim/time_stepping/method.py", "memory.slip[contact] = memory.answer.velocity[2 * place + 1]",
      "memory.slip[contact] = -memory.answer.velocity[2 * place + 1]"),
-    ("sim/recording.py", "record.slip[row, i] = memory.slip[i]",
+    ("sim/record/recording.py", "record.slip[row, i] = memory.slip[i]",
      "record.slip[row, i] = -memory.slip[i]"),
     ("sim/event_driven/method.py", "_, record.slip[row, contact] = contact_velocity(",
      "record.slip[row, contact], _ = contact_velocity("),

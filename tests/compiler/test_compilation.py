@@ -19,7 +19,7 @@ from numba import TypingError, types
 import heelstrike
 from heelstrike.compiler.compilation import SWITCH, compiled_for, kernel, uncompiled
 from heelstrike.compiler.separate_kernel import SeparateKernel
-from heelstrike.contact.solvers.search import try_solvers
+from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.robot import load_robot
 from heelstrike.sim.memory import allocate_memory
 

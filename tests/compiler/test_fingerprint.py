@@ -27,10 +27,10 @@ import json
 from heelstrike.compiler import machine_code, straight_line
 from heelstrike.compiler.private_numba import PrivateNumba
 from heelstrike.contact.solvers import elimination
-from heelstrike.contact.solvers.search import try_solvers
+from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.dynamics import kernels
 from heelstrike.robot import load_robot
-from heelstrike.sim import programs
+from heelstrike.sim.contacts import straight_line as programs
 from heelstrike.sim.frame import frame
 from heelstrike.sim.time_stepping import TimeStepping
 
@@ -105,7 +105,7 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
         {"loop", "kinematics", "programs"},
     ),
     "how a kernel is recorded": (
-        [("sim/programs.py", '"matrix", "rows", "force"', '"matrix", "rows"')],
+        [("sim/contacts/straight_line.py", '"matrix", "rows", "force"', '"matrix", "rows"')],
         {"programs"},
     ),
     "how arithmetic is folded": ([("compiler/tape.py", "_is(other, -1.0)", "False")], RECORDED),

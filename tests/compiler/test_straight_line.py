@@ -20,7 +20,12 @@ from heelstrike.compiler.recording import Program, Recording
 from heelstrike.compiler.straight_line import add_function, play
 from heelstrike.compiler.tape import Tape, Value
 from heelstrike.dynamics.workspace import workspace
-from heelstrike.sim.programs import KERNELS, MOST_COORDINATES, straight_line_programs, usual_points
+from heelstrike.sim.contacts.straight_line import (
+    KERNELS,
+    MOST_COORDINATES,
+    straight_line_programs,
+    usual_points,
+)
 
 # Both sides do the same few hundred operations in another order, with products and sums fused.
 ROUNDING = 1e-11

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from heelstrike.contact import SolveStatus, solve_contact, solve_lcp
 from heelstrike.contact.certificate import certify, velocity_error
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 
 SOLVERS = ["lemke", "fischer_burmeister", "gauss_seidel"]

@@ -24,8 +24,8 @@ from heelstrike.contact.modes import (
     WARM_START,
 )
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.solvers.repetition import repeat
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
+from heelstrike.contact.solvers.known_modes import repeat
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 
 ALL = (LEMKE, FISCHER_BURMEISTER, GAUSS_SEIDEL)

@@ -11,7 +11,7 @@ from heelstrike.contact.certificate import certify
 from heelstrike.contact.modes import FISCHER_BURMEISTER, GAUSS_SEIDEL, LEMKE, SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE, LINE
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, Floats
 
 projected, contains, press = (

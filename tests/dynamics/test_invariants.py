@@ -11,7 +11,7 @@ import pytest
 from robot_cases import ROBOTS, RobotCase
 
 from heelstrike import dynamics
-from heelstrike.dynamics.symbolic import TracedDynamics, expression, symbols
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 
 # All of these compare two sums of a few hundred products of order one, so that 1e-10 relative to
 # the largest entry leaves four orders of magnitude for rounding.

@@ -8,9 +8,9 @@ from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike import dynamics
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import Evaluation
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.places import add_point_force, write_point_rows
+from heelstrike.dynamics.queries.evaluation import Evaluation
 
 CASES = [*NAMED[:2], *RANDOM[:3]]
 ROUNDING = 1e-12

@@ -16,9 +16,9 @@ from heelstrike.control import ControlState
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import Contacts, RunStatus
 from heelstrike.sim.batch import Batch
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.method import Method
 from heelstrike.sim.setting import Setting
-from heelstrike.sim.status import EventKind
 
 ROWS = ("time", "position", "velocity", "torque", "contact_force", "gap", "slip_velocity")
 RUNS = 8

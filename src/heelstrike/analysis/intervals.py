@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
-from heelstrike.sim.status import EventKind
 
 Floats = NDArray[np.float64]
 

@@ -22,11 +22,11 @@ from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate
-from heelstrike.sim.status import EventKind
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]

@@ -16,8 +16,8 @@ from heelstrike.analysis.slip import max_slip
 from heelstrike.analysis.support import double_support_fraction, walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run, SolverCount
-from heelstrike.sim.status import RunStatus
 
 if TYPE_CHECKING:
     from rich.table import Table

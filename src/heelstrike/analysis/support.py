@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
-from heelstrike.sim.status import EventKind
 
 NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""

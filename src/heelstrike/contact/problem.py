@@ -17,8 +17,8 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
-from heelstrike.contact.solvers.repetition import repeat
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
+from heelstrike.contact.solvers.known_modes import repeat
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,

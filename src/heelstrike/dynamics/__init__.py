@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from heelstrike.dynamics.coordinates import difference, integrate
-from heelstrike.dynamics.energies import energy, kinetic_energy, potential_energy
-from heelstrike.dynamics.equations_of_motion import (
+from heelstrike.dynamics.queries.energies import energy, kinetic_energy, potential_energy
+from heelstrike.dynamics.queries.equations_of_motion import (
     applied_force,
     bias_force,
     coriolis_force,
@@ -16,8 +16,8 @@ from heelstrike.dynamics.equations_of_motion import (
     mass_matrix,
     passive_force,
 )
-from heelstrike.dynamics.linearization import Linearization, linearize
-from heelstrike.dynamics.momenta import (
+from heelstrike.dynamics.queries.linearization import Linearization, linearize
+from heelstrike.dynamics.queries.momenta import (
     angular_momentum,
     center_of_mass,
     center_of_mass_bias_acceleration,
@@ -26,7 +26,7 @@ from heelstrike.dynamics.momenta import (
     momentum,
     momentum_matrix,
 )
-from heelstrike.dynamics.points import (
+from heelstrike.dynamics.queries.points import (
     contact_bias_acceleration,
     contact_jacobian,
     contact_positions,
@@ -35,10 +35,10 @@ from heelstrike.dynamics.points import (
     point_position,
     point_velocity,
 )
-from heelstrike.dynamics.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
+from heelstrike.dynamics.queries.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
 
 if TYPE_CHECKING:
-    from heelstrike.dynamics.casadi_functions import CasadiDynamics as CasadiDynamics
+    from heelstrike.dynamics.queries.casadi_functions import CasadiDynamics as CasadiDynamics
 
 __all__ = [
     "CasadiDynamics",
@@ -81,7 +81,7 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     # CasADi is loaded only by those who ask for it.
     if name == "CasadiDynamics":
-        from heelstrike.dynamics.casadi_functions import CasadiDynamics
+        from heelstrike.dynamics.queries.casadi_functions import CasadiDynamics
 
         return CasadiDynamics
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import Evaluation
-from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats
 
 

@@ -2,7 +2,7 @@
 
 Every kernel here works on plain arrays, allocates nothing and never branches on a value of ``q``
 or ``v``. Compiled by Numba it runs at machine speed; uncompiled, over arrays of CasADi symbols, it
-yields the exact expression graph (see :mod:`heelstrike.dynamics.symbolic`).
+yields the exact expression graph (see :mod:`heelstrike.dynamics.queries.symbolic`).
 
 All spatial vectors are expressed in world axes at one common point, the pivot, so that motions and
 inertias of different links add without any transformation. This is Featherstone's algorithm

@@ -23,8 +23,8 @@ from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Run, simulate
+from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.method import Method
-from heelstrike.sim.status import RunStatus
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

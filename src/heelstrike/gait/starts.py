@@ -10,7 +10,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.dynamics.symbolic import TracedDynamics, symbols
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, symbols
 from heelstrike.gait.request import Request
 from heelstrike.gait.sole import leg
 

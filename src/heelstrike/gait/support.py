@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.symbolic import TracedDynamics, traced
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, traced
 from heelstrike.gait.sole import Sole, leg
 from heelstrike.robot.robot import Robot
 

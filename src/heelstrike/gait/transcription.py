@@ -14,7 +14,7 @@ from typing import Any
 import casadi
 import numpy as np
 
-from heelstrike.dynamics.symbolic import expression, symbols
+from heelstrike.dynamics.queries.symbolic import expression, symbols
 from heelstrike.gait.request import Request
 from heelstrike.gait.support import Impact, Support, Symbols
 

@@ -418,7 +418,7 @@ class Robot:
         >>> "void bravo7_mass_matrix(" in hs.load_robot("bravo7").c_code()
         True
         """
-        from heelstrike.dynamics.c_code import c_code
+        from heelstrike.dynamics.queries.c_code import c_code
 
         return c_code(self.model, name or self.name, self.joint_names)
 

@@ -8,6 +8,7 @@ from heelstrike.compiler.compilation import kernel as kernel
 from heelstrike.dynamics.kernels import passive_force as passive_force
 from heelstrike.sim.batch import Batch, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
+from heelstrike.sim.closed_sets import EventKind, RunStatus, Scheme
 from heelstrike.sim.compliant import Compliant
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
@@ -15,11 +16,11 @@ from heelstrike.sim.compliant.contact_law import (
     KelvinVoigt,
     RegularisedFriction,
 )
-from heelstrike.sim.contact_geometry import contact_rows as contact_rows
-from heelstrike.sim.contact_geometry import contact_velocity as contact_velocity
-from heelstrike.sim.contact_geometry import evaluate_equations as evaluate_equations
-from heelstrike.sim.contact_geometry import locate_contacts as locate_contacts
-from heelstrike.sim.contact_geometry import solve_mass_matrix as solve_mass_matrix
+from heelstrike.sim.contacts.geometry import contact_rows as contact_rows
+from heelstrike.sim.contacts.geometry import contact_velocity as contact_velocity
+from heelstrike.sim.contacts.geometry import evaluate_equations as evaluate_equations
+from heelstrike.sim.contacts.geometry import locate_contacts as locate_contacts
+from heelstrike.sim.contacts.geometry import solve_mass_matrix as solve_mass_matrix
 from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.files.run_file import load_run
@@ -28,19 +29,18 @@ from heelstrike.sim.frame import DONE as DONE
 from heelstrike.sim.frame import SOLVER_FAILED as SOLVER_FAILED
 from heelstrike.sim.frame import Kernels
 from heelstrike.sim.memory import Memory as Memory
-from heelstrike.sim.memory import Record as Record
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push
 from heelstrike.sim.push import add_pushes as add_pushes
 from heelstrike.sim.push import share_over_step as share_over_step
-from heelstrike.sim.recording import note_events as note_events
-from heelstrike.sim.recording import note_extremes as note_extremes
-from heelstrike.sim.recording import note_row_when_due as note_row_when_due
+from heelstrike.sim.record.record import Record as Record
+from heelstrike.sim.record.recording import note_events as note_events
+from heelstrike.sim.record.recording import note_extremes as note_extremes
+from heelstrike.sim.record.recording import note_row_when_due as note_row_when_due
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
 from heelstrike.sim.setting import Setting as Setting
 from heelstrike.sim.simulation import Simulation, simulate
 from heelstrike.sim.snapshot import Snapshot, load_snapshot
-from heelstrike.sim.status import EventKind, RunStatus, Scheme
 from heelstrike.sim.time_stepping import TimeStepping
 
 __all__ = [

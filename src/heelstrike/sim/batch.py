@@ -24,17 +24,18 @@ from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
+from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.frame import compiled_loop
-from heelstrike.sim.memory import Memory, Record, allocate_memory
+from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push, pushes_on
-from heelstrike.sim.record_size import check_runs
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.size import check_runs
 from heelstrike.sim.run import Run, Timing
 from heelstrike.sim.setting import Setting, checked_setting
 from heelstrike.sim.simulation import check_duration, checked_method, simulation_to_the_end
-from heelstrike.sim.status import EventKind, RunStatus
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -64,7 +65,7 @@ class Batch:
     steps, saturations : (n,) int
         Steps taken; times that a torque was clipped to its limit.
     events : (n, kinds) int
-        Events of each kind, in the order of :class:`~heelstrike.sim.status.EventKind`.
+        Events of each kind, in the order of :class:`~heelstrike.sim.closed_sets.EventKind`.
     penetration : (n,) float
         Deepest penetration of a contact point, in m.
     complementarity, cone, non_penetration : (n,) float

@@ -26,14 +26,15 @@ from numba import types
 
 from heelstrike.compiler.compilation import loop_for
 from heelstrike.contact.ground import GroundModel
-from heelstrike.contact.solvers.search import try_solvers
+from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.robot.model import Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.law import CONTROLLER_TYPE
-from heelstrike.sim.memory import Memory, Record
-from heelstrike.sim.recording import center_height, limit_torque, sound
+from heelstrike.sim.memory import Memory
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import center_height, limit_torque, sound
 
 
 class Outcome(enum.IntEnum):

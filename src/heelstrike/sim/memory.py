@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.programs import straight_line_programs, usual_points
 from heelstrike.sim.push import Push, Pushes, pushes_on
 
 Floats = NDArray[np.float64]
@@ -70,7 +70,8 @@ class Memory(Bundle):
     added : (nv,) float
         What an implicit scheme adds to the diagonal of the mass matrix.
     bodies : ArticulatedBodies
-        What the loops solve with instead of the factor; see :mod:`heelstrike.sim.programs`.
+        What the loops solve with instead of the factor; see
+        :mod:`heelstrike.sim.contacts.straight_line`.
     tree : Workspace
         Kinematics of the state now.
     contacts : Contacts
@@ -113,7 +114,8 @@ class Memory(Bundle):
     answer : ContactAnswer
         Its solution.
     programs : (5,) int
-        Addresses of straight-line code, zero for none; see :mod:`heelstrike.sim.programs`.
+        Addresses of straight-line code, zero for none; see
+        :mod:`heelstrike.sim.contacts.straight_line`.
     every_point, usual_points : (nc,), (k,) int
         All contact points, and those that the programs are for.
     usual_place : (nc,) int
@@ -211,37 +213,3 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
         pushes=pushes_on(robot, pushes),
     )  # fmt: skip
-
-
-class Record(Bundle):
-    """Rows of a run, filled by the compiled loop, one row an instant.
-
-    Forces and torques of a row are those decided at its instant and acting over the step that
-    follows. `rows` and `events` are the numbers of rows used.
-    """
-
-    rows: int = cell(int)
-    events: int = cell(int)
-    time: Floats = array("nt")
-    q: Floats = array("nt", "nq")
-    v: Floats = array("nt", "nv")
-    torque: Floats = array("nt", "nu")
-    stop_torque: Floats = array("nt", "nv")
-    friction_torque: Floats = array("nt", "nv")
-    point: Floats = array("nt", "nc", "axes")
-    normal: Floats = array("nt", "nc", "axes")
-    gap: Floats = array("nt", "nc")
-    force: Floats = array("nt", "nc", "components")
-    slip: Floats = array("nt", "nc")
-    residual: Floats = array("nt", 3)
-    event_time: Floats = array("ne")
-    event_kind: Integers = array("ne", of=int)
-    event_contact: Integers = array("ne", of=int)
-    event_impulse: Floats = array("ne", "components")
-
-
-def allocate_record(robot: Robot, rows: int, events: int) -> Record:
-    """Allocate a record of `rows` instants and `events` events."""
-    return Record.allocate(
-        nt=rows, ne=events, nq=robot.nq, nv=robot.nv, nu=robot.nu, nc=robot.nc, axes=2, components=2
-    )

@@ -22,7 +22,7 @@ from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.frame import Kernels
-from heelstrike.sim.record_size import check_room, check_steps
+from heelstrike.sim.record.size import check_room, check_steps
 from heelstrike.sim.setting import Setting
 
 

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from heelstrike.contact.ground import Ground
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import Push
+from heelstrike.sim.record.record import Record
 from heelstrike.sim.snapshot import Snapshot
-from heelstrike.sim.status import EventKind, RunStatus
 
 if TYPE_CHECKING:
     import xarray

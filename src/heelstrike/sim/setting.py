@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Required, TypedDict
 import numpy as np
 
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics.momenta import center_of_mass
+from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State

@@ -18,15 +18,17 @@ from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
+from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, law_of, no_torque
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
-from heelstrike.sim.memory import Memory, Record, allocate_memory, allocate_record
+from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
+from heelstrike.sim.record.record import Record, allocate_record
 from heelstrike.sim.run import Run, Timing, recorded, tallied
 from heelstrike.sim.setting import (
     Setting,
@@ -36,7 +38,6 @@ from heelstrike.sim.setting import (
     identity_of,
 )
 from heelstrike.sim.snapshot import Snapshot
-from heelstrike.sim.status import EventKind, RunStatus
 from heelstrike.sim.time_stepping import TimeStepping
 
 # Rows of one chunk of the record, and most steps between two looks at Ctrl-C and the progress bar.

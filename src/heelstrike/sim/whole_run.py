@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
-from heelstrike.sim.status import RunStatus
 
 
 def whole(run: Run) -> Run:

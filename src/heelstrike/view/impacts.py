@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
-from heelstrike.sim.status import EventKind
 
 Floats = NDArray[np.float64]
 

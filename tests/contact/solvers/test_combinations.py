@@ -10,8 +10,8 @@ import pytest
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, STICK
 from heelstrike.contact.solvers import combinations as modes_in_turn
+from heelstrike.contact.solvers.certified_solve import contact_workspace, nearly_singular
 from heelstrike.contact.solvers.combinations import MOST
-from heelstrike.contact.solvers.search import contact_workspace, nearly_singular
 from heelstrike.contact.workspace import ContactProblem, ContactWorkspace, Integers
 
 begin_combinations = uncompiled(modes_in_turn.begin_combinations)

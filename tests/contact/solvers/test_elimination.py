@@ -9,13 +9,13 @@ from numba import njit
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel, solver_order
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.elimination import (
     LARGEST,
     POOR_PIVOT,
     eliminate,
     elimination_programs,
 )
-from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.robot.model import Floats
 

@@ -7,7 +7,7 @@ import pytest
 
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.solvers import fischer_burmeister as fb
-from heelstrike.contact.solvers.search import contact_workspace
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactWorkspace
 
 equations = uncompiled(fb.equations)

@@ -7,8 +7,8 @@ import pytest
 
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.gauss_seidel import solve_block
-from heelstrike.contact.solvers.search import contact_workspace
 
 
 def solved(

@@ -7,8 +7,8 @@ import pytest
 
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD
+from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.solvers.search import contact_workspace
 from heelstrike.contact.workspace import ContactProblem, Floats, Integers, ReducedProblem
 
 

@@ -14,7 +14,7 @@ from heelstrike.contact.queries.forward_dynamics import TOUCHING
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import inverse_dynamics, passive_force
-from heelstrike.dynamics.evaluation import contact_indices, joint_vector
+from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError
 from heelstrike.robot.robot import Robot
 

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from heelstrike.contact.ground import Ground, ground_contact
 from heelstrike.contact.workspace import Floats
-from heelstrike.dynamics.evaluation import Evaluation
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.places import write_point_rows
+from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.robot.robot import Robot
 
 

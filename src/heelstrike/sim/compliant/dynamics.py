@@ -51,13 +51,13 @@ from heelstrike.sim.compliant.contact_law import (
     normal_force,
 )
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
-from heelstrike.sim.contact_geometry import contact_rows, observe, row_product
+from heelstrike.sim.contacts.geometry import contact_rows, observe, row_product
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
-from heelstrike.sim.recording import try_torque
+from heelstrike.sim.record.recording import try_torque
 
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
 # They only steer the linear systems: their error costs steps, not accuracy.

@@ -44,13 +44,14 @@ from heelstrike.sim.compliant.dynamics import (
     find_gains,
 )
 from heelstrike.sim.compliant.rosenbrock import ORDER
-from heelstrike.sim.contact_geometry import observe
+from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels
-from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
-from heelstrike.sim.recording import (
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import (
     JOINT_STOP,
     LIFTOFF,
     LIFTOFF_GAP,

@@ -14,7 +14,8 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import (
+from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     contact_velocity,
@@ -26,13 +27,12 @@ from heelstrike.sim.contact_geometry import (
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.event_driven.candidates import share_redundant
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
-from heelstrike.sim.recording import try_torque
+from heelstrike.sim.record.recording import try_torque
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""

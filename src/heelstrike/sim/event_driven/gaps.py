@@ -13,7 +13,7 @@ from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.contact_geometry import contact_rows, contact_velocity, write_unit_row
+from heelstrike.sim.contacts.geometry import contact_rows, contact_velocity, write_unit_row
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory

@@ -6,7 +6,8 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.robot.model import Floats, Model
-from heelstrike.sim.contact_geometry import (
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     evaluate_equations,
@@ -20,8 +21,8 @@ from heelstrike.sim.event_driven.dynamics import (
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.modes import log_event, note_residual
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Memory, Record
-from heelstrike.sim.status import EventKind
+from heelstrike.sim.memory import Memory
+from heelstrike.sim.record.record import Record
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 IMPACT = int(EventKind.IMPACT)

@@ -23,7 +23,9 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.contact_geometry import (
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.geometry import (
     contact_velocity,
     evaluate_equations,
     locate_contacts,
@@ -31,7 +33,6 @@ from heelstrike.sim.contact_geometry import (
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.dry_friction import dry_force
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import evaluate, project
@@ -48,12 +49,12 @@ from heelstrike.sim.event_driven.modes import (
 )
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels
-from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
-from heelstrike.sim.record_size import check_room, check_steps
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.size import check_room, check_steps
 from heelstrike.sim.setting import Setting
-from heelstrike.sim.status import EventKind
 
 ZENO = int(EventKind.ZENO)
 PAINLEVE = int(EventKind.PAINLEVE)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.event_driven.dynamics import tangential_place
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Memory, Record, Tally
-from heelstrike.sim.status import EventKind
+from heelstrike.sim.memory import Memory, Tally
+from heelstrike.sim.record.record import Record
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 LIFTOFF = int(EventKind.LIFTOFF)

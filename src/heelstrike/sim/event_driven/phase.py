@@ -20,7 +20,8 @@ class Phase(Bundle):
     straight piece of ground form a group, told by its first point: only the outermost two of them
     carry normal force, and one tangential force stands for all. Joint stops are numbered on from
     the contact points, joints with dry friction from these; in the shapes below nc counts all. A
-    dry joint is always closed, on a contact of its own (:mod:`heelstrike.sim.dry_friction`).
+    dry joint is always closed, on a contact of its own
+    (:mod:`heelstrike.sim.contacts.dry_friction`).
 
     Attributes
     ----------

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,
@@ -19,7 +20,6 @@ from heelstrike.sim.compliant.method import Compliant
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.method import UnknownMethod
 from heelstrike.sim.run import Run
-from heelstrike.sim.status import EventKind
 from heelstrike.sim.time_stepping.method import TimeStepping
 
 if TYPE_CHECKING:

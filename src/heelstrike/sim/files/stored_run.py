@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError, RunFileError
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.files.dataset import (
     COUNTS,
     FORMAT,
@@ -31,7 +32,6 @@ from heelstrike.sim.files.robot_dataset import stored_robot
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
-from heelstrike.sim.status import EventKind, RunStatus
 
 _ENDED_WELL = (RunStatus.COMPLETED, RunStatus.FELL, RunStatus.INTERRUPTED)
 """Ends of runs of which every number is finite."""

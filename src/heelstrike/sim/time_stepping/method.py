@@ -33,7 +33,9 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.contact_geometry import (
+from heelstrike.sim.closed_sets import Scheme
+from heelstrike.sim.contacts.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
+from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     contact_rows,
@@ -44,17 +46,16 @@ from heelstrike.sim.contact_geometry import (
     weigh,
     write_unit_row,
 )
+from heelstrike.sim.contacts.points import point_velocities
+from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
 from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels
-from heelstrike.sim.memory import Memory, Record
+from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method, solver_order
-from heelstrike.sim.point_contacts import point_velocities
-from heelstrike.sim.programs import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.push import add_pushes, share_over_step
-from heelstrike.sim.recording import note_events, note_extremes, note_row_when_due
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
-from heelstrike.sim.status import Scheme
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
 PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
@@ -100,7 +101,7 @@ class TimeStepping(Method):
     step : float
         Length of the step h in seconds.
     scheme : Scheme
-        Discretisation; see :class:`~heelstrike.sim.status.Scheme`.
+        Discretisation; see :class:`~heelstrike.sim.closed_sets.Scheme`.
     solver : str
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``;
         the others follow as fallbacks, each use counted in the run.

@@ -1,9 +1,9 @@
 """Queries: what can be asked of a robot in a state, each written once for numbers and symbols.
 
-A query is a function of an :class:`~heelstrike.dynamics.evaluation.Evaluation`. The decorators
-here make the function of (robot, q, …) of it that people call, with its documentation; its ``at``
-is the query itself, which :mod:`heelstrike.dynamics.symbolic` and
-:mod:`heelstrike.dynamics.casadi_functions` ask over symbols.
+A query is a function of an :class:`~heelstrike.dynamics.queries.evaluation.Evaluation`. The
+decorators here make the function of (robot, q, …) of it that people call, with its documentation;
+its ``at`` is the query itself, which :mod:`heelstrike.dynamics.queries.symbolic` and
+:mod:`heelstrike.dynamics.queries.casadi_functions` ask over symbols.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.robot.robot import Robot
 
 P = ParamSpec("P")

@@ -13,7 +13,7 @@ import numpy as np
 
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.memory import allocate_record
+from heelstrike.sim.record.record import allocate_record
 from heelstrike.sim.setting import Setting
 
 MOST_STEPS = 2**53

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heelstrike.dynamics.evaluation import Evaluation
-from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats
 
 

@@ -10,7 +10,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.dynamics.symbolic import TracedDynamics, symbols
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, symbols
 from heelstrike.errors import RobotError
 
 QUERIES = [name for name in dynamics.__all__ if hasattr(getattr(dynamics, name), "at")]

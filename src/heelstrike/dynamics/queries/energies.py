@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import Evaluation
-from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.query import of_position, of_state
 
 
 @of_state("float: In J.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.evaluation import contact_indices, joint_vector, torque_vector
+from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector, torque_vector
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
@@ -127,7 +127,7 @@ def _equations(robot: Robot, contacts: tuple[int, ...]) -> tuple[casadi.Function
     """
     import casadi
 
-    from heelstrike.dynamics.casadi_functions import contact_equations
+    from heelstrike.dynamics.queries.casadi_functions import contact_equations
 
     n = robot.nv
     q, v = casadi.SX.sym("q", n), casadi.SX.sym("v", n)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from heelstrike import dynamics
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.dynamics.evaluation import Evaluation
+from heelstrike.dynamics.queries.evaluation import Evaluation
 
 
 def traced(kernel: Callable[..., Any]) -> Callable[..., Any]:

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.evaluation import Evaluation
 from heelstrike.dynamics.places import write_point_rows
-from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats
 
 UP = np.array([0.0, 1.0])

@@ -32,9 +32,9 @@ from heelstrike.contact.solvers.combinations import (
 from heelstrike.contact.solvers.elimination import LARGEST, elimination_programs
 from heelstrike.contact.solvers.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
+from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
 from heelstrike.contact.solvers.lemke import PATHS, lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
-from heelstrike.contact.solvers.repetition import AS_GOOD, CLEAN
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.equations_of_motion import weightless
-from heelstrike.dynamics.evaluation import Evaluation
-from heelstrike.dynamics.query import of_position, of_state
+from heelstrike.dynamics.queries.equations_of_motion import weightless
+from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats
 
 

@@ -15,7 +15,7 @@ from heelstrike.dynamics.kernels import solve_factorized, state_equations
 from heelstrike.dynamics.workspace import workspace
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.point_contacts import point_delassus, point_velocities, push_points
+from heelstrike.sim.contacts.points import point_delassus, point_velocities, push_points
 
 # Places in ``Memory.programs``; an address of zero means that there is none.
 EQUATIONS = 0

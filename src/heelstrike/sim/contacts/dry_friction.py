@@ -18,7 +18,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import press
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contact_geometry import write_unit_row
+from heelstrike.sim.contacts.geometry import write_unit_row
 from heelstrike.sim.memory import Memory
 
 

@@ -15,7 +15,7 @@ import pytest
 from synthetic_runs import box, make_run
 
 import heelstrike as hs
-from heelstrike.sim import record_size
+from heelstrike.sim.record import size as record_size
 from heelstrike.sim.setting import Setting, checked_setting
 
 SHORT: dict[str, Any] = {
@@ -136,7 +136,7 @@ def test_limits_of_a_container(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 @pytest.mark.skipif(os.name != "posix", reason="limits of POSIX")
 def test_what_the_system_does_not_grant(tmp_path: Path) -> None:
     script = (
-        "import resource; from heelstrike.sim import record_size;"
+        "import resource; from heelstrike.sim.record import size as record_size;"
         "resource.setrlimit(resource.RLIMIT_AS, (2**31, 2**31));"
         "record_size.machine_memory = lambda: 2**40; print(record_size.room())"
     )

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike import dynamics
-from heelstrike.dynamics.evaluation import contact_indices
-from heelstrike.dynamics.query import VECTORS, Query, docstring
-from heelstrike.dynamics.symbolic import TracedDynamics, expression, symbols
+from heelstrike.dynamics.queries.evaluation import contact_indices
+from heelstrike.dynamics.queries.query import VECTORS, Query, docstring
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.robot.robot import Robot
 
 P = ParamSpec("P")

@@ -12,7 +12,7 @@ from heelstrike.compiler.compilation import uncompiled
 from heelstrike.robot import Robot, read_mjcf
 from heelstrike.sim import Certificates, EventKind, Scheme
 from heelstrike.sim.memory import Memory, allocate_memory
-from heelstrike.sim.recording import limit_torque, note_extremes
+from heelstrike.sim.record.recording import limit_torque, note_extremes
 
 G = 9.81
 

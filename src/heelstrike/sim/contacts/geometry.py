@@ -21,8 +21,8 @@ from heelstrike.dynamics.kernels import (
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.straight_line import EQUATIONS, SOLVE
 from heelstrike.sim.memory import Memory
-from heelstrike.sim.programs import EQUATIONS, SOLVE
 
 
 @kernel
@@ -203,7 +203,7 @@ def weigh(model: Model, memory: Memory) -> None:
     """Find what A of the pose now is solved with, ``memory.added`` on its diagonal.
 
     A short robot's programs leave the factor of A behind, a long one's loops articulated bodies
-    (:mod:`heelstrike.sim.programs`); all that solves with A takes what there is.
+    (:mod:`heelstrike.sim.contacts.straight_line`); all that solves with A takes what there is.
     """
     if memory.programs[EQUATIONS] != 0:
         mass_matrix(model, memory.tree, memory.mass_matrix)

@@ -6,9 +6,10 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.contact_geometry import contact_velocity
-from heelstrike.sim.memory import Memory, Record
-from heelstrike.sim.status import EventKind
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.memory import Memory
+from heelstrike.sim.record.record import Record
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 LIFTOFF = int(EventKind.LIFTOFF)

@@ -8,7 +8,7 @@ import pytest
 from robot_cases import NAMED, RANDOM, RobotCase
 
 from heelstrike import dynamics
-from heelstrike.dynamics.symbolic import TracedDynamics, expression, symbols
+from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 
 # Same operations in the same order; only the order of the sine's last bit may differ.
 TOLERANCE = 1e-12

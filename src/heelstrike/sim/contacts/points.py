@@ -2,7 +2,7 @@
 
 `points` (k,) lists the contact points. Rows and components go point by point in that order, normal
 before tangent. Arrays of (nc, 2) have an entry for every contact point of the robot; positions and
-normals are those of :func:`~heelstrike.sim.contact_geometry.locate_contacts`.
+normals are those of :func:`~heelstrike.sim.contacts.geometry.locate_contacts`.
 """
 
 from __future__ import annotations

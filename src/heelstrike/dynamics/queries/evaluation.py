@@ -51,7 +51,7 @@ class Evaluation:
     def run(self, kernel: Callable[..., Any], *arguments: Any) -> None:
         """Run a kernel, over symbols as plain Python."""
         if self.symbolic:
-            from heelstrike.dynamics.symbolic import traced
+            from heelstrike.dynamics.queries.symbolic import traced
 
             kernel = traced(kernel)
         kernel(*arguments)

@@ -12,8 +12,9 @@ import heelstrike as hs
 from heelstrike import dynamics
 from heelstrike.contact.ground import Ground
 from heelstrike.robot import Robot, load_robot, read_mjcf
-from heelstrike.sim import Scheme, TimeStepping, programs
-from heelstrike.sim.contact_geometry import (
+from heelstrike.sim import Scheme, TimeStepping
+from heelstrike.sim.contacts import straight_line as programs
+from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     contact_rows,
