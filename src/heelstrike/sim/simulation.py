@@ -329,10 +329,12 @@ class Simulation:
             If the simulation has come to its end, the time is past, or there is no room for the
             record.
         """
-        instant = self.method.instant(self._clock, until) if np.isfinite(until) else -np.inf
+        instant = -np.inf
+        if np.isfinite(until):
+            self.method.check_span(self._setting, max(until - self.time, 0.0))
+            instant = self.method.instant(self._clock, until)
         if instant < self.time:
             raise SimulationError(f"until must be a time from now, {self._now}, on; got {until}")
-        self.method.check_span(self._setting, max(until - self.time, 0.0))
         return self._advance(instant, NEVER, progress)
 
     def _advance(
