@@ -179,6 +179,8 @@ class Bundle:
     (1.0, 1)
     """
 
+    _cell_count = 0
+
     declared: ClassVar[dict[str, Member]] = {}
     methods: ClassVar[bool] = False
     named: ClassVar[frozenset[str]] = frozenset()
@@ -195,6 +197,7 @@ class Bundle:
         cls.declared = cls.declared | {k: v for k, v in own.items() if k not in cls.named}
         cls.methods = cls.methods or any(hasattr(value, "py_func") for value in vars(cls).values())
         cells = [name for name, member in cls.declared.items() if member.role == "cell"]
+        cls._cell_count = len(cells)
         for name in own:
             if name in cls.named:
                 setattr(cls, name, _extent_property(name))
@@ -205,7 +208,7 @@ class Bundle:
 
     def __init__(self, **members: Any) -> None:
         own = self.__dict__
-        own["_cells"] = np.zeros(self._cell_count(), dtype=np.int64)
+        own["_cells"] = np.zeros(self._cell_count, dtype=np.int64)
         extents = own["_extents"] = {}
         for name, member in self.declared.items():
             if name not in members:
@@ -276,10 +279,6 @@ class Bundle:
                 floats = dtype if dtype is not None and member.kind is float else member.dtype
                 members[name] = np.zeros(size, dtype=floats)
         return cls(**members)
-
-    @classmethod
-    def _cell_count(cls) -> int:
-        return sum(member.role == "cell" for member in cls.declared.values())
 
     @classmethod
     def compiled_type(cls) -> Any:
@@ -371,7 +370,7 @@ class Bundle:
         tuple of str and array
             Name and array.
         """
-        if self._cell_count():
+        if self._cell_count:
             yield f"{prefix}cells", self.__dict__["_cells"]
         for name, member in self.declared.items():
             if member.role == "part" and not member.address:
@@ -399,7 +398,7 @@ class Bundle:
             The copy.
         """
         cells = self.__dict__["_cells"]
-        if self._cell_count():
+        if self._cell_count:
             cells = place(f"{prefix}cells", cells)
         members = self.members()
         for name, member in self.declared.items():

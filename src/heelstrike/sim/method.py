@@ -13,11 +13,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-import numpy as np
-
 from heelstrike.compiler.bundle import Bundle
-from heelstrike.contact.modes import Solver
-from heelstrike.errors import SimulationError
+from heelstrike.contact import problem
+from heelstrike.errors import ContactProblemError, SimulationError
 from heelstrike.robot.model import Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
@@ -257,13 +255,10 @@ class UnknownMethod:
 
 def solver_order(name: str) -> Integers:
     """Codes of the contact solvers in the order in which they are tried, `name` first."""
-    order = (Solver.LEMKE, Solver.FISCHER_BURMEISTER, Solver.GAUSS_SEIDEL)
-    for first in order:
-        if first.value == name:
-            rest = [solver for solver in order if solver is not first]
-            return np.array([solver.code for solver in (first, *rest)], dtype=np.int64)
-    names = ", ".join(solver.value for solver in order)
-    raise SimulationError(f"unknown contact solver {name!r}; choose one of {names}")
+    try:
+        return problem.solver_order(name)
+    except ContactProblemError as error:
+        raise SimulationError(str(error)) from None
 
 
 def whole_steps(name: str, value: float, step: float) -> int:

@@ -47,7 +47,7 @@ from heelstrike.sim.event_driven.modes import (
     note_residual,
     report_modes,
 )
-from heelstrike.sim.event_driven.phase import Phase, allocate_phase
+from heelstrike.sim.event_driven.phase import Phase, allocate_phase, contact_count
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method, solver_order
@@ -179,7 +179,7 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * len(allocate_phase(robot).closed) + 8
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_count(robot) + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""

@@ -178,13 +178,20 @@ class Phase(Bundle):
     let_pass: int = cell(int)
 
 
+def contact_count(robot: Robot) -> int:
+    """Return how many contacts a phase counts: points, joint stops and joints with dry friction."""
+    model = robot.model
+    stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
+    return robot.nc + int(stops) + int((model.dry_friction > 0.0).sum())
+
+
 def allocate_phase(robot: Robot) -> Phase:
     """Allocate the memory of an event-driven simulation of `robot`."""
     model, nv, nu = robot.model, robot.nv, robot.nu
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
     dry = np.flatnonzero(model.dry_friction > 0.0)
-    nc = robot.nc + len(lower) + len(upper) + len(dry)
+    nc = contact_count(robot)
     return Phase.allocate(
         nv=nv, nu=nu, ns=len(lower) + len(upper), nd=len(dry), contacts=nc, axes=2, components=2,
         stages=SLOPES, dense_rows=DENSE_ROWS,
