@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from speed import page
 from speed.scenarios import falling, plank, standing, walk_gait
 
 import heelstrike as hs
@@ -262,7 +263,7 @@ def compare(found: dict[str, float], kept: dict[str, Any]) -> list[str]:
 
 
 def main() -> None:
-    """Count, compare, and keep if asked to."""
+    """Count, compare, and keep (with the table of the page) if asked to."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--update", action="store_true", help="keep the counts of this run")
     parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
@@ -285,6 +286,7 @@ def main() -> None:
             "times_sticking": beside,
         }
         KEPT.write_text(json.dumps(content, indent=2) + "\n")
+        page.put([("instructions", page.instructions())])
     elif worse:
         sys.exit(f"more than {100 * TOLERANCE:g} % more instructions: {', '.join(worse)}")
 

@@ -6,7 +6,7 @@ import json
 import re
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +43,11 @@ def blocks(results: dict[str, Any], folder: Path) -> Iterator[tuple[str, str]]:
             shutil.copyfile(folder / figure, IMAGES / figure)
             text += f"\n\n![{CAPTIONS[part]}](images/{figure})"
         yield part, text
+    yield "instructions", instructions()
+
+
+def instructions() -> str:
+    """Return the table of the counts that are kept."""
     kept = json.loads((ROOT / "benchmarks" / "instructions.json").read_text())
     beside = {name: f"{times:.2f}" for name, times in kept["times_sticking"].items()}
     counts = markdown(
@@ -52,7 +57,19 @@ def blocks(results: dict[str, Any], folder: Path) -> Iterator[tuple[str, str]]:
             for name, count in kept["instructions_a_step"].items()
         ],
     )
-    yield "instructions", "\n".join(counts)
+    return "\n".join(counts)
+
+
+def put(blocks: Iterable[tuple[str, str]]) -> None:
+    """Write blocks by name into the page."""
+    page = PAGE.read_text(encoding="utf-8")
+    for name, text in blocks:
+        pattern = re.compile(rf"(<!-- benchmark: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
+        page, found = pattern.subn(lambda match, text=text: f"{match[1]}{text}\n{match[2]}", page)
+        if found != 1:
+            sys.exit(f"{PAGE} has {found} places for {name}")
+    PAGE.write_text(page, encoding="utf-8")
+    print(f"filled {PAGE}")
 
 
 def fill(folder: Path) -> None:
@@ -60,11 +77,4 @@ def fill(folder: Path) -> None:
     results = json.loads((folder / "benchmark.json").read_text(encoding="utf-8"))
     if results["quick"] or "interrupted" in results:
         sys.exit("these are not all results: run it in full")
-    page = PAGE.read_text(encoding="utf-8")
-    for name, text in blocks(results, folder):
-        pattern = re.compile(rf"(<!-- benchmark: {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        page, found = pattern.subn(lambda match, text=text: f"{match[1]}{text}\n{match[2]}", page)
-        if found != 1:
-            sys.exit(f"{PAGE} has {found} places for {name}")
-    PAGE.write_text(page, encoding="utf-8")
-    print(f"filled {PAGE}")
+    put(blocks(results, folder))
