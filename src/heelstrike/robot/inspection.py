@@ -346,7 +346,7 @@ def _description(robot: Robot) -> str:
 
 
 def _of_locked(robot: Robot) -> list[str]:
-    rows = [("joint", "moves", "kind", "axis", "at", "why")]
+    rows: list[tuple[str, ...]] = [("joint", "moves", "kind", "axis", "at", "why")]
     for one in robot.locked:
         axis = ", ".join(f"{value:.3g}" for value in one.axis) if any(one.axis) else ""
         rows.append((one.name, one.link, one.kind, axis, f"{one.position:.4g}", one.reason))

@@ -80,7 +80,8 @@ def find_mirror(
         tail = f"; and {more} more" if more > 0 else ""
         warn(
             f"{source}: left and right differ, so the robot has no mirror image: {shown}{tail}. "
-            'Gaits whose steps mirror each other need two equal legs: mirror="average" makes them so.'
+            "Gaits whose steps mirror each other need two equal legs, as load_robot makes them "
+            'with mirror="average".'
         )
         return None
     by_link = {foot.link: i for i, foot in enumerate(feet)}
@@ -129,7 +130,8 @@ def averaged(
     left = list(_structure(result, joint, sign, contact, joint_names, link_names))
     if left:
         raise RobotError(
-            f'{source}: mirror="average" cannot make left and right equal: {"; ".join(left[:SHOWN])}.'
+            f'{source}: mirror="average" cannot make left and right equal: '
+            f"{'; '.join(left[:SHOWN])}."
         )
     said = [
         f"{label(name)} by {_text(difference)} ({joint_names[place]})"
@@ -138,7 +140,8 @@ def averaged(
     ]
     if said:
         warn(
-            f"{source}: left and right are made equal by their means. They differed in {', '.join(said)}."
+            f"{source}: left and right are made equal by their means. They differed in "
+            f"{', '.join(said)}."
         )
     return result
 
@@ -263,10 +266,10 @@ def _corner(name: str, names: Sequence[str]) -> tuple[str, str] | None:
         side, place = _CORNERS[word.lower()]
         for other, (far, where) in _CORNERS.items():
             swapped = other.upper() if word.isupper() else other
-            if far != side and where == place:
-                if name[: found.start()] + swapped + name[found.end() :] in names:
-                    rest = f"{name[: found.start()]}{place} {name[found.end() :]}"
-                    return _SIDES[side], rest.lower()
+            twin = name[: found.start()] + swapped + name[found.end() :]
+            if far != side and where == place and twin in names:
+                rest = f"{name[: found.start()]}{place} {name[found.end() :]}"
+                return _SIDES[side], rest.lower()
     return None
 
 

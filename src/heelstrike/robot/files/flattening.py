@@ -10,6 +10,7 @@ import copy
 import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -152,7 +153,11 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
     mujoco.mj_kinematics(model, pose)
     floating = _floating_bodies(model, pose, options, label, hanging)
     keeps = _keeps(model, pose, floating)
-    spatial = [joint for joint in np.flatnonzero(~keeps) if model.jnt_bodyid[joint] not in floating]
+    spatial = [
+        joint
+        for joint in range(model.njnt)
+        if not keeps[joint] and model.jnt_bodyid[joint] not in floating
+    ]
     followers = list(_followers(model))
     why = dict.fromkeys(spatial, "leaves the plane")
     for _ in followers:
@@ -336,10 +341,9 @@ def _coordinates(
         if body in floating:
             lead = "" if body == floating[0] else f"{model.body(body).name}_"
             place = np.array(pose.xpos[body])
-            for name, axis, reference in zip(
-                ROOT, (X, Z, Y), (place[0], place[2], 0.0), strict=True
-            ):
-                yield Coordinate(lead + name, body, name == ROOT[2], axis, place, float(reference))
+            values = (place[0], place[2], 0.0)
+            for name, axis, value in zip(ROOT, (X, Z, Y), values, strict=True):
+                yield Coordinate(lead + name, body, name == ROOT[2], axis, place, float(value))
             continue
         first = model.body_jntadr[body]
         for joint in range(first, first + model.body_jntnum[body]):
@@ -373,7 +377,7 @@ def _in_order(coordinates: tuple[Coordinate, ...], model: Any) -> tuple[Coordina
         for body in set(bodies[:2]) - {bodies[2]}
     )
     chain = [0, *dict.fromkeys(bodies)]
-    alone &= all(model.body_parentid[b] == a for a, b in zip(chain, chain[1:], strict=False))
+    alone &= all(model.body_parentid[b] == a for a, b in pairwise(chain))
     driven = {int(joint) for joint in model.actuator_trnid[:, 0]} & {one.joint for one in root}
     slides = np.array([one.axis for one in root[:2]])
     which = np.abs(slides[:, [0, 2]]).argmax(axis=1)

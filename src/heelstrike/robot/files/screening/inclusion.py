@@ -101,6 +101,8 @@ def plain(text: str) -> str:
     declaration, which has to come first: it goes, since it says nothing.
     """
     bare = text.lstrip(_AROUND)
+    if not bare:
+        return text  # which is refused
     lines = text[: len(text) - len(bare)].count("\n")
     if lines and bare.startswith("<?xml"):
         bare = bare[bare.find("?>") + 2 :]
@@ -112,7 +114,7 @@ def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
     reading.characters += len(text)
     if reading.characters > LARGEST_FILE:
         raise RobotError(_too_large(reading.label))
-    if not text.strip():
+    if not text.strip("\ufeff \t\r\n"):
         raise RobotError(f"{label}: the file is empty.")
     if "\0" in text:
         raise RobotError(f"{label}: this is not a text file; MJCF and URDF are XML text.")
