@@ -14,7 +14,7 @@ import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import UNLIKELY, link_origins
-from heelstrike.robot.files.flattening import MASSLESS
+from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.files.saving import body_links

@@ -306,14 +306,18 @@ def _signs(model: Model, joint: Integers) -> Floats:
 
 
 def _contact_pairs(model: Model, joint: Integers) -> Integers:
-    """Nearest contact point on the counterpart of the link of every contact point."""
+    """Counterpart of every contact point: those of two links are matched as near as they can be."""
+    from scipy.optimize import linear_sum_assignment
+
     result = np.arange(len(model.contact_link))
-    for i, link in enumerate(model.contact_link):
-        there = np.flatnonzero(model.contact_link == joint[link])
-        if len(there) and joint[link] != link:
-            apart = model.contact_position[there] - model.contact_position[i]
-            change = np.abs(model.contact_radius[there] - model.contact_radius[i])
-            result[i] = there[np.argmin(np.hypot(*apart.T) + change)]
+    for link, other in enumerate(joint):
+        if link >= other:
+            continue
+        here, there = (np.flatnonzero(model.contact_link == one) for one in (link, other))
+        apart = model.contact_position[here][:, None] - model.contact_position[there]
+        change = np.abs(model.contact_radius[here][:, None] - model.contact_radius[there])
+        one, twin = linear_sum_assignment(np.hypot(apart[..., 0], apart[..., 1]) + change)
+        result[here[one]], result[there[twin]] = there[twin], here[one]
     return result
 
 

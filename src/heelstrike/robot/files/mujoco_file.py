@@ -24,6 +24,7 @@ from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_t
 from heelstrike.robot.files.urdf import (
     WORLD,
     let_massless_links_pass,
+    let_thin_meshes_pass,
     missing_moments,
     urdf_text,
 )
@@ -231,6 +232,7 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     spec.compiler.fusestatic = False
     if urdf:
         let_massless_links_pass(spec)
+        let_thin_meshes_pass(spec)
         spec.compiler.balanceinertia = False  # which replaces moments that URDF states
     lift_sizes(spec)
     return spec

@@ -98,15 +98,14 @@ def plain(text: str) -> str:
     """Return a text without what editors leave around it, every line where it was.
 
     That is null characters and byte order marks at both ends, and blank lines before the XML
-    declaration, which has to come first: it goes, since it says nothing.
+    declaration, which has to come first. The declaration goes: it says nothing, and some are wrong.
     """
     bare = text.lstrip(_AROUND)
     if not bare:
         return text  # which is refused
-    lines = text[: len(text) - len(bare)].count("\n")
-    if lines and bare.startswith("<?xml"):
-        bare = bare[bare.find("?>") + 2 :]
-    return "\n" * lines + bare.rstrip(_AROUND)
+    end = bare.find("?>") + 2 if bare.startswith("<?xml") else 0
+    lines = text[: len(text) - len(bare) + end].count("\n")
+    return "\n" * lines + bare[end:].rstrip(_AROUND)
 
 
 def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
