@@ -138,3 +138,10 @@ def run_motion(run: Run) -> Motion:
         Where its links and its centre of mass are in each row.
     """
     return motion(run.robot, run.position, run.velocity, run.contact_point)
+
+
+def in_world(origin: Floats, angle: Floats, local: Floats) -> Floats:
+    """Places (..., 2) of points (x, z) in link frames whose poses are given, in m and rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, z = local[..., 0], local[..., 1]
+    return np.asarray(origin + np.stack((c * x + s * z, c * z - s * x), axis=-1))

@@ -14,6 +14,9 @@ from heelstrike.sim.run import Run
 NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""
 
+CHATTER = 0.02
+"""A foot that lands again within this time (s) has not stepped: it chatters, or scuffs."""
+
 
 def pushing(run: Run) -> NDArray[np.bool_]:
     """Tell which contact points push in each row, (nt, nc).
@@ -197,7 +200,8 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     """List the stances that end a walking step: the landing foot is not the one that landed last.
 
     The contact the robot starts with is no step, nor is the first landing of a robot dropped from
-    the air, nor a foot that lands again without the other one having landed in between.
+    the air, nor a foot that lands again without the other one having landed in between, nor one
+    that was in the air for less than `CHATTER`.
 
     Parameters
     ----------
@@ -211,13 +215,16 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     """
     taken: list[Stance] = []
     last: set[int] = set()
+    left: dict[int, float] = {}
     for stance in stances(run):
+        chatters = stance.touchdown - left.get(stance.foot, -np.inf) < CHATTER
+        left[stance.foot] = stance.liftoff
         if stance.touchdown == run.time[0]:
             last.add(stance.foot)
-            continue
-        if last and last != {stance.foot}:
-            taken.append(stance)
-        last = {stance.foot}
+        elif not chatters:
+            if last and last != {stance.foot}:
+                taken.append(stance)
+            last = {stance.foot}
     return tuple(taken)
 
 

@@ -19,14 +19,15 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
+from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.view.style import (
-    FOOT_COLORS,
     INK,
     ORANGE,
     PALE,
+    foot_color,
     legend_above,
     new_figure,
     save_figure,
@@ -80,7 +81,7 @@ class Skeleton:
     @property
     def colors(self) -> list[str]:
         """Colour of each segment: legs as their feet, the rest dark."""
-        return [INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)] for foot in self.foot]
+        return [foot_color(foot) for foot in self.foot]
 
     def segments(self, origin: Floats, angle: Floats) -> Floats:
         """Place the segments in the world.
@@ -97,10 +98,7 @@ class Skeleton:
         (..., ns, 2, 2) float
             Segments, ends, (x, z).
         """
-        theta = angle[..., self.link]
-        c, s = np.cos(theta), np.sin(theta)
-        x, z = self.local[..., 0], self.local[..., 1]
-        return np.asarray(origin[..., self.link, :] + np.stack((c * x + s * z, c * z - s * x), -1))
+        return in_world(origin[..., self.link, :], angle[..., self.link], self.local)
 
 
 def skeleton(robot: Robot) -> Skeleton:
@@ -219,10 +217,7 @@ def leg_labels(robot: Robot) -> list[tuple[str, str]]:
     """Colours of the legs with the names of their feet; none for a robot of one leg."""
     if len(robot.feet) < 2:
         return []
-    return [
-        (FOOT_COLORS[i % len(FOOT_COLORS)], foot.name.replace("_", " "))
-        for i, foot in enumerate(robot.feet)
-    ]
+    return [(foot_color(i), foot.name.replace("_", " ")) for i, foot in enumerate(robot.feet)]
 
 
 def _sides(robot: Robot) -> NDArray[np.int64]:
@@ -366,12 +361,9 @@ def legs_apart(robot: Robot) -> Floats:
 
 def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:
     """Lowest points of the contact discs, (nc, 2)."""
-    model = robot.model
-    c, s = np.cos(angle[model.contact_link]), np.sin(angle[model.contact_link])
-    x, z = model.contact_position.T
-    center = origin[model.contact_link] + np.column_stack((c * x + s * z, c * z - s * x))
-    center[:, 1] -= model.contact_radius
-    return center
+    model, link = robot.model, robot.model.contact_link
+    center = in_world(origin[link], angle[link], model.contact_position)
+    return center - np.outer(model.contact_radius, [0.0, 1.0])
 
 
 def ground_outline(ground: Ground, left: float, right: float) -> Floats:

@@ -13,12 +13,13 @@ from matplotlib.figure import Figure
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
+from heelstrike.view.panels import Excerpt
 from heelstrike.view.style import save_figure, styled
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-_DRAWINGS: dict[str, tuple[str, Callable[[Run, Gait | None, slice], Figure]]] = {
+_DRAWINGS: dict[str, tuple[str, Callable[[Excerpt], Figure]]] = {
     "tracking": (
         "joint positions with the gait's reference (paper Figure 3)",
         joint_figures.draw_tracking,
@@ -28,7 +29,7 @@ _DRAWINGS: dict[str, tuple[str, Callable[[Run, Gait | None, slice], Figure]]] = 
         joint_figures.draw_velocities,
     ),
     "zmp": (
-        "zero moment point of the stance foot within its sole (paper Figure 5)",
+        "zero moment point of each foot within its sole (paper Figure 5)",
         contact_figures.draw_zero_moment_point,
     ),
     "friction": (
@@ -89,9 +90,9 @@ def plot(
     """
     if what not in _DRAWINGS:
         raise ViewError(_unknown(what))
-    rows = _rows(run, span)
+    excerpt = Excerpt(run, _rows(run, span), gait)
     with styled():
-        figure = _DRAWINGS[what][1](run, gait, rows)
+        figure = _DRAWINGS[what][1](excerpt)
     if path is not None:
         save_figure(figure, path)
     return figure
