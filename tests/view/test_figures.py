@@ -17,7 +17,7 @@ from synthetic_runs import box, make_run, pendulum
 import heelstrike as hs
 from heelstrike.analysis import energy_balance, reference_motion, zero_moment_point
 from heelstrike.view import FIGURES, ViewError, plot
-from heelstrike.view.impacts import impact_rows
+from heelstrike.view.panels import impact_rows
 
 
 def curve(axes: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:
