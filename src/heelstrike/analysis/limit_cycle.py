@@ -73,6 +73,7 @@ class LimitCycle:
         )
 
 
+# More arguments than eight: what walks, and how its steps are told apart, are a user's to say.
 def find_limit_cycle(
     robot: Robot,
     state: State,

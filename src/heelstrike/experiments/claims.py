@@ -296,23 +296,27 @@ def small_steps(evidence: Evidence) -> Claim:
         walked = [
             row
             for row in evidence.refinement
-            if row.scheme is scheme and row.status is RunStatus.COMPLETED and row.steps == STEPS
+            if row.scheme is scheme
+            and row.summary.status == RunStatus.COMPLETED.value
+            and row.summary.steps == STEPS
         ]
         if not walked:
-            outcomes.append(f"{scheme_name(scheme)}: none of the steps tried")
+            outcomes.append(f"{scheme.label}: none of the steps tried")
             continue
         coarsest = max(walked, key=lambda row: row.step)
         stable.append(coarsest)
         outcomes.append(
-            f"{scheme_name(scheme)}: {1e3 * coarsest.step:g} ms "
-            f"({coarsest.real_time_factor:.0f} × real time)"
+            f"{scheme.label}: {1e3 * coarsest.step:g} ms "
+            f"({coarsest.summary.real_time_factor:.0f} × real time)"
         )
     return Claim(
         "Sections 1 and 6",
         "Time stepping may require step sizes prohibitively small for numerical stability.",
         f"largest time step with which {STEPS} steps are walked: " + "; ".join(outcomes),
         "the claim holds if a scheme walks with no step that runs in real time",
-        _judged(len(stable) < len(SCHEMES) or any(row.real_time_factor < 1.0 for row in stable)),
+        _judged(
+            len(stable) < len(SCHEMES) or any(row.summary.real_time_factor < 1.0 for row in stable)
+        ),
         "See the table of steps and schemes.",
     )
 
@@ -325,9 +329,9 @@ def first_order(evidence: Evidence) -> Claim:
         "Section 1",
         "Time stepping is restricted to first-order methods with a fixed step.",
         "measured order of convergence: "
-        + ", ".join(f"{scheme_name(scheme)} {value:.2f}" for scheme, value in standing.items())
+        + ", ".join(f"{scheme.label} {value:.2f}" for scheme, value in standing.items())
         + "".join(
-            f"; {scheme_name(scheme)} loses the ground in {100.0 * share:.2g} % of its time steps"
+            f"; {scheme.label} loses the ground in {100.0 * share:.2g} % of its time steps"
             for scheme, share in falling.items()
         ),
         "schemes that keep the stance foot on the ground, the default among them, have an order "
@@ -436,11 +440,6 @@ CLAIMS: tuple[Callable[[Evidence], Claim], ...] = (
 def judge(evidence: Evidence) -> tuple[Claim, ...]:
     """Measure every claim of the paper."""
     return tuple(claim(evidence) for claim in CLAIMS)
-
-
-def scheme_name(scheme: Scheme) -> str:
-    """Name of a scheme in prose."""
-    return scheme.name.lower().replace("_", "-")
 
 
 def _rms(values: Floats) -> float:

@@ -9,17 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis import summarize
+from heelstrike.analysis import Summary, summarize
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.experiments.walk import walk
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
-from heelstrike.sim import Run, RunStatus, Scheme, TimeStepping, simulate
+from heelstrike.sim import Run, Scheme, TimeStepping, simulate
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
@@ -50,29 +51,13 @@ class RefinedWalk:
         Discretisation.
     step : float
         Time step in s.
-    status : RunStatus
-        How the run ended.
-    steps : int
-        Walking steps taken, of those asked for.
-    tracking_rms : float
-        Tracking error of the joints, in rad.
-    zmp_margin : float
-        Least distance of the zero moment point to the ends of the sole in single support, in m.
-    slip, penetration : float
-        Largest over the walk, in m.
-    real_time_factor : float
-        Simulated over computing time.
+    summary : Summary
+        What came of it.
     """
 
     scheme: Scheme
     step: float
-    status: RunStatus
-    steps: int
-    tracking_rms: float
-    zmp_margin: float
-    slip: float
-    penetration: float
-    real_time_factor: float
+    summary: Summary
 
 
 @dataclass(frozen=True)
@@ -133,33 +118,12 @@ def refine(
         Called with the fraction of the walks that is done.
     """
     walks = []
-    for scheme in schemes:
-        for step in time_steps:
-            run = whole(
-                walk(
-                    robot,
-                    gait,
-                    steps=walking_steps,
-                    method=TimeStepping(step=step, scheme=scheme),
-                    ground=ground,
-                )
-            )
-            summary = summarize(run, gait=gait)
-            walks.append(
-                RefinedWalk(
-                    scheme=scheme,
-                    step=step,
-                    status=run.status,
-                    steps=summary.steps,
-                    tracking_rms=summary.tracking_rms_rad,
-                    zmp_margin=summary.zmp_margin_min_m,
-                    slip=summary.slip_max_m,
-                    penetration=summary.penetration_max_m,
-                    real_time_factor=summary.real_time_factor,
-                )
-            )
-            if progress is not None:
-                progress(len(walks) / (len(schemes) * len(time_steps)))
+    for scheme, step in product(schemes, time_steps):
+        method = TimeStepping(step=step, scheme=scheme)
+        run = whole(walk(robot, gait, steps=walking_steps, method=method, ground=ground))
+        walks.append(RefinedWalk(scheme, step, summarize(run, gait=gait)))
+        if progress is not None:
+            progress(len(walks) / (len(schemes) * len(time_steps)))
     return tuple(walks)
 
 

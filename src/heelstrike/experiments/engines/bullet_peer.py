@@ -103,11 +103,10 @@ class BulletPeer(Peer):
     def _shape(self, points: Any) -> int:
         if not points:
             return -1
-        centers, radii = zip(*points, strict=True)
         shape = self._engine.createCollisionShapeArray(
             shapeTypes=[pybullet.GEOM_SPHERE] * len(points),
-            radii=radii,
-            collisionFramePositions=centers,
+            radii=[radius for _, radius in points],
+            collisionFramePositions=[center for center, _ in points],
         )
         return int(shape)
 
