@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import walking
@@ -178,3 +180,21 @@ def test_every_scheme_says_what_it_is(scheme: Scheme) -> None:
 def test_a_run_introduces_itself_in_a_line() -> None:
     found = run(None, stop_when_fallen=False)
     assert repr(found) == "Run(bravo7, TimeStepping, 0.1 s, completed, 100 steps)"
+
+
+def test_what_is_not_a_robot_state_or_method_is_refused_in_words() -> None:
+    robot = hs.load_robot("compass_gait")
+    state = robot.reference_state()
+    wrong: list[tuple[Any, dict[str, Any], str]] = [
+        ("bravo7", {"state": state}, r"robot must be a Robot, got 'bravo7'; load_robot"),
+        (robot, {"state": (state.q, state.v)}, r"got tuple; write State\(q, v\)"),
+        (robot, {"state": state, "method": hs.TimeStepping}, r"write TimeStepping\(\)"),
+    ]
+    for given, options, words in wrong:
+        with pytest.raises(hs.SimulationError, match=words):
+            hs.simulate(given, duration=0.1, **options)
+
+
+def test_an_unknown_scheme_is_answered_with_names() -> None:
+    with pytest.raises(hs.SimulationError, match=r"Scheme\.GAP_LINEARISED, .*Scheme\.MOREAU_JEAN"):
+        hs.TimeStepping(scheme="moreau-jean")  # type: ignore[arg-type]

@@ -30,7 +30,7 @@ Floats = NDArray[np.float64]
 
 WIDTH = 9.0  # inches
 # Points: each curve is wider than the one that is drawn over it, so that neither hides the other.
-THIN, WIDER = 1.4, 0.8
+THIN, WIDER = 1.4, 0.6
 
 ROWS_OF_AN_IMPACT = 3
 """An impact acts over the step in which a gap closes and the next, in which the point stops; the
