@@ -90,6 +90,14 @@ class Section:
         return State(q, state.v), distance
 
 
+def derivative(function: Callable[[Floats], Floats], size: int, change: float) -> Floats:
+    """Derivative of a function of a vector at zero, (m, size), by central differences."""
+    columns = [
+        (function(each) - function(-each)) / (2.0 * change) for each in change * np.eye(size)
+    ]
+    return np.array(columns).reshape(size, -1).T
+
+
 class Chart:
     """Coordinates of the states on the section near one of them, which is their origin.
 
@@ -102,13 +110,9 @@ class Chart:
         self._origin = np.concatenate((origin.q, origin.v))
         self._touching, self._at_rest = section.standing(origin)
         self._foothold = section.foothold(origin)
-        size = len(self._origin)
-        columns = [
-            (self._equations(self._origin + e) - self._equations(self._origin - e))
-            / (2.0 * DISTURBANCE)
-            for e in DISTURBANCE * np.eye(size)
-        ]
-        gradient = np.array(columns).T
+        gradient = derivative(
+            lambda change: self._equations(self._origin + change), len(self._origin), DISTURBANCE
+        )
         _, singular, directions = np.linalg.svd(gradient)
         rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
         self._normal = directions[:rank].T

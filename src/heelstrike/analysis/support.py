@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +30,13 @@ def pushing(run: Run) -> NDArray[np.bool_]:
 
 def pushing_feet(run: Run) -> NDArray[np.bool_]:
     """Tell which feet push in each row, (nt, nf)."""
-    points = pushing(run)
-    feet = [points[:, list(foot.contacts)].any(axis=1) for foot in run.robot.feet]
-    return np.array(feet, dtype=bool).reshape(len(feet), len(points)).T
+    return np.asarray(foot_sums(run, pushing(run)) > 0)
+
+
+def foot_sums(run: Run, values: NDArray[Any]) -> NDArray[Any]:
+    """Sum what is of contact points, (nt, nc, ...), over those of each foot, (nt, nf, ...)."""
+    sums = [values[:, list(foot.contacts)].sum(axis=1) for foot in run.robot.feet]
+    return np.stack(sums, axis=1) if sums else np.zeros((len(values), 0, *values.shape[2:]))
 
 
 def single_support(run: Run) -> NDArray[np.bool_]:

@@ -823,9 +823,9 @@ def checked_method(method: Method | None) -> Method:
             f"class, or those of its laws: load_run(path, classes=[{method.name}])"
         )
     if not isinstance(method, Method):
-        made = f"; write {method.__name__}()" if isinstance(method, type) else ""
         raise SimulationError(
-            f"method must be a way through time such as TimeStepping(), got {method!r}{made}"
+            f"method must be a way through time such as TimeStepping(), got {method!r}"
+            + (f"; write {method.__name__}()" if isinstance(method, type) else "")
         )
     return method
 

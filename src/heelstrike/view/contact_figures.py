@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from heelstrike.analysis.friction import friction_coefficient, friction_use
-from heelstrike.analysis.support import pushing_feet
+from heelstrike.analysis.support import foot_sums, pushing_feet
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
 from heelstrike.errors import ViewError
 from heelstrike.robot.robot import Foot
@@ -15,7 +15,6 @@ from heelstrike.view.panels import (
     NOTE,
     Curve,
     Excerpt,
-    Floats,
     Panel,
     draw_panels,
 )
@@ -51,16 +50,16 @@ def draw_zero_moment_point(excerpt: Excerpt) -> Figure:
 def draw_friction(excerpt: Excerpt) -> Figure:
     """Tangential force of each foot while it pushes, and what friction allows."""
     run = excerpt.run
+    feet, pushes = _feet(run), pushing_feet(run)
     allowed = friction_coefficient(run) * run.contact_force[..., 0]
+    cones = np.where(pushes, foot_sums(run, allowed), np.nan).T
+    forces = np.where(pushes, foot_sums(run, run.contact_force[..., 1]), np.nan).T
     panels = []
-    for i, foot in enumerate(_feet(run)):
-        pushes = pushing_feet(run)[:, i]
-        cone = np.where(pushes, _sum(allowed, foot), np.nan)
-        force = np.where(pushes, _sum(run.contact_force[..., 1], foot), np.nan)
+    for i, (foot, cone) in enumerate(zip(feet, cones, strict=True)):
         curves = [
             Curve(cone, "cone ±μFₙ", BOUND),
             Curve(-cone, look=BOUND),
-            Curve(force, "Fₜ", {"color": foot_color(i)}),
+            Curve(forces[i], "Fₜ", {"color": foot_color(i)}),
         ]
         panels.append(Panel("force (N)", curves, _name(foot), cone=cone, impacts=False))
     return draw_panels(
@@ -87,9 +86,10 @@ def draw_forces(excerpt: Excerpt) -> Figure:
     """Normal and tangential force on each foot."""
     run = excerpt.run
     feet = _feet(run)
+    force = foot_sums(run, run.contact_force)
     normal, tangential = (
         [
-            Curve(_sum(run.contact_force[..., k], foot), _name(foot), {"color": foot_color(i)})
+            Curve(force[:, i, k], _name(foot), {"color": foot_color(i)})
             for i, foot in enumerate(feet)
         ]
         for k in range(2)
@@ -125,10 +125,6 @@ def _feet(run: Run) -> tuple[Foot, ...]:
     if not run.robot.feet:
         raise ViewError(f"robot {run.robot.name!r} has no feet: there is nothing to show")
     return run.robot.feet
-
-
-def _sum(of_points: Floats, foot: Foot) -> Floats:
-    return np.asarray(of_points[:, list(foot.contacts)].sum(axis=1))
 
 
 def _name(foot: Foot) -> str:

@@ -87,12 +87,8 @@ def frames(run: Run, interval: float) -> Frames:
     mean[same] = acting[row[same]]
     force, normal = mean[..., :2], mean[..., 2]
     on_ground = run.contact_point[row] - run.gap[row][..., None] * run.contact_normal[row]
-    total = normal.sum(axis=1)
-    pushes = total > 1e-6 * run.robot.weight
-    pressure = np.full((count, 2), np.nan)
-    pressure[pushes] = np.einsum(
-        "fc,fck->fk", normal[pushes] / total[pushes, None], on_ground[pushes]
-    )
+    total = normal.sum(axis=1, keepdims=True)
+    share = normal / np.where(total > 1e-6 * run.robot.weight, total, np.nan)
     return Frames(
         time=time,
         row=row,
@@ -100,7 +96,7 @@ def frames(run: Run, interval: float) -> Frames:
         center=motion.center_of_mass[row],
         point=run.contact_point[row],
         force=force,
-        pressure=pressure,
+        pressure=np.einsum("fc,fck->fk", share, on_ground),
     )
 
 
@@ -203,9 +199,7 @@ class Film:
         center = self.frames.center[:, 0]
         reach = min(round(FOLLOWS_WITHIN / interval), len(center) - 1)
         # Straight continuation at both ends, so that the camera neither lags nor stops early.
-        before = center[0] - (center[1 : reach + 1] - center[0])[::-1]
-        after = center[-1] - (center[-reach - 1 : -1] - center[-1])[::-1]
-        padded = np.concatenate((before, center, after))
+        padded = np.pad(center, reach, mode="reflect", reflect_type="odd")
         window = np.hanning(2 * reach + 3)[1:-1]
         x = np.convolve(padded, window / window.sum(), mode="valid")
         return np.column_stack((x, np.asarray(self._ground.height(x))))
