@@ -8,7 +8,7 @@ from pathlib import Path
 
 import heelstrike
 from heelstrike.analysis import summarize
-from heelstrike.experiments.claims import Claim, Verdict
+from heelstrike.experiments.claims import Claim
 from heelstrike.experiments.evidence import STEPS, TIME_STEP, Evidence
 from heelstrike.experiments.refinement import EXACT_STEP, Convergence, RefinedWalk
 from heelstrike.whole_file import write_whole
@@ -78,7 +78,7 @@ def _setting(evidence: Evidence) -> str:
 
 
 def _tally(claims: Sequence[Claim]) -> str:
-    hold = sum(claim.verdict is Verdict.HOLDS for claim in claims)
+    hold = sum(claim.holds for claim in claims)
     return f"Of {len(claims)} claims {hold} hold here; each is judged by the criterion beside it."
 
 

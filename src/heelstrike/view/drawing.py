@@ -13,6 +13,7 @@ import os
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -105,48 +106,11 @@ def skeleton(robot: Robot) -> Skeleton:
     """Make the line segments of a robot, those in front last."""
     model = robot.model
     reference = link_poses(robot, model.reference).origin
-    leg = legs(robot)
-    side = _sides(robot)
-    bones: list[Bone] = []
     share = np.cbrt(model.mass / max(robot.total_mass, 1e-12))
     width = np.maximum(THINNEST, THICKEST * share)
-    nowhere = np.zeros(2)
-    for link in range(robot.nv):
-        if model.mass[link] == 0.0:
-            continue
-        before = len(bones)
-        center = model.center_of_mass[link]
-        # The frame of a slide may be anywhere; that of a hinge is on the link.
-        home = nowhere if model.axis[link, 0] != 0.0 else center
-        children = np.flatnonzero(model.parent == link)
-        joints = reference[children] - reference[link]
-        if _is_trunk(robot, link, joints):
-            if np.hypot(*(center - joints[0])) > SAME_PLACE:
-                bones.append((link, joints[0], link, 2.0 * center - joints[0], width[link]))
-            continue
-        for child, place in zip(children, joints, strict=True):
-            if np.hypot(*(place - home)) > SAME_PLACE:
-                bones.append((link, home, int(child), nowhere, width[link]))
-        contacts = np.flatnonzero(model.contact_link == link)
-        points = model.contact_position[contacts]
-        thickness = width[link]
-        if len(bones) == before and _are_around(points):
-            lines = [(home, p) for p in points]
-            thickness = THINNEST
-        elif len(bones) == before:
-            lines = _outline(points)
-        else:
-            ends = np.array([home, *joints])
-            lines = [(home, p) for p in points if np.hypot(*(ends - p).T).min() > SAME_PLACE]
-        for start, end in lines:
-            bones.append((link, start, link, end, thickness))
-        for contact in contacts:
-            radius = float(model.contact_radius[contact])
-            if radius > SAME_PLACE:
-                for start, end in _disc(model.contact_position[contact], radius):
-                    bones.append((link, start, link, end, DISC_WIDTH))
-        if len(bones) == before and np.hypot(*(center - home)) > SAME_PLACE:
-            bones.append((link, nowhere, link, 2.0 * center, width[link]))
+    side = _sides(robot)
+    massive = np.flatnonzero(model.mass).tolist()
+    bones = [bone for i in massive for bone in _bones(robot, i, reference, float(width[i]))]
     bones.sort(key=lambda bone: side[bone[0]])
     links = np.array([(a, b) for a, _, b, _, _ in bones], dtype=np.int64).reshape(-1, 2)
     return Skeleton(
@@ -154,8 +118,47 @@ def skeleton(robot: Robot) -> Skeleton:
         local=np.array([(p, r) for _, p, _, r, _ in bones], dtype=np.float64).reshape(-1, 2, 2),
         width=np.array([bone[4] for bone in bones], dtype=np.float64),
         side=side[links[:, 0]],
-        foot=leg[links[:, 0]],
+        foot=legs(robot)[links[:, 0]],
     )
+
+
+def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bone]:
+    """Bones of a link that has a mass."""
+    model = robot.model
+    center, nowhere = model.center_of_mass[link], np.zeros(2)
+    # The frame of a slide may be anywhere; that of a hinge is on the link.
+    home = nowhere if model.axis[link, 0] != 0.0 else center
+    children = np.flatnonzero(model.parent == link)
+    joints = reference[children] - reference[link]
+    if _is_trunk(robot, link, joints):
+        end = 2.0 * center - joints[0]
+        return [(link, joints[0], link, end, width)] if _apart(center, joints[0]) else []
+    bones: list[Bone] = [
+        (link, home, int(child), nowhere, width)
+        for child, place in zip(children, joints, strict=True)
+        if _apart(place, home)
+    ]
+    contacts = np.flatnonzero(model.contact_link == link)
+    points = model.contact_position[contacts]
+    thickness = width
+    if bones:
+        lines = [(home, p) for p in points if all(_apart(p, end) for end in (home, *joints))]
+    elif _are_around(points):
+        lines, thickness = [(home, p) for p in points], THINNEST
+    else:
+        lines = _outline(points)
+    bones += [(link, start, link, end, thickness) for start, end in lines]
+    for point, radius in zip(points, model.contact_radius[contacts], strict=True):
+        if radius > SAME_PLACE:
+            rim = _disc(point, float(radius))
+            bones += [(link, start, link, end, DISC_WIDTH) for start, end in rim]
+    if not bones and _apart(center, home):
+        bones = [(link, nowhere, link, 2.0 * center, width)]
+    return bones
+
+
+def _apart(a: Floats, b: Floats) -> bool:
+    return bool(np.hypot(*(a - b)) > SAME_PLACE)
 
 
 def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
@@ -189,7 +192,7 @@ def _outline(points: Floats) -> list[tuple[Floats, Floats]]:
     corners = [np.zeros(2), *points]
     if len(points) > 1:
         corners.append(np.zeros(2))
-    return [(a, b) for a, b in pairwise(corners) if np.hypot(*(b - a)) > SAME_PLACE]
+    return [(a, b) for a, b in pairwise(corners) if _apart(a, b)]
 
 
 def _disc(center: Floats, radius: float) -> list[tuple[Floats, Floats]]:
@@ -304,21 +307,17 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         draw_robot(axes, robot, q)
         massive = np.flatnonzero(model.mass > 0.0)
         joints = [i for i in massive if model.axis[i, 0] != 0.0 and model.parent[i] >= 0]
-        axes.plot(
-            *poses.origin[joints].T, "o", color="white", mec=INK, ms=5, zorder=5, label="joint"
-        )
-        axes.plot(
-            *poses.center_of_mass[massive].T,
-            "P",
-            color=ORANGE,
-            mec="white",
-            ms=7,
-            zorder=6,
-            label="centre of mass",
-        )
         points = _contact_bottoms(robot, poses.origin, poses.angle)
-        if len(points):
-            axes.plot(*points.T, "^", color=INK, ms=5, zorder=6, label="contact point")
+        marks: dict[str, tuple[Floats, str, dict[str, Any]]] = {
+            "joint": (poses.origin[joints], "o", {"color": "white", "mec": INK, "zorder": 5}),
+            "centre of mass": (
+                poses.center_of_mass[massive], "P", {"color": ORANGE, "mec": "white", "ms": 7}
+            ),
+            "contact point": (points, "^", {"color": INK}),
+        }  # fmt: skip
+        for label, (places, marker, look) in marks.items():
+            if len(places):
+                axes.plot(*places.T, marker, label=label, **({"ms": 5, "zorder": 6} | look))
         ground = float(points[:, 1].min()) if len(points) else float(low[1])
         axes.axhspan(ground - 0.06 * size, ground, color=PALE, zorder=0)
         middle = 0.5 * float(low[0] + high[0])
