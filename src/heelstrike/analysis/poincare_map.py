@@ -219,8 +219,8 @@ class PoincareMap:
             self._relabelled = lambda state, _: symmetry(state)
         elif landing is not None:
             self._relabelled = lambda state, _: state
-        elif robot.mirror is not None:
-            self._relabelled = lambda state, _: exchanged(robot, state)
+        elif (mirror := robot.mirror) is not None:
+            self._relabelled = lambda state, _: mirror.state(state)
         elif is_wheel(robot):
             self._relabelled = lambda state, contact: turned(robot, state, contact)
         else:
@@ -277,14 +277,6 @@ class PoincareMap:
         )
 
 
-def exchanged(robot: Robot, state: State) -> State:
-    """Return a state with left and right exchanged."""
-    mirror = robot.mirror
-    if mirror is None:
-        raise LimitCycleError(f"robot {robot.name!r} has no mirror image")
-    return mirror.state(state)
-
-
 def is_wheel(robot: Robot) -> bool:
     """Whether all contact points are spokes of one wheel: evenly spaced, balanced on its hinge."""
     model = robot.model
@@ -293,7 +285,8 @@ def is_wheel(robot: Robot) -> bool:
         return False
     (link,) = links
     spokes = model.contact_position @ np.array([1j, 1.0])  # angles about +y, from the vertical
-    gaps = np.diff(np.sort(np.angle(spokes)), append=np.sort(np.angle(spokes))[0] + 2.0 * np.pi)
+    angles = np.sort(np.angle(spokes))
+    gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
     return bool(
         model.axis[link, 0] != 0.0
         and np.ptp(np.abs(spokes)) < 1e-9

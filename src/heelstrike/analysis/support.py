@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import Event, Run
 
 NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""
@@ -173,15 +173,13 @@ def stances(run: Run) -> tuple[Stance, ...]:
     closed: dict[int, set[int]] = {foot: set() for foot in range(len(run.robot.feet))}
     current: dict[int, int] = {}
     found: list[Stance] = []
-    for contact in _first_contacts(run):
-        foot = foot_of.get(contact, -1)
-        if foot >= 0:
-            closed[foot].add(contact)
-    for foot, contacts in closed.items():
-        if contacts:
-            current[foot] = len(found)
-            found.append(Stance(foot, float(run.time[0]), np.inf, 0.0))
-    for event in run.events:
+    standing = np.any(pushing(run)[:1], axis=0).tolist()
+    begin = [
+        Event(float(run.time[0]), EventKind.TOUCHDOWN, contact, (0.0, 0.0))
+        for contact in foot_of
+        if standing[contact]
+    ]
+    for event in (*begin, *run.events):
         foot = foot_of.get(event.contact, -1)
         if foot < 0:
             continue
@@ -231,10 +229,3 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
                 taken.append(stance)
             last = {stance.foot}
     return tuple(taken)
-
-
-def _first_contacts(run: Run) -> list[int]:
-    """Contact points on the ground at the beginning."""
-    if not len(run.time):
-        return []
-    return [int(contact) for contact in np.flatnonzero(pushing(run)[0])]

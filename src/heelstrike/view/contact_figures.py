@@ -18,7 +18,7 @@ from heelstrike.view.panels import (
     Panel,
     draw_panels,
 )
-from heelstrike.view.style import BOUND, INK, foot_color
+from heelstrike.view.style import BOUND, INK, foot_color, in_words
 
 STROKES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 
@@ -34,7 +34,7 @@ def draw_zero_moment_point(excerpt: Excerpt) -> Figure:
         Curve(zmp.foot[:, i], look=look[i] | {"linewidth": 0.6, "alpha": 0.6})
         for i in range(len(feet))
     ]
-    curves += [Curve(alone[:, i], _name(foot), look[i]) for i, foot in enumerate(feet)]
+    curves += [Curve(alone[:, i], in_words(foot.name), look[i]) for i, foot in enumerate(feet)]
     heel, toe = zero_moment_point_limits(run.robot)
     room = 0.15 * max(toe - heel, 1e-3)
     panel = Panel(
@@ -61,7 +61,7 @@ def draw_friction(excerpt: Excerpt) -> Figure:
             Curve(-cone, look=BOUND),
             Curve(forces[i], "Fₜ", {"color": foot_color(i)}),
         ]
-        panels.append(Panel("force (N)", curves, _name(foot), cone=cone, impacts=False))
+        panels.append(Panel("force (N)", curves, in_words(foot.name), cone=cone, impacts=False))
     return draw_panels(
         excerpt,
         "tangential force of the ground on the feet",
@@ -89,7 +89,7 @@ def draw_forces(excerpt: Excerpt) -> Figure:
     force = foot_sums(run, run.contact_force)
     normal, tangential = (
         [
-            Curve(force[:, i, k], _name(foot), {"color": foot_color(i)})
+            Curve(force[:, i, k], in_words(foot.name), {"color": foot_color(i)})
             for i, foot in enumerate(feet)
         ]
         for k in range(2)
@@ -111,12 +111,12 @@ def draw_gaps(excerpt: Excerpt) -> Figure:
         curves = [
             Curve(
                 run.gap[:, contact],
-                _words(run.robot.contact_names[contact].removeprefix(f"{foot.name}_")),
+                in_words(run.robot.contact_names[contact].removeprefix(f"{foot.name}_")),
                 {"color": INK if k else foot_color(i), "linestyle": STROKES[k % len(STROKES)]},
             )
             for k, contact in enumerate(foot.contacts)
         ]
-        panels.append(Panel("height (m)", curves, _name(foot)))
+        panels.append(Panel("height (m)", curves, in_words(foot.name)))
     title = "height of the contact points above the ground"
     return draw_panels(excerpt, title, panels, height=0.9 + 2.3 * len(panels))
 
@@ -125,11 +125,3 @@ def _feet(run: Run) -> tuple[Foot, ...]:
     if not run.robot.feet:
         raise ViewError(f"robot {run.robot.name!r} has no feet: there is nothing to show")
     return run.robot.feet
-
-
-def _name(foot: Foot) -> str:
-    return _words(foot.name)
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

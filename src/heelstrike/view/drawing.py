@@ -29,6 +29,7 @@ from heelstrike.view.style import (
     ORANGE,
     PALE,
     foot_color,
+    in_words,
     legend_above,
     new_figure,
     save_figure,
@@ -220,7 +221,7 @@ def leg_labels(robot: Robot) -> list[tuple[str, str]]:
     """Colours of the legs with the names of their feet; none for a robot of one leg."""
     if len(robot.feet) < 2:
         return []
-    return [(foot_color(i), foot.name.replace("_", " ")) for i, foot in enumerate(robot.feet)]
+    return [(foot_color(i), in_words(foot.name)) for i, foot in enumerate(robot.feet)]
 
 
 def _sides(robot: Robot) -> NDArray[np.int64]:

@@ -11,10 +11,9 @@ from matplotlib.figure import Figure
 
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.errors import ViewError
-from heelstrike.robot.robot import Robot
 from heelstrike.view.drawing import legs
 from heelstrike.view.panels import Curve, Excerpt, Panel, draw_panels
-from heelstrike.view.style import INK, foot_color
+from heelstrike.view.style import INK, foot_color, in_words
 
 REFERENCE: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
@@ -32,7 +31,7 @@ def draw_motion(excerpt: Excerpt, what: Literal["position", "velocity"]) -> Figu
         curves = [Curve(values[:, joint], "simulated", look)]
         if reference is not None:
             curves.append(Curve(reference[:, joint], "reference", REFERENCE))
-        return Panel(units[not turns], curves, _name(run.robot, joint))
+        return Panel(units[not turns], curves, in_words(run.robot.actuator_names[joint]))
 
     title = f"joint {'positions' if what == 'position' else 'velocities'}"
     return _draw_joints(excerpt, title, panel)
@@ -54,7 +53,7 @@ def draw_torque(excerpt: Excerpt) -> Figure:
         return Panel(
             unit,
             [Curve(run.torque[:, joint], look={"color": color, "drawstyle": "steps-post"})],
-            _name(run.robot, joint),
+            in_words(run.robot.actuator_names[joint]),
             remark=f"limits {text} {unit}" if limits else "",
             bounds={"": limits},
             impacts=False,
@@ -79,7 +78,3 @@ def _draw_joints(excerpt: Excerpt, title: str, panel: Callable[[int, str, bool],
     columns = min(2, robot.nu)
     height = 1.2 + 1.9 * -(-robot.nu // columns)
     return draw_panels(excerpt, title, panels, height=height, columns=columns, legends=False)
-
-
-def _name(robot: Robot, actuator: int) -> str:
-    return robot.actuator_names[actuator].replace("_", " ")

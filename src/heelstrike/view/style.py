@@ -87,6 +87,11 @@ def foot_color(foot: int) -> str:
     return INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)]
 
 
+def in_words(name: str) -> str:
+    """Name of a joint, foot or contact point as people write it."""
+    return name.replace("_", " ")
+
+
 def new_figure(width: float, height: float) -> Figure:
     """Make a figure (inches) that belongs to no window and to no global list."""
     figure = Figure(figsize=(width, height), layout="constrained")

@@ -73,7 +73,7 @@ class DrakePeer(Peer):
         logging.getLogger("drake").setLevel(logging.ERROR)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the deprecated approximation
-            self._simulator, self._plant = _simulator(scenario, config, material)
+            self._simulator, self._plant = _simulator(scenario, self.commands, config, material)
         self._context = self._plant.GetMyMutableContextFromRoot(
             self._simulator.get_mutable_context()
         )
@@ -100,7 +100,7 @@ class DrakePeer(Peer):
         return [(abs(float(one.contact_force()[2])), float(one.point_pair().depth)) for one in each]
 
 
-def _simulator(scenario: Scenario, config: Any, material: Any) -> tuple[Any, Any]:
+def _simulator(scenario: Scenario, commands: Floats, config: Any, material: Any) -> tuple[Any, Any]:
     model = scenario.robot.model
     builder = framework.DiagramBuilder()
     plant, scene = plants.AddMultibodyPlant(config, builder)
@@ -116,7 +116,7 @@ def _simulator(scenario: Scenario, config: Any, material: Any) -> tuple[Any, Any
     )
     scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
     if scenario.robot.nu:
-        source = builder.AddSystem(_commands(scenario))
+        source = builder.AddSystem(_commands(scenario, commands))
         port = plant.get_actuation_input_port(tree.default_model_instance())
         builder.Connect(source.get_output_port(), port)
     return analysis.Simulator(builder.Build()), plant
@@ -169,21 +169,16 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
     return bodies
 
 
-def _commands(scenario: Scenario) -> Any:
+def _commands(scenario: Scenario, commands: Floats) -> Any:
     """Source of the commands of the actuators, as polynomials of time."""
     feedback = scenario.feedback
-    if feedback is None:
-        return primitives.ConstantVectorSource(np.zeros(scenario.robot.nu))
-    if len(feedback.parameters.begins) == 1 and feedback.parameters.coefficients.shape[2] == 1:
-        return primitives.ConstantVectorSource(feedback.command([0.0])[0])
+    if feedback is None or len(commands) == 1:  # they never change
+        return primitives.ConstantVectorSource(commands[0])
+    law = feedback.parameters
     pieces = [
-        np.array([[polynomial.Polynomial(row)] for row in piece])
-        for piece in feedback.parameters.coefficients
+        np.array([[polynomial.Polynomial(row)] for row in piece]) for piece in law.coefficients
     ]
-    breaks = [
-        *feedback.parameters.begins,
-        max(2.0 * scenario.duration, 2.0 * feedback.parameters.begins[-1]),
-    ]
+    breaks = [*law.begins, 2.0 * max(scenario.duration, law.begins[-1])]
     return primitives.TrajectorySource(trajectories.PiecewisePolynomial(pieces, breaks))
 
 
