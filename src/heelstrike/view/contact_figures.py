@@ -31,8 +31,8 @@ def draw_zero_moment_point(excerpt: Excerpt) -> Figure:
     alone = np.where(zmp.single_support[:, None], zmp.foot, np.nan)
     look = [{"color": foot_color(i), "linewidth": 1.4} for i in range(len(feet))]
     curves = [
-        Curve(zmp.foot[:, i], look=look[i] | {"linewidth": 0.6, "alpha": 0.6})
-        for i in range(len(feet))
+        Curve(own, look=look[i] | {"linewidth": 0.9, "linestyle": STROKES[i % len(STROKES)]})
+        for i, own in enumerate(zmp.foot.T)
     ]
     curves += [Curve(alone[:, i], in_words(foot.name), look[i]) for i, foot in enumerate(feet)]
     heel, toe = zero_moment_point_limits(run.robot)
