@@ -114,7 +114,7 @@ def test_order_is_that_of_made_up_errors(
 
     monkeypatch.setattr("heelstrike.experiments.refinement.simulate", simulate)
     monkeypatch.setattr("heelstrike.experiments.refinement.EXACT_STEP", 1e-12)
-    found = converge(bravo7, gait)
+    found = converge(bravo7, gait, hs.Ground())
     assert [each.order for each in found] == pytest.approx([2.0] * len(SCHEMES))
     assert [each.scheme for each in found] == list(SCHEMES)
     lost = [0.1 if each.scheme is Scheme.PAPER_EXPLICIT else 0.0 for each in found]

@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
@@ -101,6 +100,16 @@ class Skeleton:
             Segments, ends, (x, z).
         """
         return in_world(origin[..., self.link, :], angle[..., self.link], self.local)
+
+    def lines(self, segments: Floats, scale: float = 1.0) -> LineCollection:
+        """Lines to draw, from segments (ns, 2, 2) in the world and a factor of all widths."""
+        return LineCollection(
+            list(segments),
+            colors=self.colors,
+            linewidths=scale * self.width,
+            capstyle="round",
+            zorder=3,
+        )
 
 
 def skeleton(robot: Robot) -> Skeleton:
@@ -242,36 +251,6 @@ def _says_left(robot: Robot, link: int) -> bool:
     return "left" in f"{robot.joint_names[link]} {robot.link_names[link]}".lower()
 
 
-def draw_robot(
-    axes: Axes, robot: Robot, q: Floats, *, alpha: float = 1.0, scale: float = 1.0
-) -> LineCollection:
-    """Draw a robot in one configuration.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where, with metres along both axes.
-    robot : Robot
-        The robot.
-    q : (nq,) float
-        Its configuration.
-    alpha, scale : float
-        Opacity, and factor of all line widths.
-    """
-    bones = skeleton(robot)
-    poses = link_poses(robot, q)
-    lines = LineCollection(
-        list(bones.segments(poses.origin, poses.angle)),
-        colors=bones.colors,
-        linewidths=bones.width * scale,
-        capstyle="round",
-        alpha=alpha,
-        zorder=3,
-    )
-    axes.add_collection(lines)
-    return lines
-
-
 def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
     """Write a portrait of a robot, standing as in its file but with its legs apart.
 
@@ -299,13 +278,14 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
         poses = link_poses(robot, q)
     bones = skeleton(robot)
-    low, high = extent(bones.segments(poses.origin, poses.angle))
+    segments = bones.segments(poses.origin, poses.angle)
+    low, high = extent(segments)
     width, height = high - low
     size = max(float(height), float(width) / WIDTH_SHARE, 1e-3)
     with styled():
         figure = new_figure(4.6, 5.8)
         axes = figure.add_subplot()
-        draw_robot(axes, robot, q)
+        axes.add_collection(bones.lines(segments))
         massive = np.flatnonzero(model.mass > 0.0)
         joints = [i for i in massive if model.axis[i, 0] != 0.0 and model.parent[i] >= 0]
         points = _contact_bottoms(robot, poses.origin, poses.angle)

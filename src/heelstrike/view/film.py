@@ -131,9 +131,7 @@ class Film:
         self._soil = Polygon(np.zeros((1, 2)), closed=True, facecolor=PALE, edgecolor=GREY, lw=1.0)
         axes.add_patch(self._soil)
         self._marks = LineCollection([], colors=GREY, linewidths=1.0)
-        self._robot = LineCollection(
-            [], colors=bones.colors, linewidths=scale * bones.width, capstyle="round"
-        )
+        self._robot = bones.lines(np.zeros((0, 2, 2)), scale)
         for collection in (self._marks, self._robot):
             axes.add_collection(collection, autolim=False)
         self._arrows = Arrows(axes, self._size, run.robot.weight, width=2.5 * scale)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -39,15 +38,7 @@ def draw_snapshots(excerpt: Excerpt) -> Figure:
     axes = figure.add_subplot()
     shift = np.column_stack((spacing * np.arange(POSES), np.zeros(POSES))) - origin
     for i, row in enumerate(at):
-        axes.add_collection(
-            LineCollection(
-                list(segments[i] + shift[i]),
-                colors=bones.colors,
-                linewidths=0.55 * bones.width,
-                capstyle="round",
-                zorder=3,
-            )
-        )
+        axes.add_collection(bones.lines(segments[i] + shift[i], 0.55))
         surface = ground_outline(run.ground, center[i] - 0.5 * spacing, center[i] + 0.5 * spacing)
         below = surface - [0.0, 0.02 * size]
         axes.fill(*(np.concatenate((surface, below[::-1])) + shift[i]).T, color=PALE, zorder=0)
