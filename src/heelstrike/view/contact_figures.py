@@ -24,7 +24,7 @@ STROKES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 
 
 def draw_zero_moment_point(excerpt: Excerpt) -> Figure:
-    """Zero moment point of each foot in its frame, thin where the other foot pushes, too."""
+    """Zero moment point of each foot within its sole (paper Figure 5), thin in double support."""
     run = excerpt.run
     feet = _feet(run)
     zmp = zero_moment_point(run)
@@ -48,7 +48,7 @@ def draw_zero_moment_point(excerpt: Excerpt) -> Figure:
 
 
 def draw_friction(excerpt: Excerpt) -> Figure:
-    """Tangential force of each foot while it pushes, and what friction allows."""
+    """Tangential force of each foot within the friction cone (paper Figure 6)."""
     run = excerpt.run
     feet, pushes = _feet(run), pushing_feet(run)
     allowed = friction_coefficient(run) * run.contact_force[..., 0]

@@ -27,7 +27,7 @@ ALWAYS = ("actuators", "contacts", "residual")
 
 
 def draw_energy(excerpt: Excerpt) -> Figure:
-    """Energy above, the work done since the start below."""
+    """Mechanical energy, the work that changed it, and what no work explains."""
     balance = energy_balance(excerpt.run)
     changes = [
         Curve(getattr(balance, name) - getattr(balance, name)[0], label, {"color": color})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -18,7 +17,7 @@ from heelstrike.view.style import INK, foot_color, in_words
 REFERENCE: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
-def draw_motion(excerpt: Excerpt, what: Literal["position", "velocity"]) -> Figure:
+def _draw_motion(excerpt: Excerpt, what: Literal["position", "velocity"]) -> Figure:
     """Joint positions or velocities, and their references."""
     run = excerpt.run
     values = getattr(run, what)[:, run.robot.model.actuator_joint]
@@ -37,12 +36,18 @@ def draw_motion(excerpt: Excerpt, what: Literal["position", "velocity"]) -> Figu
     return _draw_joints(excerpt, title, panel)
 
 
-draw_tracking = partial(draw_motion, what="position")
-draw_velocities = partial(draw_motion, what="velocity")
+def draw_tracking(excerpt: Excerpt) -> Figure:
+    """Joint positions with the gait's reference (paper Figure 3)."""
+    return _draw_motion(excerpt, "position")
+
+
+def draw_velocities(excerpt: Excerpt) -> Figure:
+    """Joint velocities with the gait's reference (paper Figure 4)."""
+    return _draw_motion(excerpt, "velocity")
 
 
 def draw_torque(excerpt: Excerpt) -> Figure:
-    """Joint torques, held from row to row, and their limits."""
+    """Joint torques with their limits, held from row to row."""
     run, model = excerpt.run, excerpt.run.robot.model
 
     def panel(joint: int, color: str, turns: bool) -> Panel:

@@ -21,7 +21,7 @@ POSES = 7
 
 
 def draw_snapshots(excerpt: Excerpt) -> Figure:
-    """The robot at equal times of its middle step, side by side, with the forces on it."""
+    """The robot at equal times of one step, side by side, with the forces on it."""
     run = excerpt.run
     motion = run_motion(run)
     bones = skeleton(run.robot)
