@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.sim import RunStatus, Scheme
+from heelstrike.sim import RunStatus, Scheme, simulation
 
 
 class Constant:
@@ -198,3 +199,18 @@ def test_what_is_not_a_robot_state_or_method_is_refused_in_words() -> None:
 def test_an_unknown_scheme_is_answered_with_names() -> None:
     with pytest.raises(hs.SimulationError, match=r"Scheme\.GAP_LINEARISED, .*Scheme\.MOREAU_JEAN"):
         hs.TimeStepping(scheme="moreau-jean")  # type: ignore[arg-type]
+
+
+def test_computing_time_is_without_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a clock that goes on while something is compiled, by 100 s, and at no other time."""
+    now = [0.0]
+
+    def slow(*arguments: Any) -> Any:
+        now[0] += 100.0
+        return compiled_loop(*arguments)[0], 100.0
+
+    compiled_loop = simulation.compiled_loop
+    monkeypatch.setattr(simulation, "compiled_loop", slow)
+    monkeypatch.setattr(simulation, "clock_time", SimpleNamespace(perf_counter=lambda: now[0]))
+    timing = run(None).timing
+    assert (timing.compile_s, timing.wall_s) == (100.0, 0.0)
