@@ -61,7 +61,7 @@ def draw_comparison(
                     np.where(values > SMALLEST, values, np.nan),
                     color=COLORS[i % len(COLORS)],
                     linestyle=STROKES[i % len(STROKES)],
-                    linewidth=1.0 + 0.7 * (len(others) - 1 - i),  # none hides another
+                    linewidth=1.0 + 0.35 * (len(others) - 1 - i),  # none hides another
                     label=name,
                 )
             axes.set_ylabel(label)
