@@ -229,9 +229,10 @@ def _of_locked(locked: tuple[LockedJoint, ...], options: Options) -> Iterator[st
         return
     words = ", ".join(joint.name for joint in locked[:SHOWN])
     more = f" and {len(locked) - SHOWN} more" if len(locked) > SHOWN else ""
+    number = f"{len(locked)} joints are" if len(locked) > 1 else "1 joint is"
     if options.projected:
         yield (
-            f"projected onto the x–z plane; {len(locked)} joints are locked: {words}{more}. "
+            f"projected onto the x–z plane; {number} locked: {words}{more}. "
             "Robot.locked is their table. What the robot does out of this plane (roll, yaw, side "
             "steps) is left out."
         )
