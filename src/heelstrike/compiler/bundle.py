@@ -13,11 +13,12 @@ Kernels written into the class are its methods, in compiled code as in Python.
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -42,7 +43,7 @@ _BYTES = 8
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
 
 # Names of no members: where a bundle keeps what is its own, and an argument of `allocate`.
-_TAKEN = ("_cells", "_extents", "_table", "dtype")
+_TAKEN = ("_cells", "_extents", "_block", "_places", "_table", "dtype")
 
 _Some = TypeVar("_Some", bound="Bundle")
 
@@ -69,7 +70,7 @@ class Member:
     shape: tuple[str | int, ...] = ()
     address: bool = False
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[Any]:
         """Of its numbers: 64 bits."""
         return np.dtype(np.float64 if self.kind is float else np.int64)
@@ -207,13 +208,20 @@ class Bundle:
             setattr(cls, name, _cell_property(place, cls.declared[name]))
 
     def __init__(self, **members: Any) -> None:
+        for name, member in self.declared.items():
+            if name not in members and member.role != "cell":
+                raise TypeError(f"{type(self).__name__} is made with {name}, which is missing")
         own = self.__dict__
         own["_cells"] = np.zeros(self._cell_count, dtype=np.int64)
-        extents = own["_extents"] = {}
+        own["_extents"] = {}
+        self._take(members)
+
+    def _take(self, members: dict[str, Any]) -> None:
+        """Make members one's own, each of the shape that it is declared with."""
+        own = self.__dict__
+        extents = own["_extents"]
         for name, member in self.declared.items():
             if name not in members:
-                if member.role != "cell":
-                    raise TypeError(f"{type(self).__name__} is made with {name}, which is missing")
                 continue
             value = members.pop(name)
             if member.role == "cell":
@@ -267,18 +275,27 @@ class Bundle:
         for name, value in extents.items():
             if not isinstance(value, int | np.integer):
                 raise TypeError(f"{cls.__name__} has no {name}, and an extent is a whole number")
-        for name, member in cls.declared.items():
-            if name in members or member.role == "cell":
-                continue
-            if member.role == "part":
-                members[name] = member.kind.allocate(dtype=dtype, **extents)  # type: ignore[attr-defined]
-            elif member.role == "number":
-                members[name] = member.kind()
-            else:
-                size = tuple(_extent(each, extents) for each in member.shape)
-                floats = dtype if dtype is not None and member.kind is float else member.dtype
-                members[name] = np.zeros(size, dtype=floats)
-        return cls(**members)
+        kind: Any = cls
+        plan = _plan(kind, frozenset(members), tuple(extents.items()))
+        block = np.zeros(plan.size, dtype=np.int64)
+        bundle = cls.__new__(cls)
+        own = bundle.__dict__
+        own["_cells"] = np.ndarray(cls._cell_count, np.int64, block)
+        own["_extents"] = plan.extents.copy()
+        for name, shape, numbers, place in plan.arrays:
+            own[name] = np.ndarray(shape, numbers, block, place)
+        if dtype is None:
+            own["_block"], own["_places"] = block, plan.places
+        else:
+            own |= {
+                name: np.zeros(s, dtype) for name, s, kind, _ in plan.arrays if kind.kind == "f"
+            }
+        for name, number in plan.numbers:
+            own[name] = number
+        for name, part in plan.parts:
+            own[name] = part.allocate(dtype=dtype, **extents)
+        bundle._take(members)
+        return bundle
 
     @classmethod
     def compiled_type(cls) -> Any:
@@ -305,20 +322,24 @@ class Bundle:
 
     def _new_table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
         words: list[int] = []
-        cells = int(self.__dict__["_cells"].ctypes.data)
+        own = self.__dict__
+        block, places = own.get("_block"), own.get("_places", {})
+        cells = begin = _address(own["_cells"] if block is None else block)
         for name, member in self.declared.items():
             if member.role == "cell":
                 words.append(cells)
                 cells += _BYTES
                 continue
-            value = getattr(self, name)
-            if member.role == "array":
+            value = own[name]
+            if name in places:
+                words += [begin + places[name], *value.shape]
+            elif member.role == "array":
                 if not (value.flags.c_contiguous and value.dtype == member.dtype):
                     raise TypeError(
                         f"{type(self).__name__}.{name} is a C-contiguous array of "
                         f"{member.dtype}, not of {value.dtype}"
                     )
-                words += [value.__array_interface__["data"][0], *value.shape]
+                words += [_address(value), *value.shape]
             elif member.role == "part":
                 words.append(value.address)
             elif member.kind is float:
@@ -487,6 +508,45 @@ class Bundle:
 
 def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
     return kind(**members)
+
+
+def _address(array: np.ndarray[Any, Any]) -> int:
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+class _Plan(NamedTuple):
+    """How a bundle is allocated: one block for its cells and arrays, and where in it they lie."""
+
+    size: int
+    arrays: list[tuple[str, tuple[int, ...], np.dtype[Any], int]]
+    places: dict[str, int]
+    numbers: list[tuple[str, Any]]
+    parts: list[tuple[str, Any]]
+    extents: dict[str, int]
+
+
+@lru_cache(1024)
+def _plan(cls: Any, given: frozenset[str], sizes: tuple[tuple[str, int], ...]) -> _Plan:
+    """Plan the members of a bundle that are not given, for extents by name."""
+    known = dict(sizes)
+    members = [(name, each) for name, each in cls.declared.items() if name not in given]
+    extents: dict[str, int] = {}
+    size, arrays = cls._cell_count, []
+    for name, member in members:
+        if member.role == "array":
+            shape = tuple(_extent(each, known) for each in member.shape)
+            _check_shape(f"{cls.__name__}.{name}", member, shape, extents)
+            arrays.append((name, shape, member.dtype, _BYTES * size))
+            size += math.prod(shape)
+    return _Plan(
+        max(size, 1),
+        arrays,
+        {name: place for name, _, _, place in arrays},
+        [(name, member.kind()) for name, member in members if member.role == "number"],
+        [(name, member.kind) for name, member in members if member.role == "part"],
+        extents,
+    )
 
 
 @lru_cache
