@@ -181,7 +181,7 @@ def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Floats]
     """Return some pushes on a robot as arrays that :func:`pushes_of_numbers` makes them of."""
     places = [push.place(robot) for push in pushes]
     return {
-        "link": np.array([link for link, _ in places], dtype=np.float64),
+        "link": np.array([link for link, _ in places], dtype=np.int64),
         "point": np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
         "force": np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
         "window": np.array([(p.start, p.duration) for p in pushes], dtype=np.float64).reshape(
