@@ -131,7 +131,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import numpy as np
 import heelstrike as hs
-from sim_test_stepping import simulation
+from {module} import simulation
 kept = hs.load_snapshot(sys.argv[2])
 again = simulation(sys.argv[3], sys.argv[4], state=kept)
 for _ in range(50):
@@ -151,9 +151,13 @@ def test_a_snapshot_goes_on_in_another_process(
     for _ in range(17):
         never.step()
     file = never.snapshot().save(tmp_path / "kept.npz")
-    (tmp_path / "sim_test_stepping.py").write_text(Path(__file__).read_text(encoding="utf-8"))
+    # The same module, for a controller in Python is known by it and by its class.
+    copy = tmp_path.joinpath(*__name__.split(".")).with_suffix(".py")
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.write_text(Path(__file__).read_text(encoding="utf-8"))
     places = [str(tmp_path), str(Path(__file__).parents[1])]
     script = FRESH.replace("sys.path.insert(0, sys.argv[1])", f"sys.path[:0] = {places!r}")
+    script = script.format(module=__name__)
     subprocess.run(
         [sys.executable, "-c", script, "", str(file), method, controller, str(tmp_path / "end")],
         check=True,

@@ -266,30 +266,26 @@ class Bundle:
             If an extent is missing, or something is given that is neither a member nor a whole
             number. Extents that no array has are ignored: those of a robot fit every bundle.
         """
-        extents = {
-            name: value
-            for name, value in given.items()
-            if name not in cls.declared or cls.declared[name] == Member("number", int)
-        }
+        kind: Any = cls
         members = {name: value for name, value in given.items() if name in cls.declared}
+        extents = {name: value for name, value in given.items() if name not in members}
+        extents |= {name: members[name] for name in _whole_numbers(kind) if name in members}
         for name, value in extents.items():
             if not isinstance(value, int | np.integer):
                 raise TypeError(f"{cls.__name__} has no {name}, and an extent is a whole number")
-        kind: Any = cls
         plan = _plan(kind, frozenset(members), tuple(extents.items()))
         block = np.zeros(plan.size, dtype=np.int64)
         bundle = cls.__new__(cls)
         own = bundle.__dict__
-        own["_cells"] = np.ndarray(cls._cell_count, np.int64, block)
+        own["_cells"] = np.ndarray(cls._cell_count, np.int64, block, plan.cells)
         own["_extents"] = plan.extents.copy()
         for name, shape, numbers, place in plan.arrays:
             own[name] = np.ndarray(shape, numbers, block, place)
         if dtype is None:
             own["_block"], own["_places"] = block, plan.places
         else:
-            own |= {
-                name: np.zeros(s, dtype) for name, s, kind, _ in plan.arrays if kind.kind == "f"
-            }
+            floats = (each for each in plan.arrays if each[2].kind == "f")
+            own |= {name: np.zeros(shape, dtype) for name, shape, _, _ in floats}
         for name, number in plan.numbers:
             own[name] = number
         for name, part in plan.parts:
@@ -323,8 +319,12 @@ class Bundle:
     def _new_table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
         words: list[int] = []
         own = self.__dict__
-        block, places = own.get("_block"), own.get("_places", {})
-        cells = begin = _address(own["_cells"] if block is None else block)
+        block, places, begin = own.get("_block"), own.get("_places", {}), 0
+        if block is None:
+            cells = _address(own["_cells"])
+        else:
+            own["address"] = begin = _address(block)
+            cells = begin + places["_cells"]
         for name, member in self.declared.items():
             if member.role == "cell":
                 words.append(cells)
@@ -346,12 +346,16 @@ class Bundle:
                 words.append(int(np.float64(value).view(np.int64)))
             else:
                 words.append(value)
-        return np.array(words, dtype=np.int64)
+        if block is None:
+            return np.array(words, dtype=np.int64)
+        table: np.ndarray[Any, np.dtype[np.int64]] = block[: len(words)]
+        table[:] = words
+        return table
 
     @cached_property
     def address(self) -> int:
         """Where its table is."""
-        return int(self.table.ctypes.data)
+        return _address(self.table)
 
     def __reduce__(self) -> Any:
         """Members only: a copy has a table of its own."""
@@ -470,24 +474,37 @@ class Bundle:
         """Return a class of the same members whose numbers are cells, and so can be set."""
         return _settable(cls)  # type: ignore[arg-type]
 
-    def contents(self) -> dict[str, np.ndarray[Any, Any]]:
-        """Copy what is its own in its storage, by name: read-only arrays are shared with others."""
-        return {name: value.copy() for name, value in self.storage() if value.flags.writeable}
+    def contents(self, prefix: str = "") -> dict[str, np.ndarray[Any, Any]]:
+        """Copy what is its own in its storage, by name: read-only arrays are shared with others.
 
-    def fill(self, contents: Mapping[str, np.ndarray[Any, Any]]) -> None:
+        Parameters
+        ----------
+        prefix : str
+            What the names begin with.
+
+        Returns
+        -------
+        dict
+            Copies by name.
+        """
+        return {name: each.copy() for name, each in self.storage(prefix) if each.flags.writeable}
+
+    def fill(self, contents: Mapping[str, np.ndarray[Any, Any]], prefix: str = "") -> None:
         """Put contents of a bundle of the same kind and shapes in the place of its own.
 
         Parameters
         ----------
         contents : mapping of str to array
             What :meth:`contents` of that one returned.
+        prefix : str
+            What the names begin with.
 
         Raises
         ------
         ValueError
             If something is missing, or of another shape or kind; nothing has changed then.
         """
-        storage = {name: mine for name, mine in self.storage() if mine.flags.writeable}
+        storage = {name: mine for name, mine in self.storage(prefix) if mine.flags.writeable}
         for name, mine in storage.items():
             its = contents.get(name)
             if its is None or its.shape != mine.shape or its.dtype != mine.dtype:
@@ -516,9 +533,10 @@ def _address(array: np.ndarray[Any, Any]) -> int:
 
 
 class _Plan(NamedTuple):
-    """How a bundle is allocated: one block for its cells and arrays, and where in it they lie."""
+    """How a bundle is allocated: a block for table, cells and arrays, and where in it they lie."""
 
     size: int
+    cells: int
     arrays: list[tuple[str, tuple[int, ...], np.dtype[Any], int]]
     places: dict[str, int]
     numbers: list[tuple[str, Any]]
@@ -526,13 +544,21 @@ class _Plan(NamedTuple):
     extents: dict[str, int]
 
 
+@lru_cache
+def _whole_numbers(cls: Any) -> list[str]:
+    return [
+        name for name, each in cls.declared.items() if each.role == "number" and each.kind is int
+    ]
+
+
 @lru_cache(1024)
 def _plan(cls: Any, given: frozenset[str], sizes: tuple[tuple[str, int], ...]) -> _Plan:
     """Plan the members of a bundle that are not given, for extents by name."""
     known = dict(sizes)
     members = [(name, each) for name, each in cls.declared.items() if name not in given]
+    table = sum(1 + len(member.shape) for member in cls.declared.values())
     extents: dict[str, int] = {}
-    size, arrays = cls._cell_count, []
+    size, arrays = table + cls._cell_count, []
     for name, member in members:
         if member.role == "array":
             shape = tuple(_extent(each, known) for each in member.shape)
@@ -540,9 +566,10 @@ def _plan(cls: Any, given: frozenset[str], sizes: tuple[tuple[str, int], ...]) -
             arrays.append((name, shape, member.dtype, _BYTES * size))
             size += math.prod(shape)
     return _Plan(
-        max(size, 1),
+        size + 1,  # arrays of nothing lie before its end, too
+        _BYTES * table,
         arrays,
-        {name: place for name, _, _, place in arrays},
+        {name: place for name, _, _, place in arrays} | {"_cells": _BYTES * table},
         [(name, member.kind()) for name, member in members if member.role == "number"],
         [(name, member.kind) for name, member in members if member.role == "part"],
         extents,

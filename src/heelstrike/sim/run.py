@@ -408,15 +408,24 @@ def events_of(time: Floats, kind: Any, contact: Any, impulse: Floats) -> tuple[E
     )
 
 
+WORST = tuple(each.name for each in fields(Certificates))
+SOLVED = tuple(each.name for each in fields(SolverCount))[1:]
+COUNTS = ("steps", "saturations", *SOLVED)
+"""What is counted of every simulation, and what the worst is kept of."""
+
+
+def counted(memory: Memory) -> dict[str, Any]:
+    """Return counts and worst values of a simulation."""
+    tally, solver = memory.tally, memory.solver.tally
+    return {name: getattr(solver if name in SOLVED else tally, name) for name in COUNTS + WORST}
+
+
 def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
     """Return counts and worst values of a simulation, as fields of a run."""
-    worst = {each.name: getattr(memory.tally, each.name) for each in fields(Certificates)}
-    counts = {
-        each.name: getattr(memory.solver.tally, each.name) for each in fields(SolverCount)[1:]
-    }
+    found = counted(memory)
     return {
-        "certificates": Certificates(**worst),
-        "solver": SolverCount(solves_with, **counts),
-        "steps": memory.tally.steps,
-        "saturations": memory.tally.saturations,
+        "certificates": Certificates(*(found[name] for name in WORST)),
+        "solver": SolverCount(solves_with, *(found[name] for name in SOLVED)),
+        "steps": found["steps"],
+        "saturations": found["saturations"],
     }

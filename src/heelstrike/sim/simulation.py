@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import time as clock_time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NoReturn, Unpack
 
 import numpy as np
@@ -29,7 +31,7 @@ from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.record.record import Record, allocate_record
-from heelstrike.sim.run import Run, Timing, recorded, tallied
+from heelstrike.sim.run import Run, Timing, counted, recorded, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
@@ -96,7 +98,7 @@ class Simulation:
     message : str
         The same in a person's words.
     error : BaseException or None
-        What a controller or `progress` raised.
+        What a controller or `progress` raised, or that there was no memory.
 
     Raises
     ------
@@ -393,7 +395,7 @@ class Simulation:
     def _run_loop(self) -> Outcome | tuple[RunStatus, str]:
         """Run the loop until it pauses or ends, with what it needs from Python."""
         if not self._records:
-            self._new_record()
+            self._begin_record()
         while True:
             try:
                 code = self._loop(
@@ -407,7 +409,14 @@ class Simulation:
                 return Outcome.RAISED
             outcome = Outcome(code)
             if outcome is Outcome.RECORD_FULL:
-                self._new_record()
+                try:
+                    self._new_record()
+                except MemoryError as error:
+                    self.error = error
+                    return RunStatus.INTERRUPTED, (
+                        f"stopped at {self._now}: there is no memory left to record more; what was "
+                        "recorded until then is kept. A larger record_every takes less"
+                    )
             elif outcome is Outcome.FORK:
                 self._fork = self.snapshot() if self._can_be_kept else None
             elif outcome is Outcome.ASKING:
@@ -499,9 +508,17 @@ class Simulation:
             f"{self.robot.actuator_names[actuator]!r}"
         )
 
+    def _begin_record(self) -> None:
+        try:
+            self._new_record()
+        except MemoryError as error:
+            raise SimulationError(
+                "there is no memory left to record anything in; nothing was simulated"
+            ) from error
+
     def _new_record(self) -> None:
         if self._records and not self._keeps_rows:
-            self._count_events()
+            self._count_events(self._records[-1])
             return
         clock = self._clock
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
@@ -509,9 +526,8 @@ class Simulation:
         events = 256 + 2 * clock.event_margin
         self._records.append(allocate_record(self.robot, rows, events))
 
-    def _count_events(self) -> None:
-        """Count the events of the record and forget it."""
-        record = self._records[-1]
+    def _count_events(self, record: Record) -> None:
+        """Count the events of a record and forget it."""
         kinds = record.event_kind[: record.events]
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
         record.rows = record.events = 0
@@ -530,6 +546,7 @@ class Simulation:
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
         self._name = f"{type(controller).__name__}.torque"
+        self._decides = _place(type(controller) if law is None else law.function.python)
         self._shown = read_only(memory.contacts)
         memory.stiffness[:] = robot.model.stiffness
         memory.damping[:] = robot.model.damping
@@ -560,13 +577,14 @@ class Simulation:
             If a controller in Python does not take part: it needs methods ``snapshot()``, which
             returns an array of numbers, and ``restore(numbers)``.
         """
+        pushes = numbers_of_pushes(self.robot, self._pushes)
         arrays: dict[str, Any] = {
             "time": np.array(self.time),
-            **_named("ground", self._ground.numbers()),
-            **_named("push", numbers_of_pushes(self.robot, self._pushes)),
+            **{f"ground.{name}": values for name, values in self._ground.numbers().items()},
+            **{f"push.{name}": values for name, values in pushes.items()},
         }
         for name, bundle in self._bundles(self._memory):
-            arrays |= _named(name, bundle.contents())
+            arrays |= bundle.contents(name)
         if self._python is not None:
             arrays["controller"] = np.array(_partaking(self._python, self._name).snapshot())
         return Snapshot(arrays, self._identity())
@@ -595,11 +613,8 @@ class Simulation:
         self._recorded_until = snapshot.time
         self._records.clear()
         self._fork = None
-        self.status, self.message, self.error = (
-            RunStatus.COMPLETED,
-            f"restored at {self._now}",
-            None,
-        )
+        self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
+        self.error = None
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
@@ -612,7 +627,7 @@ class Simulation:
             bundles = self._bundles(memory)
             before = [(bundle, bundle.contents()) for _, bundle in bundles]
             for name, bundle in bundles:
-                bundle.fill(snapshot.part(name))
+                bundle.fill(snapshot.arrays, name)
             if self._python is not None:
                 _partaking(self._python, self._name).restore(snapshot.arrays["controller"].copy())
         except BaseException as error:
@@ -624,16 +639,16 @@ class Simulation:
         self._memory, self._pushes, self._ground = memory, pushes, ground
 
     def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
-        """Name the bundles that change as a simulation goes on."""
+        """Name the bundles that change as a simulation goes on, with the dot of their arrays."""
         return (
-            ("clock", self._clock),
-            ("memory", memory),
-            ("work", self._work),
-            ("control", self._control),
+            ("clock.", self._clock),
+            ("memory.", memory),
+            ("work.", self._work),
+            ("control.", self._control),
         )
 
     def _identity(self) -> dict[str, str]:
-        return identity_of(self._setting, self.method, self._name)
+        return identity_of(self._setting, self.method, self._decides)
 
     @property
     def record(self) -> Run:
@@ -679,7 +694,8 @@ class Simulation:
         if not self._can_be_kept:
             return None
         final = self.snapshot() if self._fork is None else self._fork
-        return Snapshot(final.arrays | {"time": np.array(self.time)}, final.identity)
+        final.arrays["time"] = np.array(self.time)
+        return final
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
@@ -759,6 +775,8 @@ class Ending:
         Where the robot was, and when.
     events : (kinds,) int
         Events of each kind.
+    counts : dict
+        What was counted, and the worst values, by name.
     run : Run or None
         The record, if rows were kept.
     record : Record or None
@@ -770,6 +788,7 @@ class Ending:
     state: State
     time: float
     events: Integers
+    counts: dict[str, Any]
     run: Run | None
     record: Record | None
 
@@ -789,22 +808,20 @@ def simulation_to_the_end(
     simulation = Simulation.__new__(Simulation)
     simulation._begin(setting, method, memory, record, keep_rows=keep_rows)
     simulation._control_with(law)
-    until = method.instant(simulation._clock, duration)
-    simulation._advance(until, NEVER, stopped=stopped)
+    simulation._advance(method.instant(simulation._clock, duration), NEVER, stopped=stopped)
     final = simulation._final() if keep_rows else None
     status, message = simulation._decide_last()
     last = simulation._records[-1]
-    state = simulation.state
-    row = last.rows - 1
+    state, row = simulation.state, last.rows - 1
     if row >= 0 and last.time[row] == simulation.time:  # event-driven rows lie on the constraints
-        state = State(last.q[row], last.v[row])
-    if not keep_rows:
-        simulation._count_events()
-        events = simulation._event_counts
-        return Ending(status, message, state, simulation.time, events, None, last)
-    run = simulation._run(status, message, final)
-    events = np.bincount([event.kind for event in run.events], minlength=len(EventKind))
-    return Ending(status, message, state, simulation.time, events, run, None)
+        state = State(last.position[row], last.velocity[row])
+    run = simulation._run(status, message, final) if keep_rows else None
+    for each in simulation._records:
+        simulation._count_events(each)
+    return Ending(
+        status, message, state, simulation.time, simulation._event_counts,
+        counted(memory), run, None if keep_rows else last,
+    )  # fmt: skip
 
 
 def check_duration(duration: float) -> None:
@@ -836,8 +853,12 @@ def _ground_of(snapshot: Snapshot) -> Ground:
         raise SimulationError(f"the snapshot is damaged: {error}") from error
 
 
-def _named(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
-    return {f"{prefix}.{name}": values for name, values in arrays.items()}
+def _place(thing: Any) -> str:
+    """Say where a class or function is defined: the same in any process."""
+    module = thing.__module__
+    if module == "__main__":  # a script, which others may import
+        module = Path(getattr(sys.modules[module], "__file__", None) or module).stem
+    return f"{module}.{thing.__qualname__}"
 
 
 def _partaking(controller: Any, name: str) -> Partaking:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,7 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.files.settings import settings
 from heelstrike.sim.files.variables import Variable
 from heelstrike.sim.push import numbers_of_pushes
-from heelstrike.sim.run import EVENT_MEMBERS, QUANTITIES, Certificates, Run, SolverCount
+from heelstrike.sim.run import EVENT_MEMBERS, QUANTITIES, SOLVED, WORST, Run
 
 if TYPE_CHECKING:
     import xarray
@@ -24,10 +23,10 @@ FORMAT = 1
 ROBOT_GROUP = "robot"
 
 DIMENSIONS = {
-    "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact", "axes": "axis",
-    "components": "component", "conditions": "condition",
+    "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
+    "axes": "axis", "components": "component", "conditions": "condition",
 }  # fmt: skip
-"""What datasets call the extents of a row. In the plane positions and velocities share one."""
+"""What datasets call the extents of a row. In the plane links and coordinates share one."""
 
 ROWS = {
     name: Variable(
@@ -133,11 +132,9 @@ def _attributes(run: Run) -> dict[str, Any]:
         "impulses_in_events": int(run.method.impulses_in_events),
         "ground_slope": float(run.ground.slope),
         "ground_has_profile": int(run.ground.profile is not None),
-        **{
-            f"worst_{each.name}": getattr(run.certificates, each.name)
-            for each in fields(Certificates)
-        },
-        **{f"solver_{each.name}": getattr(run.solver, each.name) for each in fields(SolverCount)},
+        **{f"worst_{name}": getattr(run.certificates, name) for name in WORST},
+        "solver_name": run.solver.name,
+        **{f"solver_{name}": getattr(run.solver, name) for name in SOLVED},
         "steps": run.steps,
         "saturations": run.saturations,
         "compile_s": run.timing.compile_s,

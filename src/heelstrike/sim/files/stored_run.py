@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +26,16 @@ from heelstrike.sim.files.robot_dataset import stored_robot
 from heelstrike.sim.files.settings import stored_method
 from heelstrike.sim.files.variables import DamageError, Stored
 from heelstrike.sim.push import Push, pushes_of_numbers
-from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing, events_of
+from heelstrike.sim.run import (
+    SOLVED,
+    WORST,
+    Certificates,
+    Event,
+    Run,
+    SolverCount,
+    Timing,
+    events_of,
+)
 
 _ENDED_WELL = (RunStatus.COMPLETED, RunStatus.FELL, RunStatus.INTERRUPTED)
 """Ends of runs of which every number is finite."""
@@ -117,12 +125,10 @@ def _run(stored: Stored, robot: Robot, classes: Sequence[type]) -> Run:
         time=time,
         **stored.arrays(rows, sizes),
         events=_events(stored, robot, sizes),
-        certificates=Certificates(
-            *(stored.number(f"worst_{each.name}") for each in fields(Certificates))
-        ),
+        certificates=Certificates(*(stored.number(f"worst_{name}") for name in WORST)),
         solver=SolverCount(
             stored.text("solver_name"),
-            *(stored.count(f"solver_{each.name}") for each in fields(SolverCount)[1:]),
+            *(stored.count(f"solver_{name}") for name in SOLVED),
         ),
         steps=stored.count("steps"),
         saturations=stored.count("saturations"),
