@@ -23,8 +23,8 @@ PACKAGE = Path(hs.__file__).parent
 ROOT = PACKAGE.parents[1]
 
 DECLARATION = """
-    link_angle: Floats = field(
-        metadata=quantity("nl", of="tree.angle", unit="rad", label="angles of links", later=True)
+    link_angle: Floats = recorded(
+        "nl", of="tree.angle", unit="rad", label="angles of links", later=True
     )
 """
 

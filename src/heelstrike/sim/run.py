@@ -5,6 +5,8 @@ in the memory of a simulation it is, its unit and what it is called. The arrays 
 the dataset, the files and the figures follow.
 """
 
+# ruff: noqa: RUF009 - a call declares a field
+
 from __future__ import annotations
 
 import os
@@ -59,9 +61,9 @@ class Quantity:
     later: bool = False
 
 
-def quantity(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
+def recorded(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
     """Declare a recorded quantity; see :class:`Quantity`."""
-    return {"quantity": Quantity(shape, of, unit, label, later)}
+    return field(metadata={"quantity": Quantity(shape, of, unit, label, later)})
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,7 @@ class Timing:
     wall_s: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
     """Record of a simulation.
 
@@ -208,60 +210,39 @@ class Run:
     status: RunStatus
     message: str
     time: Floats
-    position: Floats = field(
-        metadata=quantity("nq", of="q", unit="m or rad", label="generalised positions")
+    position: Floats = recorded("nq", of="q", unit="m or rad", label="generalised positions")
+    velocity: Floats = recorded("nv", of="v", unit="m/s or rad/s", label="generalised velocities")
+    torque: Floats = recorded(
+        "nu", of="torque", unit="N m", label="joint torques within their limits"
     )
-    velocity: Floats = field(
-        metadata=quantity("nv", of="v", unit="m/s or rad/s", label="generalised velocities")
+    stop_torque: Floats = recorded(
+        "nv", of="stop_torque", unit="N m or N", label="force of the joint stops on the robot"
     )
-    torque: Floats = field(
-        metadata=quantity("nu", of="torque", unit="N m", label="joint torques within their limits")
+    friction_torque: Floats = recorded(
+        "nv", of="friction_torque", unit="N m or N", later=True,
+        label="dry friction of the joints on the robot",
+    )  # fmt: skip
+    contact_point: Floats = recorded(
+        "nc", "axes", of="contacts.position", unit="m",
+        label="world position of the contact points",
+    )  # fmt: skip
+    contact_normal: Floats = recorded(
+        "nc", "axes", of="contacts.normal", unit="1", label="ground normal under the contact points"
     )
-    stop_torque: Floats = field(
-        metadata=quantity(
-            "nv", of="stop_torque", unit="N m or N", label="force of the joint stops on the robot"
-        )
+    gap: Floats = recorded(
+        "nc", of="contacts.gap", unit="m", label="distance of the contact points to the ground"
     )
-    friction_torque: Floats = field(
-        metadata=quantity(
-            "nv", of="friction_torque", unit="N m or N", later=True,
-            label="dry friction of the joints on the robot",
-        )
+    contact_force: Floats = recorded(
+        "nc", "components", of="contacts.force", unit="N",
+        label="force on the robot at the contact points, mean over the step that follows",
     )  # fmt: skip
-    contact_point: Floats = field(
-        metadata=quantity(
-            "nc", "axes", of="contacts.position", unit="m",
-            label="world position of the contact points",
-        )
+    slip_velocity: Floats = recorded(
+        "nc", of="slip", unit="m/s",
+        label="tangential velocity of the contact points at the end of the step",
     )  # fmt: skip
-    contact_normal: Floats = field(
-        metadata=quantity(
-            "nc", "axes", of="contacts.normal", unit="1",
-            label="ground normal under the contact points",
-        )
-    )  # fmt: skip
-    gap: Floats = field(
-        metadata=quantity(
-            "nc", of="contacts.gap", unit="m", label="distance of the contact points to the ground"
-        )
-    )
-    contact_force: Floats = field(
-        metadata=quantity(
-            "nc", "components", of="contacts.force", unit="N",
-            label="force on the robot at the contact points, mean over the step that follows",
-        )
-    )  # fmt: skip
-    slip_velocity: Floats = field(
-        metadata=quantity(
-            "nc", of="slip", unit="m/s",
-            label="tangential velocity of the contact points at the end of the step",
-        )
-    )  # fmt: skip
-    residual: Floats = field(
-        metadata=quantity(
-            "conditions", of="answer.residual", unit="1",
-            label="relative residuals of the contact problem",
-        )
+    residual: Floats = recorded(
+        "conditions", of="answer.residual", unit="1",
+        label="relative residuals of the contact problem",
     )  # fmt: skip
     events: tuple[Event, ...]
     certificates: Certificates
@@ -382,7 +363,7 @@ QUANTITIES: dict[str, Quantity] = {
 """What is recorded, by its name, in the order of rows."""
 
 
-def recorded(records: Sequence[Record], since: float) -> dict[str, Any]:
+def joined(records: Sequence[Record], since: float) -> dict[str, Any]:
     """Return the rows and events of consecutive records, from a time on, as fields of a run."""
 
     def join(member: str, used: str) -> Any:

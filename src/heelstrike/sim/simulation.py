@@ -31,7 +31,7 @@ from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.record.record import Record, allocate_record
-from heelstrike.sim.run import Run, Timing, counted, recorded, tallied
+from heelstrike.sim.run import Run, Timing, counted, joined, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
@@ -705,7 +705,7 @@ class Simulation:
             method=self.method,
             status=status,
             message=message,
-            **recorded(self._records, self._recorded_until),
+            **joined(self._records, self._recorded_until),
             **tallied(self._memory, self.method.solves_with),
             timing=self._timing,
             error=self.error,

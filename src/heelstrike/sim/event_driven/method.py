@@ -236,6 +236,21 @@ class EventDriven(Method):
 
 
 @kernel
+def note_state(record: Record, row: int, state: Floats) -> None:
+    """Write a state to a row, where no force acts as yet."""
+    nv = record.velocity.shape[1]
+    for i in range(nv):
+        record.position[row, i] = state[i]
+        record.velocity[row, i] = state[nv + i]
+        record.stop_torque[row, i] = 0.0
+        record.friction_torque[row, i] = 0.0
+    for contact in range(record.gap.shape[1]):
+        record.contact_force[row, contact, 0] = 0.0
+        record.contact_force[row, contact, 1] = 0.0
+        record.slip_velocity[row, contact] = 0.0
+
+
+@kernel
 def write_row(
     controller: Any,
     control: Control,
@@ -264,20 +279,13 @@ def write_row(
         note_residual(memory.answer.residual, memory.tally)
     row = record.rows
     note_row(record, time, memory)
-    points, nv = contacts.gap.shape[0], memory.v.shape[0]
-    for i in range(nv):
-        record.position[row, i] = phase.trial[i]
-        record.velocity[row, i] = phase.trial[nv + i]
-        record.stop_torque[row, i] = 0.0
-        record.friction_torque[row, i] = 0.0
+    note_state(record, row, phase.trial)
+    points = contacts.gap.shape[0]
     first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     dry_force(
         phase.dry_joint, phase.slide[first:], model.dry_friction, record.friction_torque[row]
     )  # fmt: skip
     for contact in range(points):
-        record.contact_force[row, contact, 0] = 0.0
-        record.contact_force[row, contact, 1] = 0.0
-        record.slip_velocity[row, contact] = 0.0
         if phase.passing[contact] == 0:
             memory.tally.penetration = max(memory.tally.penetration, -contacts.gap[contact])
     for place in range(count):
