@@ -482,7 +482,7 @@ class _Crew:
 
     def _take_runs(self) -> None:
         """Work of one thread, which allocates memory once for all of its runs, if they allow it."""
-        memory = fresh = robot = record = None
+        memory = fresh = robot = None
         while not self._stop.is_set():
             with self._lock:
                 index = self._next
@@ -500,15 +500,13 @@ class _Crew:
                 robot = setting.robot
                 memory = allocate_memory(robot, setting.pushes)
                 fresh = deepcopy(memory)
-                record = None
             else:
                 memory.become(fresh)
                 memory.pushes.become(pushes_on(robot, setting.pushes))
-            ending = simulation_to_the_end(
+            self._endings[index] = simulation_to_the_end(
                 setting, self._method, law, duration,
-                memory=memory, record=record, keep_rows=self._recorded, stopped=self._stop.is_set,
+                memory=memory, keep_rows=self._recorded, stopped=self._stop.is_set,
             )  # fmt: skip
-            self._endings[index], record = ending, ending.record
             with self._lock:
                 self._done += 1
 
@@ -544,4 +542,4 @@ def _not_begun(state: State) -> Ending:
     counts = dict.fromkeys(COUNTS, 0) | dict.fromkeys(WORST, 0.0)
     events = np.zeros(len(EventKind), dtype=np.int64)
     message = "interrupted before it began"
-    return Ending(RunStatus.INTERRUPTED, message, state, 0.0, events, counts, None, None)
+    return Ending(RunStatus.INTERRUPTED, message, state, 0.0, events, counts, None)

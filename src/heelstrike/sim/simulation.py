@@ -164,9 +164,8 @@ class Simulation:
         )
 
     def _begin(
-        self, setting: Setting, method: Method, memory: Memory | None = None,
-        record: Record | None = None, *, keep_rows: bool = True,
-    ) -> None:  # fmt: skip
+        self, setting: Setting, method: Method, memory: Memory | None = None, keep_rows: bool = True
+    ) -> None:
         """Allocate everything, compile, and check what only the method can.
 
         Parameters
@@ -175,8 +174,6 @@ class Simulation:
             What to simulate, and how.
         memory : Memory, optional
             Memory to use, as `allocate_memory` makes it for this robot and these pushes.
-        record : Record, optional
-            Record of an earlier simulation of this robot, to be used again.
         keep_rows : bool
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
@@ -198,7 +195,7 @@ class Simulation:
         self._loop, compile_s = compiled_loop(method.kernels, method.work)
         self._timing = Timing(compile_s, 0.0)
         self._fork: Snapshot | None = None
-        self._records: list[Record] = [] if record is None else [record]
+        self._records: list[Record] = []
         self._keeps_rows = keep_rows
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
@@ -779,8 +776,6 @@ class Ending:
         What was counted, and the worst values, by name.
     run : Run or None
         The record, if rows were kept.
-    record : Record or None
-        What the next simulation may record in, if they were not.
     """
 
     status: RunStatus
@@ -790,7 +785,6 @@ class Ending:
     events: Integers
     counts: dict[str, Any]
     run: Run | None
-    record: Record | None
 
 
 def simulation_to_the_end(
@@ -800,13 +794,12 @@ def simulation_to_the_end(
     duration: float,
     *,
     memory: Memory,
-    record: Record | None,
     keep_rows: bool,
     stopped: Callable[[], bool],
 ) -> Ending:
     """Simulate as :func:`simulate` does, in memory that is given, until `stopped` says so."""
     simulation = Simulation.__new__(Simulation)
-    simulation._begin(setting, method, memory, record, keep_rows=keep_rows)
+    simulation._begin(setting, method, memory, keep_rows)
     simulation._control_with(law)
     simulation._advance(method.instant(simulation._clock, duration), NEVER, stopped=stopped)
     final = simulation._final() if keep_rows else None
@@ -820,7 +813,7 @@ def simulation_to_the_end(
         simulation._count_events(each)
     return Ending(
         status, message, state, simulation.time, simulation._event_counts,
-        counted(memory), run, None if keep_rows else last,
+        counted(memory), run,
     )  # fmt: skip
 
 
