@@ -392,35 +392,29 @@ class Simulation:
     def _run_loop(self) -> Outcome | tuple[RunStatus, str]:
         """Run the loop until it pauses or ends, with what it needs from Python."""
         if not self._records:
-            self._begin_record()
+            self._new_record()
         while True:
             try:
-                code = self._loop(
-                    self._kernel, self._control, self.robot.model, self._ground.model(),
-                    self._memory, self._work, self._records[-1], self._clock,
+                outcome = Outcome(
+                    self._loop(
+                        self._kernel, self._control, self.robot.model, self._ground.model(),
+                        self._memory, self._work, self._records[-1], self._clock,
+                    )
                 )  # fmt: skip
+                wrong = self._ask() if outcome is Outcome.ASKING else ""
             except KeyboardInterrupt:
                 raise
-            except BaseException as error:  # of a compiled controller: loops raise nothing
+            except BaseException as error:  # of the controller: loops raise nothing
                 self.error = error
                 return Outcome.RAISED
-            outcome = Outcome(code)
+            if wrong:
+                return RunStatus.CONTROLLER_FAILED, wrong
             if outcome is Outcome.RECORD_FULL:
-                try:
-                    self._new_record()
-                except MemoryError as error:
-                    self.error = error
-                    return RunStatus.INTERRUPTED, (
-                        f"stopped at {self._now}: there is no memory left to record more; what was "
-                        "recorded until then is kept. A larger record_every takes less"
-                    )
+                if full := self._new_record():
+                    return RunStatus.INTERRUPTED, full
             elif outcome is Outcome.FORK:
                 self._fork = self.snapshot() if self._can_be_kept else None
-            elif outcome is Outcome.ASKING:
-                ending = self._ask()
-                if ending is not None:
-                    return ending
-            else:
+            elif outcome is not Outcome.ASKING:
                 return outcome
 
     def _report(self, progress: Callable[[float], None] | None) -> None:
@@ -435,33 +429,20 @@ class Simulation:
             self.error = error if self.error is None else self.error
             self._complaint = f"progress raised {_raised(error)}"
 
-    def _ask(self) -> tuple[RunStatus, str] | None:
-        """Ask a controller in Python for torques; return how it ended the run, if it did."""
-        controller = self._python
-        try:
-            torque = np.asarray(
-                controller.torque(self.time, self.state, self._shown),
-                dtype=np.float64,
-            )
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
-            self.error = error
-            if isinstance(controller, AskedLaw) and isinstance(error, ControllerError):
-                return RunStatus.CONTROLLER_FAILED, f"{error} (at {self._now})"
-            return RunStatus.CONTROLLER_FAILED, (
-                f"{self._name} raised {_raised(error)} at {self._now} (the exception is in "
-                "run.error)"
-            )
+    def _ask(self) -> str:
+        """Ask a controller in Python for torques; return what is wrong with them."""
+        torque = np.asarray(
+            self._python.torque(self.time, self.state, self._shown), dtype=np.float64
+        )
         if torque.shape != (self.robot.nu,):
-            return RunStatus.CONTROLLER_FAILED, (
+            return (
                 f"{self._name} returned shape {torque.shape} at {self._now}; robot "
                 f"{self.robot.name!r} needs ({self.robot.nu},): "
                 f"{', '.join(self.robot.actuator_names)}"
             )
         self._memory.torque[:] = torque
         self._clock.answered = 1
-        return None
+        return ""
 
     @property
     def _now(self) -> str:
@@ -476,10 +457,13 @@ class Simulation:
             )
         if outcome is Outcome.RAISED:
             assert self.error is not None
-            more = "; simulate(..., checked=True) names the array and the index"
+            if isinstance(self._python, AskedLaw) and isinstance(self.error, ControllerError):
+                return RunStatus.CONTROLLER_FAILED, f"{self.error} (at {self._now})"
+            beyond = isinstance(self.error, IndexError) and not self._python
+            more = "; simulate(..., checked=True) names the array and the index" if beyond else ""
             return RunStatus.CONTROLLER_FAILED, (
                 f"{self._name} raised {_raised(self.error)} at {self._now} (the exception is in "
-                f"run.error){more if isinstance(self.error, IndexError) else ''}"
+                f"run.error){more}"
             )
         tally = self._memory.tally
         if outcome is Outcome.DIVERGED and tally.bad_trial > 0:
@@ -505,23 +489,26 @@ class Simulation:
             f"{self.robot.actuator_names[actuator]!r}"
         )
 
-    def _begin_record(self) -> None:
-        try:
-            self._new_record()
-        except MemoryError as error:
-            raise SimulationError(
-                "there is no memory left to record anything in; nothing was simulated"
-            ) from error
-
-    def _new_record(self) -> None:
+    def _new_record(self) -> str:
+        """Make room for more rows and events; say what is wrong where there is none."""
         if self._records and not self._keeps_rows:
             self._count_events(self._records[-1])
-            return
+            return ""
         clock = self._clock
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
         rows = min(CHUNK, rows + clock.row_margin)
-        events = 256 + 2 * clock.event_margin
-        self._records.append(allocate_record(self.robot, rows, events))
+        try:
+            record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin)
+        except MemoryError as error:
+            if not self._records:
+                raise SimulationError("there is no memory left to record anything in") from error
+            self.error = error
+            return (
+                f"stopped at {self._now}: there is no memory left to record more; what was "
+                "recorded until then is kept. A larger record_every takes less"
+            )
+        self._records.append(record)
+        return ""
 
     def _count_events(self, record: Record) -> None:
         """Count the events of a record and forget it."""
