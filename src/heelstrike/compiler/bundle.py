@@ -531,7 +531,7 @@ def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
 _NOTHING = ctypes.c_char * 0
 
 
-def _address(array: np.ndarray[Any, Any]) -> int:
+def _address(array: Any) -> int:
     if array.flags.writeable:  # four times as quick
         return ctypes.addressof(_NOTHING.from_buffer(array))
     address: int = array.__array_interface__["data"][0]
