@@ -113,7 +113,6 @@ def _gait(entries: Entries) -> Gait:
         for key, (name, shape) in _NUMBERS.items()
     }
     values |= {name: entries.text(key) for key, name in _TEXTS.items()}
-    size = len(joints) + 3
     if entries.data["version"] == 1:
         phases = [_only_phase(entries, nu)]
     else:

@@ -19,7 +19,8 @@ LARGEST_NUMBER = 1e10
 """Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
 
 UNLIKELY = "numbers that are unlikely"
-SHOWN = 6  # how many of them a message lists before it counts the rest
+DIFFERENT = "left and right differ"
+SHOWN = 6  # how many findings a message lists before it counts the rest
 
 
 def assembled(
@@ -61,20 +62,29 @@ def assembled(
     _refuse_impossible_numbers(model, source)
     origin = link_origins(model)
     _refuse_joints_without_inertia(model, origin, joint_names, source)
-    _warn_of_unlikely_numbers(model, origin, joint_names, link_names, source)
-    points = list(points)
-    center: Floats = model.mass @ (origin + model.center_of_mass) / model.mass.sum()
-    feet = find_feet(model.parent, link_names, points, origin, center)
+    unlikely = [one.message for one in unlikely_numbers(model, origin, joint_names, link_names)]
+    if unlikely:
+        more = f" And {len(unlikely) - SHOWN} more." if len(unlikely) > SHOWN else ""
+        warn(f"{source}: {UNLIKELY}: {' '.join(unlikely[:SHOWN])}{more}")
+    feet = find_feet(model, link_names, origin)
     friction = tuple(point.friction for point in points)
+    mirror, differences = find_mirror(model, joint_names, link_names, feet, friction)
+    if differences:
+        more = f"; and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
+        warn(
+            f"{source}: {DIFFERENT}, so the robot has no mirror image: "
+            f"{'; '.join(differences[:SHOWN])}{more}. Gaits whose steps mirror each other need two "
+            "equal legs."
+        )
     return Robot(
         name=name,
         model=model,
         joint_names=joint_names,
         link_names=link_names,
         actuator_names=actuator_names,
-        contact_names=name_contacts(link_names, points, feet),
+        contact_names=name_contacts(model, link_names, feet),
         feet=feet,
-        mirror=find_mirror(model, joint_names, link_names, feet, friction, source),
+        mirror=mirror,
         floating=_is_floating(model, source),
         contact_friction=friction,
         source=source,
@@ -100,20 +110,6 @@ def _refuse_impossible_numbers(model: Model, source: str) -> None:
                 f"{source}: the {label(field)} of the robot is not a number below "
                 f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
             )
-
-
-def _warn_of_unlikely_numbers(
-    model: Model,
-    origin: Floats,
-    joint_names: tuple[str, ...],
-    link_names: tuple[str, ...],
-    source: str,
-) -> None:
-    """Warn of numbers in units that are not meant, all in one message."""
-    found = [words for _, words in unlikely_numbers(model, origin, joint_names, link_names)]
-    if found:
-        more = f" And {len(found) - SHOWN} more." if len(found) > SHOWN else ""
-        warn(f"{source}: {UNLIKELY}: {' '.join(found[:SHOWN])}{more}")
 
 
 def _refuse_joints_without_inertia(
