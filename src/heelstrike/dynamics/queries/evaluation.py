@@ -94,11 +94,10 @@ class Evaluation:
 
     def contact_centers(self, contacts: Any) -> list[tuple[int, int, Floats]]:
         """Return index, link and centre of contact points, of all if None are named."""
-        every = range(self.robot.nc) if contacts is None else contacts
         model = self.model
         return [
             (i, *self.point(int(model.contact_link[i]), model.contact_position[i]))
-            for i in contact_indices(self.robot, every)
+            for i in contact_indices(self.robot, contacts)
         ]
 
 
@@ -147,13 +146,14 @@ def link_index(robot: Robot, link: int | str) -> int:
 
 
 def contact_indices(robot: Robot, contacts: Any) -> tuple[int, ...]:
-    """Return indices of contact points given by index or name, in the order given.
+    """Return indices of contact points given by index or name, in the order given; all of None.
 
     Raises
     ------
     RobotError
         If the robot has no such contact point.
     """
-    given: Any = (contacts,) if isinstance(contacts, str | int | np.integer) else contacts
     names = robot.contact_names
+    given: Any = range(robot.nc) if contacts is None else contacts
+    given = (given,) if isinstance(given, str | int | np.integer) else given
     return tuple(dict.fromkeys(index_of(robot, "contact point", names, one) for one in given))
