@@ -197,8 +197,7 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
     """Gait with the given unknowns, its joints in the order of the actuators."""
     transcription, request = program.transcription, program.request
     robot, stance = request.robot, request.stance
-    mirror, joint = robot.mirror, robot.model.actuator_joint
-    assert mirror is not None
+    joint = robot.model.actuator_joint
     pieces = program.pieces(unknowns)
     end, _, start_velocity, duration, length = touchdown = program.at_touchdown(unknowns)
     impulse = np.zeros(3)
@@ -211,7 +210,7 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
         pieces=pieces[:, :, joint - stance.held],
         pitch_pieces=None if stance.flat else pieces[:, :, 0],
     )
-    legs = mirror.among(joint)
+    legs = request.mirror.among(joint)
     return Gait(
         robot=robot.name,
         fingerprint=fingerprint(robot),

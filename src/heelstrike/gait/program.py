@@ -202,7 +202,7 @@ class Program:
         n = self.transcription.size
         q, v, a, duration, length = (unknowns[k:end] for k, end in pairwise(self._places))
         q, v, a = (casadi.reshape(part, n, -1) for part in (q, v, a))
-        start, _ = self.transcription.mirror(q[:, -1], v[:, 0])
+        start = self.transcription.mirror.position(q[:, -1])
         return casadi.horzcat(start, q), v, a, duration, length
 
     def along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:

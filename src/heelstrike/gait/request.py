@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.sole import reach, sole, standing_height
+from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -54,6 +55,8 @@ class Request:
 
     Attributes
     ----------
+    mirror : Mirror
+        The robot's exchange of left and right.
     stance, swing : Sole
         The feet in the first step.
     height : float
@@ -91,8 +94,8 @@ class Request:
 
     def __post_init__(self) -> None:
         robot = self.robot
-        _check_robot(robot)
-        self.lower, self.upper = ranges_kept(robot, self.joint_ranges)
+        self.mirror = _mirror_of(robot)
+        self.lower, self.upper = ranges_kept(robot, self.mirror, self.joint_ranges)
         self.stance, self.swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
         self.height = standing_height(robot, self.stance)
         self.reach = reach(robot, (self.stance, self.swing), self.lower, self.upper)
@@ -211,7 +214,8 @@ def _profiles(profile: ClearanceProfile | str | None, impact: bool) -> tuple[Cle
         raise GaitError(f"clearance_profile must be one of {names}, got {profile!r}") from None
 
 
-def _check_robot(robot: Robot) -> None:
+def _mirror_of(robot: Robot) -> Mirror:
+    """Return the mirror image of a robot that can walk, or refuse another."""
     name = f"robot {robot.name!r}"
     if not robot.floating:
         raise GaitError(
@@ -244,9 +248,10 @@ def _check_robot(robot: Robot) -> None:
             f"{name}: gravity is {robot.model.gravity} m/s²; a gait on level ground needs it "
             "to point down."
         )
+    return mirror
 
 
-def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats]:
+def ranges_kept(robot: Robot, mirror: Mirror, asked: JointRanges | None) -> tuple[Floats, Floats]:
     """Lowest and highest position of every coordinate, (nv,) each: the robot's ranges and `asked`.
 
     Every step of a gait mirrors the one before, so that what is asked of a joint holds for its
@@ -255,7 +260,9 @@ def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats
     Parameters
     ----------
     robot : Robot
-        A robot with a mirror map.
+        The robot.
+    mirror : Mirror
+        Its exchange of left and right.
     asked : mapping of str to (float, float), optional
         Ranges by the names of joints (rad, m for a slide); an infinite end leaves the robot's own.
 
@@ -264,8 +271,7 @@ def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats
     GaitError
         If there is no joint of that name, or if a range is none or has no part in the robot's.
     """
-    model, mirror = robot.model, robot.mirror
-    assert mirror is not None
+    model = robot.model
     lower, upper = model.lower, model.upper
     joints = {name: j for j, name in enumerate(robot.joint_names) if j > 2}
     try:

@@ -122,8 +122,8 @@ class Transcription:
     motion : casadi.Function
         (q, v, a) to the ground's wrench (x, z and, on a flat foot, moment), the torques and the
         heights of the swing foot's contact points.
-    mirror : casadi.Function
-        (q, v) to their mirror images.
+    mirror : Mirror
+        Exchange of left and right among the free coordinates.
     start : casadi.Function
         (q(T), v(0)) to the whole position and velocity at the beginning of the step, the stance
         foot at the origin.
@@ -139,19 +139,12 @@ class Transcription:
         self.robot = request.robot
         self.held = request.stance.held
         self.size = self.robot.nv - self.held
+        self.mirror = request.mirror.among(range(self.held, self.robot.nv))
         self._build_path()
         self._build_touchdown()
 
     def _symbol(self, name: str) -> casadi.SX:
         return casadi.SX.sym(name, self.size)
-
-    def _mirrored(self, q: Symbols, v: Symbols) -> tuple[Symbols, Symbols]:
-        """Mirror images of positions and velocities."""
-        mirror, reference = self.robot.mirror, self.robot.model.reference
-        assert mirror is not None
-        whole_q, whole_v = (np.array([*reference[: self.held], *part]) for part in (q, v))
-        images: Any = (mirror.position(whole_q), mirror.velocity(whole_v))
-        return images[0][self.held :], images[1][self.held :]
 
     def _build_path(self) -> None:
         request, robot = self.request, self.robot
@@ -211,10 +204,7 @@ class Transcription:
         request, robot = self.request, self.robot
         q, v, v_start = moving = [self._symbol(name) for name in ("q", "v", "v_start")]
         duration, length = casadi.SX.sym("duration"), casadi.SX.sym("length")
-        q_start, after = self._mirrored(symbols(q), symbols(v_start))
-        self.mirror = casadi.Function(
-            "mirror", [q, v_start], [expression(q_start), expression(after)]
-        )
+        q_start, after = self.mirror.position(symbols(q)), self.mirror.velocity(symbols(v_start))
         start = Support(robot, request.stance, q_start, symbols(v_start))
         self.start = casadi.Function(
             "start", [q, v_start], [expression(start.q), expression(start.v)]
