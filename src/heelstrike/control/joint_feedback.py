@@ -9,6 +9,7 @@ whose command is c at the time of each step.
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
@@ -114,10 +115,8 @@ class JointFeedback(Law):
         times = np.asarray(times, dtype=np.float64)
         begins, coefficients = self.parameters.begins, self.parameters.coefficients
         piece = np.maximum(np.searchsorted(begins, times + EARLY, side="right") - 1, 0)
-        since = times - begins[piece]
-        command = np.zeros((len(times), coefficients.shape[1]))
-        for power in range(coefficients.shape[2] - 1, -1, -1):
-            command = command * since[:, None] + coefficients[piece, :, power]
+        terms = np.moveaxis(coefficients[piece], -1, 0)
+        command: Floats = polyval((times - begins[piece])[:, None], terms, tensor=False)
         return command
 
 

@@ -96,6 +96,7 @@ class Solution:
     multipliers: Floats
 
 
+@dataclass(eq=False)
 class Program:
     """The program on a mesh of equal pieces.
 
@@ -120,24 +121,17 @@ class Program:
         the effort: shows which constraints are in conflict when there is no solution.
     """
 
-    def __init__(
-        self,
-        transcription: Transcription,
-        profile: ClearanceProfile,
-        degree: int,
-        instants: Instants,
-        *,
-        elastic: bool = False,
-    ) -> None:
-        self.transcription = transcription
-        self.request = transcription.request
-        self.profile = profile
-        self.degree = degree
-        self.instants = instants
-        self.elastic = elastic
-        n, pieces = transcription.size, instants.pieces
+    transcription: Transcription
+    profile: ClearanceProfile
+    degree: int
+    instants: Instants
+    elastic: bool = False
+
+    def __post_init__(self) -> None:
+        self.request = self.transcription.request
+        n, pieces = self.transcription.size, self.instants.pieces
         self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
-        sizes = [n * pieces, n * pieces, n * pieces * (degree - 1), 1, 1]
+        sizes = [n * pieces, n * pieces, n * pieces * (self.degree - 1), 1, 1]
         self._places = [0, *np.cumsum(sizes).tolist()]
         self._gaps = n * (2 * pieces - 1)
         self._lower, self._upper = self._bounds()
@@ -147,16 +141,6 @@ class Program:
     def size(self) -> int:
         """Number of unknowns."""
         return int(self._places[-1])
-
-    def refined(self, instants: Instants) -> Program:
-        """Return the same program with more instants."""
-        return Program(
-            self.transcription, self.profile, self.degree, self.instants.joined(instants)
-        )
-
-    def relaxed(self) -> Program:
-        """Return the elastic variant of the program."""
-        return Program(self.transcription, self.profile, self.degree, self.instants, elastic=True)
 
     def path_bounds(self, instants: Instants) -> tuple[Floats, Floats]:
         """Scaled bounds of the constraints along the path at instants, (rows, N) each."""

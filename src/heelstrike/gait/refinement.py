@@ -6,6 +6,8 @@ exchange method of semi-infinite programming.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +50,7 @@ def held_between_nodes(program: Program, solution: Solution) -> Floats:
         missed = _missed(program, unknowns, fine)
         if not missed.share.size:
             return unknowns
-        program = program.refined(missed)
+        program = replace(program, instants=program.instants.joined(missed))
         solution = program.solve(unknowns)
         if not solution.converged:
             solution = program.solve(nearest_to_feasible(program))

@@ -75,8 +75,7 @@ class Evaluation:
     def vector(self, name: str, value: ArrayLike) -> Floats:
         """Check a vector over the coordinates, or the actuators if it is "torque"; symbols pass."""
         symbolic: Any = value
-        entries = self.robot.actuator_names if name == "torque" else self.robot.joint_names
-        return symbolic if self.symbolic else _vector(self.robot, name, value, entries)
+        return symbolic if self.symbolic else joint_vector(self.robot, name, value)
 
     def point(self, link: int | str, local: ArrayLike) -> tuple[int, Floats]:
         """Return the index of a link and the world position of a point of it."""
@@ -102,16 +101,14 @@ class Evaluation:
 
 
 def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:
-    """Return a vector over the coordinates, (nv,), or raise a `RobotError` that names them."""
-    return _vector(robot, name, value, robot.joint_names)
+    """Return a vector over the coordinates, or the actuators if it is "torque".
 
-
-def torque_vector(robot: Robot, value: ArrayLike) -> Floats:
-    """Return a vector over the actuators, (nu,), or raise a `RobotError` that names them."""
-    return _vector(robot, "torque", value, robot.actuator_names)
-
-
-def _vector(robot: Robot, name: str, value: ArrayLike, entries: tuple[str, ...]) -> Floats:
+    Raises
+    ------
+    RobotError
+        That names them, if it has another length.
+    """
+    entries = robot.actuator_names if name == "torque" else robot.joint_names
     vector = np.ascontiguousarray(value, dtype=np.float64)
     if vector.shape != (len(entries),):
         raise RobotError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector, torque_vector
+from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
@@ -85,7 +85,7 @@ def linearize(
     """
     held = contact_indices(robot, contacts)
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
-    gamma = torque_vector(robot, torque)
+    gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, 2 * len(held)
     equations, derivatives = _equations(robot, held)
     nothing = np.zeros(n + k)
