@@ -187,7 +187,7 @@ def _best_of_starts(program: Program, report: Callable[[float], None]) -> Soluti
     if not converged:
         raise InfeasibleGaitError(
             f"robot {request.robot.name!r}: gaits with {request} exist only just: points that "
-            f"satisfy all constraints were found, but no optimum ({solutions[-1].status}). Ask "
+            f"satisfy all constraints were found, but no optimum ({solutions[-1].ended}). Ask "
             "for a shorter or slower step or a lower clearance of the swing foot."
         )
     return min(converged, key=lambda solution: solution.objective)

@@ -83,8 +83,8 @@ class Solution:
         Value of the objective.
     converged : bool
         Whether it is an optimum within the tolerance.
-    status : str
-        IPOPT's own word for how it ended.
+    ended : str
+        IPOPT's own word for how it did.
     multipliers : (m,) float
         Multipliers of the scaled constraints, in the order of :meth:`Program.labelled_rows`.
     """
@@ -92,7 +92,7 @@ class Solution:
     unknowns: Floats
     objective: float
     converged: bool
-    status: str
+    ended: str
     multipliers: Floats
 
 
@@ -256,7 +256,7 @@ class Program:
             unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
-            status=str(statistics["return_status"]).replace("_", " ").lower(),
+            ended=str(statistics["return_status"]).replace("_", " ").lower(),
             multipliers=np.array(found["lam_g"]).ravel()[self._gaps :],
         )
 
@@ -310,7 +310,7 @@ class Ipopt:
 
     CasADi looks for signals in the functions that IPOPT evaluates, takes what they raise for a
     failure of the function, and returns; nobody learns that there was a Ctrl-C. So the signal is
-    held back, and the search stopped after the iteration in which it came.
+    held back, and IPOPT stopped after the iteration in which it came.
 
     Parameters
     ----------

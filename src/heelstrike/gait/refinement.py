@@ -60,7 +60,7 @@ def held_between_nodes(program: Program, solution: Solution) -> Floats:
     raise InfeasibleGaitError(
         f"robot {request.robot.name!r}: a gait with {request} satisfies the constraints at "
         f"{np.count_nonzero(program.instants.weight)} phases of a step but not between them "
-        f"({solution.status}). Try more intervals, or a slower step."
+        f"({solution.ended}). Try more intervals, or a slower step."
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Iterator
@@ -317,14 +318,11 @@ def _tree(robot: Robot) -> Iterator[tuple[int, str]]:
         joint, lead, below = stack.pop()
         yield joint, lead
         own = children.get(joint, [])
-        for place, child in reversed(list(enumerate(own))):
+        for child in reversed(own):
+            branch, line = ("└ ", "  ") if child == own[-1] else ("├ ", "│ ")
             if len(own) == 1:
-                stack.append((child, below, below))  # a chain needs no lines
-            else:
-                last = place == len(own) - 1
-                stack.append(
-                    (child, below + ("└ " if last else "├ "), below + ("  " if last else "│ "))
-                )
+                branch = line = ""  # a chain needs no lines
+            stack.append((child, below + branch, below + line))
 
 
 _MORE = {"stiffness": "spring", "speed_limit": "speed"}
@@ -382,31 +380,25 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         return result
     model = robot.model
 
-    def numbers(values: Floats) -> list[Any]:
-        plain = np.where(np.isfinite(values), values, np.nan).tolist()
-        return [None if value != value else value for value in plain]
-
     of_joints = {
-        name: numbers(getattr(model, name))
+        name: [value if math.isfinite(value) else None for value in getattr(model, name).tolist()]
         for name, number in NUMBERS.items()
         if number.shape in (("nq",), ("nv",), ("nu",)) and number.kind is float
     }
-    return (
-        result
-        | {
-            "name": robot.name,
-            "mass_kg": robot.total_mass,
-            "floating": robot.floating,
-            "symmetric": robot.mirror is not None,
-            "coordinates": list(robot.joint_names),
-            "links": list(robot.link_names),
-            "parent": model.parent.tolist(),
-            "link_mass_kg": model.mass.tolist(),
-            "link_inertia_kg_m2": model.inertia.tolist(),
-            "link_center_of_mass_m": model.center_of_mass.tolist(),
-            "actuators": list(robot.actuator_names),
-            "contact_points": list(robot.contact_names),
-            "feet": [foot.name for foot in robot.feet],
-        }
-        | of_joints
-    )
+    return {
+        **result,
+        "name": robot.name,
+        "mass_kg": robot.total_mass,
+        "floating": robot.floating,
+        "symmetric": robot.mirror is not None,
+        "coordinates": list(robot.joint_names),
+        "links": list(robot.link_names),
+        "parent": model.parent.tolist(),
+        "link_mass_kg": model.mass.tolist(),
+        "link_inertia_kg_m2": model.inertia.tolist(),
+        "link_center_of_mass_m": model.center_of_mass.tolist(),
+        "actuators": list(robot.actuator_names),
+        "contact_points": list(robot.contact_names),
+        "feet": [foot.name for foot in robot.feet],
+        **of_joints,
+    }

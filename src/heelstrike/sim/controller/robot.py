@@ -11,6 +11,7 @@ from heelstrike.dynamics.kernels import (
     bias_force,
     center_of_mass,
     composite_inertias,
+    first_moments,
     forward_kinematics,
     inverse_dynamics,
     link_velocities,
@@ -178,9 +179,7 @@ class ControlledRobot(Bundle):
         """Velocity (x, z) of the centre of mass."""
         found = self.columns[0]  # three numbers
         momentum(self.model, state.kinematics, found)
-        mass = 0.0
-        for i in range(self.nl):
-            mass += self.model.mass[i]
+        mass, _, _ = first_moments(self.model, state.kinematics)
         velocity[0] = found[0] / mass
         velocity[1] = found[1] / mass
 
@@ -190,10 +189,7 @@ class ControlledRobot(Bundle):
 
 def extents_of(robot: Robot) -> dict[str, int]:
     """Sizes of a robot by the names under which arrays of controllers are declared."""
-    return {
-        "nq": robot.nq, "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "nl": robot.nv,
-        "axes": 2, "components": 2,
-    }  # fmt: skip
+    return {**robot.model.extents, "components": 2}
 
 
 def controlled_robot(robot: Robot) -> ControlledRobot:
