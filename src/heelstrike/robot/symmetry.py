@@ -19,7 +19,7 @@ TOLERANCE = 1e-6
 
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-_OTHER = {"l": "r", "r": "l"}
+_OTHER = str.maketrans("lrLR", "rlRL")
 
 
 def find_mirror(
@@ -81,26 +81,14 @@ def _side(name: str, names: Sequence[str]) -> tuple[str, str]:
     A bare first letter, as in lhip, counts only if `names` has the other side's, rhip.
     """
     words = [word.lower() for word in _WORDS.findall(name)]
-    side = ""
-    rest: list[str] = []
-    for word in words:
-        if not side and word in _SIDES:
-            side = _SIDES[word]
-        elif not side and len(word) > 4 and word.startswith("left"):
-            side, rest = "left", [*rest, word[4:]]
-        elif not side and len(word) > 5 and word.startswith("right"):
-            side, rest = "right", [*rest, word[5:]]
-        else:
-            rest.append(word)
-    letter = name[:1].lower()
-    if not side and letter in _OTHER and _swapped(name) in names:
-        return _SIDES[letter], name[1:].lower()
-    return side, " ".join(rest)
-
-
-def _swapped(name: str) -> str:
-    other = _OTHER[name[0].lower()]
-    return (other.upper() if name[0].isupper() else other) + name[1:]
+    for k, word in enumerate(words):
+        side = _SIDES.get(word) or next((s for s in ("left", "right") if word.startswith(s)), "")
+        if side:
+            words[k : k + 1] = [] if word in _SIDES else [word.removeprefix(side)]
+            return side, " ".join(words)
+    if name[:1].translate(_OTHER) + name[1:] in names and name[:1].lower() in _SIDES:
+        return _SIDES[name[0].lower()], name[1:].lower()
+    return "", " ".join(words)
 
 
 def _numbered(names: Sequence[str]) -> tuple[str, ...]:
