@@ -171,17 +171,16 @@ def has_landed(
     differ from the reference by as much as the impact itself. A foot that has touched without
     coming flat counts as landed after a while.
     """
-    if memory.landed == 0:
-        landed = t - memory.start > parameters.landing
-        if not landed:
-            landed = True
-            link = robot.foot_link[memory.stance]
-            for i in range(robot.nc):
-                if robot.contact_foot[i] == memory.stance:
-                    speed = approaching_speed(state.kinematics, contacts, link, i)
-                    landed = landed and speed < LANDED_SPEED
-        memory.landed = 1 if landed else 0
-    return memory.landed == 1
+    landed = memory.landed == 1 or t - memory.start > parameters.landing
+    if not landed:
+        landed = True
+        link = robot.foot_link[memory.stance]
+        for i in range(robot.nc):
+            if robot.contact_foot[i] == memory.stance:
+                speed = approaching_speed(state.kinematics, contacts, link, i)
+                landed = landed and speed < LANDED_SPEED
+    memory.landed = 1 if landed else 0
+    return landed
 
 
 @kernel

@@ -176,20 +176,15 @@ def composite_inertias(model: Model, work: Workspace) -> None:
 @kernel
 def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
     """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
-    for i in range(model.nl):
-        for k in range(4):
-            work.composite[i, k] = work.inertia[i, k]
+    composite_inertias(model, work)
+    for i in range(model.nv):
         for j in range(model.nv):
             matrix[i, j] = 0.0
     for i in range(model.nl - 1, -1, -1):
         motion = spatial(work.motion, i)
         p = momentum_of(work.composite, i, motion)
         matrix[i, i] = power(motion, p) + model.armature[i]
-        parent = model.parent[i]
-        if parent >= 0:
-            for k in range(4):
-                work.composite[parent, k] += work.composite[i, k]
-        j = parent
+        j = model.parent[i]
         while j >= 0:
             entry = power(spatial(work.motion, j), p)
             matrix[i, j] = entry

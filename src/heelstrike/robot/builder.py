@@ -24,9 +24,6 @@ class _Link:
 
     joint: str
     name: str
-    parent: int
-    axis: tuple[float, float, float]
-    at: tuple[float, float]
     numbers: dict[str, Any]
     torque: tuple[float, float] | None
 
@@ -233,15 +230,12 @@ class RobotBuilder:
         numbers = {name: [link.numbers[name] for link in links] for name in links[0].numbers}
         model = Model.made(
             **numbers,
-            parent=[link.parent for link in links],
-            axis=[link.axis for link in links],
-            offset=[link.at for link in links],
             gravity=(0.0, -self._gravity),
             **of_model(points),
             actuator_joint=driven,
             torque_lower=torques[0],
             torque_upper=torques[1],
-            pivot=next((i for i, link in enumerate(links) if link.axis[0]), 0),
+            pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(
             self.name,
@@ -278,7 +272,8 @@ class RobotBuilder:
             numbers, torque = _numbers(properties), _torque(properties.get("torque"))
         except RobotError as error:
             raise self._error(f"joint {joint!r}: {error}") from None
-        self._links.append(_Link(joint, name, place, axis, at, numbers, torque))
+        numbers |= {"parent": place, "axis": axis, "offset": at}
+        self._links.append(_Link(joint, name, numbers, torque))
         return name
 
     def _index(self, link: str, why: str = "a contact point is on") -> int:
