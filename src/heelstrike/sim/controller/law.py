@@ -87,16 +87,6 @@ class ControllerFunction:
         """What it is called in messages."""
         return self.python.__name__
 
-    def fitting(self, parameters: Bundle) -> Bundle:
-        """Return parameters, or refuse those that it does not take."""
-        if not isinstance(parameters, self.parameters):
-            wanted = "none" if self.parameters is Bundle else self.parameters.__name__
-            raise ControllerError(
-                f"controller {self.name!r} takes {wanted} as parameters, got "
-                f"{type(parameters).__name__}"
-            )
-        return parameters
-
     def __call__(self, parameters: Bundle | None = None, **options: Any) -> Law:
         """Return the law with these parameters; see :class:`Law`, also for the options."""
         return Law(self, parameters, **options)
@@ -277,7 +267,7 @@ class Law:
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
             )
         self.function = function
-        self.parameters: Any = function.fitting(Bundle() if parameters is None else parameters)
+        self.parameters: Any = _fitting(function, Bundle() if parameters is None else parameters)
         self.robot = robot
         self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
         self.damping = None if damping is None else np.asarray(damping, dtype=np.float64)
@@ -297,7 +287,7 @@ class Law:
             The law.
         """
         law = copy.copy(self)
-        law.parameters, law._asked = self.function.fitting(parameters), None
+        law.parameters, law._asked = _fitting(self.function, parameters), None
         return law
 
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
@@ -375,6 +365,17 @@ class Law:
     def __getstate__(self) -> dict[str, Any]:
         """Leave what holds places in this process."""
         return self.__dict__ | {"_asked": None}
+
+
+def _fitting(function: ControllerFunction, parameters: Bundle) -> Bundle:
+    """Return parameters, or refuse those that a function does not take."""
+    if not isinstance(parameters, function.parameters):
+        wanted = "none" if function.parameters is Bundle else function.parameters.__name__
+        raise ControllerError(
+            f"controller {function.name!r} takes {wanted} as parameters, got "
+            f"{type(parameters).__name__}"
+        )
+    return parameters
 
 
 @controller
