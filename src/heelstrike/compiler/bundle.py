@@ -62,12 +62,19 @@ class Member:
         Extents of an array: ``"nv"``, ``"2 nc"``, ``"nc + 1"``, 3.
     address : bool
         Whether it holds places in this process, or a part what is another's: nothing to keep.
+    flat : bool
+        Whether what a part holds is stored under the names of its own members.
     """
 
     role: str
     kind: type
     shape: tuple[str | int, ...] = ()
     address: bool = False
+    flat: bool = False
+
+    def prefix(self, name: str) -> str:
+        """What the names begin with under which the members of a part are stored."""
+        return "" if self.flat else f"{name}."
 
     @property
     def dtype(self) -> np.dtype[Any]:
@@ -127,9 +134,9 @@ def number(of: type) -> Any:
     return Member("number", of)
 
 
-def part(kind: type[Bundle], *, address: bool = False) -> Any:
-    """Declare a bundle within a bundle."""
-    return Member("part", kind, address=address)
+def part(kind: type[Bundle], *, address: bool = False, flat: bool = False) -> Any:
+    """Declare a bundle within a bundle; a flat one is stored as if its members were this one's."""
+    return Member("part", kind, address=address, flat=flat)
 
 
 def extent() -> Any:
@@ -374,7 +381,7 @@ class Bundle:
             yield f"{prefix}cells", self.__dict__["_cells"]
         for name, member in self.declared.items():
             if member.role == "part" and not member.address:
-                yield from getattr(self, name).storage(f"{prefix}{name}.")
+                yield from getattr(self, name).storage(prefix + member.prefix(name))
             elif member.role == "array" and not member.address:
                 yield prefix + name, getattr(self, name)
 
@@ -403,7 +410,7 @@ class Bundle:
         members = self.members()
         for name, member in self.declared.items():
             if member.role == "part" and not member.address:
-                members[name] = members[name].stored(place, f"{prefix}{name}.")
+                members[name] = members[name].stored(place, prefix + member.prefix(name))
             elif member.role == "array" and not member.address:
                 members[name] = place(prefix + name, members[name])
         copy = type(self)(**members)

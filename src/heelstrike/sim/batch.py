@@ -549,7 +549,7 @@ class _Crew:
         self._message[index] = ending.message
         if ending.status is RunStatus.INTERRUPTED:
             self._message[index] += self._why
-        tally, solver = memory.tally, memory.solver.tally
+        tally, solver = memory.tally, memory.assembly.solver.tally
         self._tally[index] = tally.steps, tally.saturations
         self._extreme[index] = (
             tally.penetration, tally.complementarity, tally.cone, tally.non_penetration,

@@ -139,7 +139,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 if due:
                     if control.in_python == 0:
                         ask(
-                            controller, control, clock.time, memory.q, memory.v, model, memory,
+                            controller, clock.time, memory.q, memory.v, model, memory, control,
                             memory.torque,
                         )  # fmt: skip
                     elif clock.answered == 0:

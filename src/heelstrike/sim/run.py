@@ -344,7 +344,7 @@ _MEMBERS = {
 
 def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
     """Return counts and worst values of a simulation, as fields of a run."""
-    tally, solver = memory.tally, memory.solver.tally
+    tally, solver = memory.tally, memory.assembly.solver.tally
     return {
         "certificates": Certificates(
             penetration=tally.penetration,

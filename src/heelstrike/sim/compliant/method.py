@@ -59,6 +59,7 @@ from heelstrike.sim.record.recording import (
     STICK,
     TOUCHDOWN,
     limit_torque,
+    log_event,
     note_event,
     note_row_when_due,
 )
@@ -202,12 +203,12 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
         gap = memory.contacts.gap[contact]
         before = work.base_gap[contact]
         memory.tally.penetration = max(memory.tally.penetration, -gap)
-        if memory.closed[contact] == 0 and gap < 0.0:
-            memory.closed[contact] = 1
+        if memory.reported.closed[contact] == 0 and gap < 0.0:
+            memory.reported.closed[contact] = 1
             share = before / (before - gap) if before > 0.0 else 0.0
             work.touched[contact] = since + share * h
-        elif memory.closed[contact] == 1 and gap > LIFTOFF_GAP:
-            memory.closed[contact] = 0
+        elif memory.reported.closed[contact] == 1 and gap > LIFTOFF_GAP:
+            memory.reported.closed[contact] = 0
             share = before / (before - gap) if before < 0.0 else 0.0
             work.left[contact] = since + share * h
 
@@ -235,7 +236,7 @@ def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> flo
     for contact in range(model.contact_link.shape[0]):
         normal = work.force[contact, 0]
         tangent = abs(work.force[contact, 1])
-        excess = max(-normal, tangent - memory.friction[contact] * normal)
+        excess = max(-normal, tangent - memory.surface.friction[contact] * normal)
         if excess > 0.0:
             worst = max(worst, excess / (abs(normal) + tangent))
     return worst
@@ -258,7 +259,7 @@ def sample(
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] = 0.0
         work.dry_impulse[joint] = 0.0
-    memory.answer.residual[1] = cone_residual(model, memory, work)
+    memory.assembly.answer.residual[1] = cone_residual(model, memory, work)
     span = work.step
     elapsed = 0.0
     h = work.proposed
@@ -289,7 +290,7 @@ def sample(
             h = max(taken * factor, SHORTEST)
             rejected = True
             continue
-        observe(model, ground, memory)
+        observe(model, ground, memory.q, memory.v, memory)
         met = landing(model, work.atol, memory, work)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
@@ -298,8 +299,8 @@ def sample(
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
-        memory.answer.residual[1] = max(
-            memory.answer.residual[1], cone_residual(model, memory, work)
+        memory.assembly.answer.residual[1] = max(
+            memory.assembly.answer.residual[1], cone_residual(model, memory, work)
         )
         memory.tally.steps += 1
         work.age += 1
@@ -318,9 +319,9 @@ def sample(
         for k in range(2):
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
     for joint in range(model.parent.shape[0]):
-        memory.stop_torque[joint] = work.stop_impulse[joint] / span
-        memory.friction_torque[joint] = work.dry_impulse[joint] / span
-    memory.tally.cone = max(memory.tally.cone, memory.answer.residual[1])
+        memory.reaction.stop_torque[joint] = work.stop_impulse[joint] / span
+        memory.reaction.friction_torque[joint] = work.dry_impulse[joint] / span
+    memory.tally.cone = max(memory.tally.cone, memory.assembly.answer.residual[1])
     return DONE
 
 
@@ -336,7 +337,7 @@ def note_events(
         touched = work.touched[contact]
         left = work.left[contact]
         if touched >= 0.0 or left >= 0.0:
-            memory.slipping[contact] = 0
+            memory.reported.slipping[contact] = 0
         if left >= 0.0 and left < touched:
             note_event(record, left, LIFTOFF, contact, memory)
         if touched >= 0.0:
@@ -348,27 +349,22 @@ def note_events(
         sliding = slips(
             work.laws.friction,
             work.laws.numbers,
-            memory.friction[contact] * work.force[contact, 0],
-            memory.slip[contact],
+            memory.surface.friction[contact] * work.force[contact, 0],
+            memory.reaction.slip[contact],
             work.bristle[contact],
         )
-        if sliding and memory.slipping[contact] == 0:
-            memory.slipping[contact] = 1
+        if sliding and memory.reported.slipping[contact] == 0:
+            memory.reported.slipping[contact] = 1
             note_event(record, time, SLIP, contact, memory)
-        elif not sliding and memory.slipping[contact] == 1:
-            memory.slipping[contact] = 0
+        elif not sliding and memory.reported.slipping[contact] == 1:
+            memory.reported.slipping[contact] = 0
             note_event(record, time, STICK, contact, memory)
     for joint in range(model.parent.shape[0]):
-        pressed = memory.stop_torque[joint] != 0.0
-        if pressed and memory.stopped[joint] == 0:
-            place = record.events
-            record.event_time[place] = time
-            record.event_kind[place] = JOINT_STOP
-            record.event_contact[place] = joint
-            record.event_impulse[place, 0] = abs(memory.stop_torque[joint])
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
-        memory.stopped[joint] = 1 if pressed else 0
+        pressed = memory.reaction.stop_torque[joint] != 0.0
+        if pressed and memory.reported.stopped[joint] == 0:
+            impulse = abs(memory.reaction.stop_torque[joint])
+            log_event(time, JOINT_STOP, joint, impulse, 0.0, record)
+        memory.reported.stopped[joint] = 1 if pressed else 0
 
 
 @kernel
@@ -382,8 +378,8 @@ def note_forces(
     for contact in range(force.shape[0]):
         record.force[row, contact, 0] = force[contact, 0]
         record.force[row, contact, 1] = force[contact, 1]
-        record.slip[row, contact] = memory.slip[contact]
-    record.residual[row, 1] = memory.answer.residual[1]
+        record.slip[row, contact] = memory.reaction.slip[contact]
+    record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
 @kernel
@@ -395,9 +391,9 @@ def begin(
     record: Record,  # noqa: ARG001
 ) -> int:
     """Points in the ground, or on it, are closed when the simulation begins."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
     for contact in range(model.contact_link.shape[0]):
-        memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
+        memory.reported.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
     return DONE
 
 
@@ -409,7 +405,7 @@ def prepare(
     work: CompliantWorkspace,  # noqa: ARG001
 ) -> None:
     """Kinematics and contact points of the state now."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
 
 
 @kernel
@@ -424,7 +420,7 @@ def decide(
     clock: Clock,
 ) -> int:
     """Forces and rates at this sample, under the torques that the frame asked for."""
-    share_over_step(memory.pushes, clock.time, work.step)
+    share_over_step(clock.time, work.step, memory.pushes)
     evaluate(controller, control, model, ground, HELD, clock.time, memory, work)
     return DONE
 
@@ -469,9 +465,10 @@ def move(
         record.event_impulse[place, 1] *= step
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
+        reaction = memory.reaction
         note_forces(
-            record, work.row, memory.contacts.force, memory.stop_torque, memory.friction_torque,
-            memory,
+            record, work.row, memory.contacts.force, reaction.stop_torque,
+            reaction.friction_torque, memory,
         )  # fmt: skip
     if control.continuous == 1:
         for contact in range(model.contact_link.shape[0]):

@@ -8,7 +8,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
@@ -64,27 +64,42 @@ def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memor
     memory.tally.bad_trial = bad
 
 
+@kernel
+def note_residual(residual: Floats, tally: Tally) -> None:
+    """Keep the worst residuals of the run."""
+    tally.complementarity = max(tally.complementarity, residual[0])
+    tally.cone = max(tally.cone, residual[1])
+    tally.non_penetration = max(tally.non_penetration, residual[2])
+
+
+@kernel
+def log_event(
+    time: float, kind: int, place: int, normal: float, tangent: float, record: Record
+) -> None:
+    """Append an event at a contact point or joint, with its impulse."""
+    event = record.events
+    record.event_time[event] = time
+    record.event_kind[event] = kind
+    record.event_contact[event] = place
+    record.event_impulse[event, 0] = normal
+    record.event_impulse[event, 1] = tangent
+    record.events = event + 1
+
+
 @dissolved_kernel
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
     tally = memory.tally
     for contact in range(model.contact_link.shape[0]):
         tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
-    tally.complementarity = max(tally.complementarity, memory.answer.residual[0])
-    tally.cone = max(tally.cone, memory.answer.residual[1])
-    tally.non_penetration = max(tally.non_penetration, memory.answer.residual[2])
+    note_residual(memory.assembly.answer.residual, tally)
 
 
 @kernel
 def note_event(record: Record, time: float, kind: int, contact: int, memory: Memory) -> None:
     """Append an event; its impulse is that of the step it happened in."""
-    place = record.events
-    record.event_time[place] = time
-    record.event_kind[place] = kind
-    record.event_contact[place] = contact
-    record.event_impulse[place, 0] = memory.contacts.force[contact, 0]
-    record.event_impulse[place, 1] = memory.contacts.force[contact, 1]
-    record.events = place + 1
+    force = memory.contacts.force
+    log_event(time, kind, contact, force[contact, 0], force[contact, 1], record)
 
 
 @dissolved_kernel
@@ -98,42 +113,37 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
     for contact in range(model.contact_link.shape[0]):
         pushed = memory.contacts.force[contact, 0] > 0.0
         first = record.events
-        if memory.closed[contact] == 0 and pushed:
-            memory.closed[contact] = 1
-            memory.slipping[contact] = 0
+        if memory.reported.closed[contact] == 0 and pushed:
+            memory.reported.closed[contact] = 1
+            memory.reported.slipping[contact] = 0
             stood = memory.tally.steps == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
             if stood:
-                normal, _ = contact_velocity(
-                    model.contact_link[contact],
-                    memory.contacts.position[contact],
-                    memory.contacts.normal[contact],
-                    memory.tree,
-                )
+                normal, _ = contact_velocity(model, memory.equations.tree, memory.contacts, contact)
                 stood = normal >= -STANDING_SPEED
             if not stood:
                 note_event(record, time + step, TOUCHDOWN, contact, memory)
         elif (
-            memory.closed[contact] == 1
+            memory.reported.closed[contact] == 1
             and not pushed
             and memory.contacts.gap[contact] > LIFTOFF_GAP
         ):
-            memory.closed[contact] = 0
-            memory.slipping[contact] = 0
+            memory.reported.closed[contact] = 0
+            memory.reported.slipping[contact] = 0
             note_event(record, time, LIFTOFF, contact, memory)
-        if memory.closed[contact] == 1 and pushed:
-            slips = abs(memory.slip[contact]) > SLIP_SPEED
-            if slips and memory.slipping[contact] == 0:
-                memory.slipping[contact] = 1
+        if memory.reported.closed[contact] == 1 and pushed:
+            slips = abs(memory.reaction.slip[contact]) > SLIP_SPEED
+            if slips and memory.reported.slipping[contact] == 0:
+                memory.reported.slipping[contact] = 1
                 note_event(record, time + step, SLIP, contact, memory)
-            elif not slips and memory.slipping[contact] == 1:
-                memory.slipping[contact] = 0
+            elif not slips and memory.reported.slipping[contact] == 1:
+                memory.reported.slipping[contact] = 0
                 note_event(record, time + step, STICK, contact, memory)
         for place in range(first, record.events):
             record.event_impulse[place, 0] *= step
             record.event_impulse[place, 1] *= step
     for joint in range(model.parent.shape[0]):
-        pushed = memory.stop_torque[joint] != 0.0
-        if not pushed and memory.stopped[joint] == 0:
+        pushed = memory.reaction.stop_torque[joint] != 0.0
+        if not pushed and memory.reported.stopped[joint] == 0:
             continue
         way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
         stood = (
@@ -141,31 +151,23 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
             and way <= LIFTOFF_GAP
             and abs(memory.v[joint]) <= STANDING_SPEED
         )
-        if pushed and memory.stopped[joint] == 0 and not stood:
-            place = record.events
-            record.event_time[place] = time + step
-            record.event_kind[place] = JOINT_STOP
-            record.event_contact[place] = joint
-            record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
+        if pushed and memory.reported.stopped[joint] == 0 and not stood:
+            impulse = abs(memory.reaction.stop_torque[joint]) * step
+            log_event(time + step, JOINT_STOP, joint, impulse, 0.0, record)
         if pushed:
-            memory.stopped[joint] = 1
+            memory.reported.stopped[joint] = 1
         elif way > LIFTOFF_GAP:
-            memory.stopped[joint] = 0
+            memory.reported.stopped[joint] = 0
     for dry in range(memory.dry_joint.shape[0]):
         rests = abs(memory.next_v[memory.dry_joint[dry]]) <= SLIP_SPEED
-        if memory.resting[dry] == -1:
-            memory.resting[dry] = 1 if abs(memory.v[memory.dry_joint[dry]]) <= SLIP_SPEED else 0
-        if rests != (memory.resting[dry] == 1):
-            place = record.events
-            record.event_time[place] = time + step
-            record.event_kind[place] = JOINT_STICK if rests else JOINT_SLIP
-            record.event_contact[place] = memory.dry_joint[dry]
-            record.event_impulse[place, 0] = 0.0
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
-            memory.resting[dry] = 1 if rests else 0
+        if memory.reported.resting[dry] == -1:
+            memory.reported.resting[dry] = (
+                1 if abs(memory.v[memory.dry_joint[dry]]) <= SLIP_SPEED else 0
+            )
+        if rests != (memory.reported.resting[dry] == 1):
+            kind = JOINT_STICK if rests else JOINT_SLIP
+            log_event(time + step, kind, memory.dry_joint[dry], 0.0, 0.0, record)
+            memory.reported.resting[dry] = 1 if rests else 0
 
 
 @dissolved_kernel
@@ -176,20 +178,20 @@ def note_row(record: Record, time: float, memory: Memory) -> None:
     for i in range(memory.v.shape[0]):
         record.q[row, i] = memory.q[i]
         record.v[row, i] = memory.v[i]
-        record.stop_torque[row, i] = memory.stop_torque[i]
-        record.friction_torque[row, i] = memory.friction_torque[i]
+        record.stop_torque[row, i] = memory.reaction.stop_torque[i]
+        record.friction_torque[row, i] = memory.reaction.friction_torque[i]
     for i in range(memory.torque.shape[0]):
         record.torque[row, i] = memory.torque[i]
     contacts = memory.contacts
-    for i in range(memory.slip.shape[0]):
+    for i in range(memory.reaction.slip.shape[0]):
         for k in range(2):
             record.point[row, i, k] = contacts.position[i, k]
             record.normal[row, i, k] = contacts.normal[i, k]
             record.force[row, i, k] = contacts.force[i, k]
         record.gap[row, i] = contacts.gap[i]
-        record.slip[row, i] = memory.slip[i]
+        record.slip[row, i] = memory.reaction.slip[i]
     for k in range(3):
-        record.residual[row, k] = memory.answer.residual[k]
+        record.residual[row, k] = memory.assembly.answer.residual[k]
     record.rows = row + 1
 
 
@@ -205,7 +207,7 @@ def note_row_when_due(record: Record, memory: Memory, clock: Clock) -> int:
 @dissolved_kernel
 def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
     """Height of the centre of mass above the ground below it."""
-    tree = memory.tree
+    tree = memory.equations.tree
     mass = 0.0
     x = 0.0
     z = 0.0
