@@ -24,7 +24,7 @@ from heelstrike.cli.walk import walk
 from heelstrike.compiler.recording import Program, Recording
 from heelstrike.compiler.tape import Entry, Operation, Result
 from heelstrike.dynamics.kernels import state_equations
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import builtin_robots, load_robot
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -182,11 +182,11 @@ def test_operations_are_those_that_are_recorded() -> None:
     equations = Program(
         state_equations,
         {
-            "model": robot.model, "q": vector, "v": vector, "tree": workspace(robot.nv),
-            "matrix": matrix, "factor": matrix, "bias": vector,
+            "model": robot.model, "q": vector, "v": vector,
+            "work": Workspace.allocate(**robot.model.extents), "matrix": matrix, "factor": matrix, "bias": vector,
         },
     )  # fmt: skip
-    recording = Recording(equations, known={"tree.zero": np.zeros(robot.nv)})
+    recording = Recording(equations, known={"work.zero": np.zeros(robot.nv)})
     results = [value for value in recording.tape.values if isinstance(value, Result)]
     count = Counter(value.operation for value in results)
     sines = count[Operation.SINE]

@@ -34,9 +34,9 @@ PROBE = """
 import numpy as np
 from heelstrike.robot import load_robot
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 robot = load_robot("bravo7")
-work = workspace(robot.nv)
+work = Workspace.allocate(**robot.model.extents)
 kernels.forward_kinematics(robot.model, robot.model.reference, work)
 kernels.link_velocities(robot.model, np.zeros(robot.nv), work)
 force = np.zeros(robot.nv)

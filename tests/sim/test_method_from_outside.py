@@ -57,7 +57,7 @@ def prepare(model: Any, ground: Any, memory: Any, work: Any) -> None:
 
 @kernel
 def decide(
-    controller: Any, control: Any, model: Any, ground: Any, memory: Any, work: Any, record: Any,
+    controller: Any, model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any,
     clock: Any,
 ) -> int:  # fmt: skip
     equations = memory.equations
@@ -91,7 +91,7 @@ def decide(
 
 @kernel
 def report(
-    controller: Any, control: Any, model: Any, ground: Any, memory: Any, work: Any, record: Any,
+    controller: Any, model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any,
     clock: Any,
 ) -> None:  # fmt: skip
     note_row_when_due(record, memory, clock)
@@ -99,7 +99,7 @@ def report(
 
 @kernel
 def move(
-    controller: Any, control: Any, model: Any, ground: Any, memory: Any, work: Any, record: Any,
+    controller: Any, model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any,
     clock: Any,
 ) -> int:  # fmt: skip
     for j in range(memory.v.shape[0]):

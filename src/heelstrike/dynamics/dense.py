@@ -24,7 +24,7 @@ CONSISTENT = 1e-12
 
 
 @kernel
-def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> None:
+def pivot(rows: int, columns: int, row: int, column: int, tableau: Floats) -> None:
     """Exchange the basic variable of ``row`` with the other variable of ``column``."""
     inverse = 1.0 / tableau[row, column]
     for j in range(columns):
@@ -90,7 +90,7 @@ def eliminate(
                     row = i
                     column = j
         if row < size:
-            pivot(tableau, size, size + 1, row, column + 1)
+            pivot(size, size + 1, row, column + 1, tableau)
             taken[row] = 1
             pivot_row[column] = row
             nullity -= 1

@@ -79,13 +79,13 @@ class Kernels:
         ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of the
         state in ``memory.q`` and ``memory.v``.
     decide : kernel
-        ``decide(controller, control, model, ground, memory, work, record, clock)``: decide what
+        ``decide(controller, model, ground, control, memory, work, record, clock)``: decide what
         acts from now on; returns ``DONE`` or what is in the way.
     report : kernel
-        ``report(controller, control, model, ground, memory, work, record, clock)``: append to the
+        ``report(controller, model, ground, control, memory, work, record, clock)``: append to the
         record what is due of this instant.
     move : kernel
-        ``move(controller, control, model, ground, memory, work, record, clock)``: bring state and
+        ``move(controller, model, ground, control, memory, work, record, clock)``: bring state and
         ``clock.time`` to the next instant; returns ``DONE`` or what is in the way. After
         ``RECORD_FULL`` or ``FORK`` it is called again.
     """
@@ -104,9 +104,9 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
     def advance(
         controller: Any,
-        control: Control,
         model: Model,
         ground: GroundModel,
+        control: Control,
         memory: Memory,
         work: Any,
         record: Record,
@@ -148,9 +148,9 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     clock.calls += 1
                     if not limit_torque(model, memory):
                         return BAD_CONTROLLER
-                code = decide(controller, control, model, ground, memory, work, record, clock)
+                code = decide(controller, model, ground, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
-                    report(controller, control, model, ground, memory, work, record, clock)
+                    report(controller, model, ground, control, memory, work, record, clock)
                 if code != DONE:
                     return code
                 if center_height(model, ground, memory) < clock.fallen_height:
@@ -158,7 +158,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 if clock.finishing == 1:
                     return DONE
                 clock.moving = 1
-            code = move(controller, control, model, ground, memory, work, record, clock)
+            code = move(controller, model, ground, control, memory, work, record, clock)
             if code != DONE:
                 return code
             clock.moving = 0
@@ -171,7 +171,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 def compiled_loop(kernels: Kernels, work: Any) -> tuple[Any, float]:
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
-    kinds = (Control, Model, GroundModel, Memory, work, Record, Clock)
+    kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
     signature = types.int64(CONTROLLER_TYPE, *(kind.compiled_type() for kind in kinds))
     try_solvers.begin()
     compiled = loop_for(signature, frame(kernels))

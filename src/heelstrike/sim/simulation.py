@@ -397,7 +397,7 @@ class Simulation:
         while True:
             try:
                 code = self._loop(
-                    self._kernel, self._control, self.robot.model, self._ground.model(),
+                    self._kernel, self.robot.model, self._ground.model(), self._control,
                     self._memory, self._work, self._records[-1], self._clock,
                 )  # fmt: skip
             except KeyboardInterrupt:

@@ -60,7 +60,7 @@ def _solve(
     """Acceleration a under a generalised force: a = A(q)^-1 (force - H(q, v))."""
     forward_kinematics(model, q, tree)
     link_velocities(model, v, tree)
-    forward_dynamics(model, matrix, factor, force, tree, acceleration)
+    forward_dynamics(model, force, tree, matrix, factor, acceleration)
 
 
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:

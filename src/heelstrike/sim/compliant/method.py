@@ -411,9 +411,9 @@ def prepare(
 @kernel
 def decide(
     controller: Any,
-    control: Control,
     model: Model,
     ground: GroundModel,
+    control: Control,
     memory: Memory,
     work: CompliantWorkspace,
     record: Record,  # noqa: ARG001
@@ -428,9 +428,9 @@ def decide(
 @kernel
 def report(
     controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
     model: Model,  # noqa: ARG001
     ground: GroundModel,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
     memory: Memory,
     work: CompliantWorkspace,
     record: Record,
@@ -445,9 +445,9 @@ def report(
 @kernel
 def move(
     controller: Any,
-    control: Control,
     model: Model,
     ground: GroundModel,
+    control: Control,
     memory: Memory,
     work: CompliantWorkspace,
     record: Record,

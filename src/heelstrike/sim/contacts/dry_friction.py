@@ -49,7 +49,7 @@ def press_dry_joints(
     """Complete the problem of the candidates, of which the dry joints are the last."""
     number = dry_joint.shape[0]
     for place in range(number):
-        press(problem, count - number + place, step * model.dry_friction[dry_joint[place]])
+        press(count - number + place, step * model.dry_friction[dry_joint[place]], problem)
 
 
 @kernel

@@ -61,7 +61,7 @@ def contact_rows(
     assembly.leaf[place] = link
     write_point_rows(
         model, tree, link, contacts.position[contact], contacts.normal[contact],
-        assembly.jacobian, 2 * place,
+        2 * place, assembly.jacobian,
     )  # fmt: skip
 
 
@@ -200,7 +200,7 @@ def add_impulse(
     if equations.programs[EQUATIONS] != 0:
         solve_lower(model, equations.factor, change)
     else:
-        carry_along(model, equations.tree, equations.bodies, change)
+        carry_along(model, equations.bodies, equations.tree, change)
     for j in range(model.nv):
         v[j] += change[j]
 
@@ -237,7 +237,7 @@ def solve_mass_matrix(model: Model, equations: Equations, x: Floats) -> None:
     if equations.programs[SOLVE] != 0:
         play(equations.programs[SOLVE], (model, equations.factor, x))
     else:
-        solve_articulated(model, equations.tree, equations.bodies, x)
+        solve_articulated(model, equations.bodies, equations.tree, x)
 
 
 @kernel

@@ -87,4 +87,4 @@ def free_gap_acceleration(
     assembly.problem.free[2 * place + 1] = along_tangent
     if contact >= phase.first_dry:
         joint = phase.dry_joint[contact - phase.first_dry]
-        press(assembly.problem, place, model.dry_friction[joint])
+        press(place, model.dry_friction[joint], assembly.problem)

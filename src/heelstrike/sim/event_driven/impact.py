@@ -109,7 +109,7 @@ def collide(
 
 @kernel
 def short_bounces(
-    model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
+    model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase
 ) -> bool:
     """Mark the points that would come down again too soon to follow; return whether there are any.
 
@@ -168,7 +168,7 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
         solved, made = collide(model, 0.0, memory, phase, state)
         if not solved:
             return False
-        if attempt == 1 or not short_bounces(model, ground, memory, phase, state):
+        if attempt == 1 or not short_bounces(model, ground, state, memory, phase):
             break
         for i in range(state.shape[0]):
             state[i] = before[i]

@@ -647,9 +647,9 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 @kernel
 def decide(
     controller: Any,
-    control: Control,
     model: Model,
     ground: GroundModel,
+    control: Control,
     memory: Memory,
     phase: Phase,
     record: Record,
@@ -680,9 +680,9 @@ def decide(
 @kernel
 def report(
     controller: Any,
-    control: Control,
     model: Model,
     ground: GroundModel,
+    control: Control,
     memory: Memory,
     phase: Phase,
     record: Record,
@@ -699,9 +699,9 @@ def report(
 @kernel
 def move(
     controller: Any,
-    control: Control,
     model: Model,
     ground: GroundModel,
+    control: Control,
     memory: Memory,
     phase: Phase,
     record: Record,

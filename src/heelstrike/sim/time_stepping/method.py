@@ -242,14 +242,9 @@ def find_velocities(
     """Velocities of the usual points by their program, or of all by the loops."""
     velocity = usual.point_velocity
     if straight:
-        play(
-            usual.programs[VELOCITIES],
-            (model, usual.usual_points, tree, contacts.position, contacts.normal, v, velocity),
-        )
+        play(usual.programs[VELOCITIES], (model, usual.usual_points, contacts, v, tree, velocity))
     else:
-        point_velocities(
-            model, usual.every_point, tree, contacts.position, contacts.normal, v, velocity
-        )
+        point_velocities(model, usual.every_point, contacts, v, tree, velocity)
 
 
 @kernel
@@ -375,8 +370,8 @@ def gather_delassus(
         play(
             usual.programs[DELASSUS],
             (
-                model, usual.usual_points, equations.tree, contacts.position, contacts.normal,
-                equations.factor, usual.point_rows, usual.usual_problem.delassus,
+                model, usual.usual_points, equations.tree, contacts, equations.factor,
+                usual.point_rows, usual.usual_problem.delassus,
             ),
         )  # fmt: skip
     if near == count == usual.usual_points.shape[0]:
@@ -445,8 +440,8 @@ def push_candidates(
         play(
             usual.programs[PUSH],
             (
-                model, usual.usual_points, equations.tree, contacts.position, contacts.normal,
-                equations.factor, usual.point_impulse, equations.rate, v,
+                model, usual.usual_points, contacts, equations.factor, usual.point_impulse,
+                equations.tree, equations.rate, v,
             ),
         )  # fmt: skip
     for place in range(near, count):
@@ -525,9 +520,9 @@ def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
 @dissolved_kernel
 def decide(
     controller: Any,  # noqa: ARG001 - asked by the frame
-    control: Control,  # noqa: ARG001
     model: Model,
     ground: GroundModel,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
     memory: Memory,
     work: Stepping,
     record: Record,
@@ -544,9 +539,9 @@ def decide(
 @dissolved_kernel
 def report(
     controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
     model: Model,  # noqa: ARG001
     ground: GroundModel,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
     memory: Memory,
     work: Stepping,  # noqa: ARG001
     record: Record,
@@ -559,9 +554,9 @@ def report(
 @dissolved_kernel
 def move(
     controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
     model: Model,
     ground: GroundModel,  # noqa: ARG001
+    control: Control,  # noqa: ARG001
     memory: Memory,
     work: Stepping,
     record: Record,  # noqa: ARG001
