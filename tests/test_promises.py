@@ -183,7 +183,8 @@ def test_operations_are_those_that_are_recorded() -> None:
         state_equations,
         {
             "model": robot.model, "q": vector, "v": vector,
-            "work": Workspace.allocate(**robot.model.extents), "matrix": matrix, "factor": matrix, "bias": vector,
+            "work": Workspace.allocate(**robot.model.extents),
+            "matrix": matrix, "factor": matrix, "bias": vector,
         },
     )  # fmt: skip
     recording = Recording(equations, known={"work.zero": np.zeros(robot.nv)})

@@ -57,10 +57,9 @@ def prepare(model: Any, ground: Any, memory: Any, work: Any) -> None:
 
 @kernel
 def decide(
-    controller: Any, model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any,
-    clock: Any,
+    scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> int:  # fmt: skip
-    equations = memory.equations
+    model, equations = scene.model, memory.equations
     force, rate = equations.force, equations.rate
     passive_force(model, memory.q, memory.v, force)
     for i in range(model.actuator_joint.shape[0]):
@@ -91,16 +90,14 @@ def decide(
 
 @kernel
 def report(
-    controller: Any, model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any,
-    clock: Any,
+    scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> None:  # fmt: skip
     note_row_when_due(record, memory, clock)
 
 
 @kernel
 def move(
-    controller: Any, model: Any, ground: Any, control: Any, memory: Any, work: Any, record: Any,
-    clock: Any,
+    scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> int:  # fmt: skip
     for j in range(memory.v.shape[0]):
         old = memory.v[j]

@@ -24,7 +24,7 @@ METHODS = [kind for kind in Method.__subclasses__() if kind.__module__.startswit
 OF_METHODS = {
     each for kind in METHODS for each in vars(kind.kernels).values() if isinstance(each, Kernel)
 }
-FIRST_OF_A_METHOD = ("controller", "model", "ground")
+FIRST_OF_A_METHOD = ("scene", "model", "ground")
 """What no method may write to; the order of the others is one for all methods."""
 
 

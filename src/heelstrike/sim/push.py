@@ -165,16 +165,12 @@ class Pushes(Bundle):
 
 def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:
     """Return the arrays of some pushes on a robot."""
-    places = [push.place(robot) for push in pushes]
-    return Pushes(
-        link=np.array([link for link, _ in places], dtype=np.int64),
-        point=np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
-        position=np.zeros((len(places), 2)),
-        force=np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
-        start=np.array([push.start for push in pushes], dtype=np.float64),
-        end=np.array([push.end for push in pushes], dtype=np.float64),
-        share=np.zeros(len(places)),
-    )
+    numbers = numbers_of_pushes(robot, pushes)
+    start, duration = numbers["window"].T
+    return Pushes.allocate(
+        np=len(pushes), axes=2, link=numbers["link"].astype(np.int64), point=numbers["point"],
+        force=numbers["force"], start=start.copy(), end=start + duration,
+    )  # fmt: skip
 
 
 def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Floats]:

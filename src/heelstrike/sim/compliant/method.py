@@ -7,6 +7,8 @@ shorten them while a foot stands; they end where a contact point meets the groun
 where the force really changes fast, after an impact.
 """
 
+# ruff: noqa: ARG001 - the kernels of all methods have the same arguments
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -46,7 +48,7 @@ from heelstrike.sim.compliant.dynamics import (
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels
+from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
@@ -384,11 +386,7 @@ def note_forces(
 
 @kernel
 def begin(
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,  # noqa: ARG001
-    record: Record,  # noqa: ARG001
+    model: Model, ground: GroundModel, memory: Memory, work: CompliantWorkspace, record: Record
 ) -> int:
     """Points in the ground, or on it, are closed when the simulation begins."""
     observe(model, ground, memory.q, memory.v, memory)
@@ -402,7 +400,7 @@ def prepare(
     model: Model,
     ground: GroundModel,
     memory: Memory,
-    work: CompliantWorkspace,  # noqa: ARG001
+    work: CompliantWorkspace,
 ) -> None:
     """Kinematics and contact points of the state now."""
     observe(model, ground, memory.q, memory.v, memory)
@@ -410,32 +408,20 @@ def prepare(
 
 @kernel
 def decide(
-    controller: Any,
-    model: Model,
-    ground: GroundModel,
-    control: Control,
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,  # noqa: ARG001
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> int:
+) -> int:  # fmt: skip
     """Forces and rates at this sample, under the torques that the frame asked for."""
     share_over_step(clock.time, work.step, memory.pushes)
-    evaluate(controller, control, model, ground, HELD, clock.time, memory, work)
+    evaluate(scene.controller, control, scene.model, scene.ground, HELD, clock.time, memory, work)
     return DONE
 
 
 @kernel
 def report(
-    controller: Any,  # noqa: ARG001
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> None:
+) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
     work.row = note_row_when_due(record, memory, clock)
     if work.row >= 0:
@@ -444,17 +430,12 @@ def report(
 
 @kernel
 def move(
-    controller: Any,
-    model: Model,
-    ground: GroundModel,
-    control: Control,
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> int:
+) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
-    code = sample(controller, control, model, ground, clock.time, memory, work)
+    model = scene.model
+    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
     if code != DONE:
         return code
     step = work.step

@@ -19,6 +19,7 @@ from heelstrike.dynamics.kernels import (
     solve_lower,
 )
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
+from heelstrike.dynamics.spatial import plus, scaled, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.straight_line import EQUATIONS, SOLVE
@@ -120,31 +121,15 @@ def halve_by_bodies(model: Model, equations: Equations, place: int, assembly: As
     """
     parents, motion, momentum = model.parent, equations.tree.motion, equations.bodies.momentum
     jacobian, root, half = assembly.jacobian, assembly.root, assembly.half
-    row = 2 * place
-    n0 = 0.0
-    n1 = 0.0
-    n2 = 0.0
-    t0 = 0.0
-    t1 = 0.0
-    t2 = 0.0
-    j = assembly.leaf[place]
-    while j >= 0:
-        m0 = motion[j, 0]
-        m1 = motion[j, 1]
-        m2 = motion[j, 2]
-        normal = root[j] * (jacobian[row, j] + m0 * n0 + m1 * n1 + m2 * n2)
-        tangent = root[j] * (jacobian[row + 1, j] + m0 * t0 + m1 * t1 + m2 * t2)
-        half[j, row] = normal
-        half[j, row + 1] = tangent
-        normal *= root[j]
-        tangent *= root[j]
-        n0 -= momentum[j, 0] * normal
-        n1 -= momentum[j, 1] * normal
-        n2 -= momentum[j, 2] * normal
-        t0 -= momentum[j, 0] * tangent
-        t1 -= momentum[j, 1] * tangent
-        t2 -= momentum[j, 2] * tangent
-        j = parents[j]
+    for row in range(2 * place, 2 * place + 2):
+        left = 0.0, 0.0, 0.0
+        j = assembly.leaf[place]
+        while j >= 0:
+            m0, m1, m2 = spatial(motion, j)
+            entry = root[j] * (jacobian[row, j] + m0 * left[0] + m1 * left[1] + m2 * left[2])
+            half[j, row] = entry
+            left = plus(left, scaled(spatial(momentum, j), -root[j] * entry))
+            j = parents[j]
 
 
 @kernel

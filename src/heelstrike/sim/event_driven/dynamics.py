@@ -7,8 +7,6 @@ this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import passive_force
@@ -32,27 +30,13 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import share_redundant
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 from heelstrike.sim.record.recording import try_torque
 
 RANK_TOLERANCE = 1e-11
 """Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
-
-
-class Scene(NamedTuple):
-    """What the motion hangs on and never changes: who decides the torques, the robot, the ground.
-
-    Attributes
-    ----------
-    controller : function
-    model : Model
-    ground : GroundModel
-    """
-
-    controller: Any
-    model: Model
-    ground: GroundModel
 
 
 @kernel

@@ -20,12 +20,10 @@ from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, ga
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import log_event, note_residual
+from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
 
-TOUCHDOWN = int(EventKind.TOUCHDOWN)
 IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
-JOINT_STOP = int(EventKind.JOINT_STOP)
 
 # Velocities (m/s) up to which a point on the ground is at rest.
 REST = 1e-9

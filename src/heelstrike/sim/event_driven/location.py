@@ -21,8 +21,9 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import Scene, evaluate, look
+from heelstrike.sim.event_driven.dynamics import evaluate, look
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
 
 NO_EVENT = 2.0

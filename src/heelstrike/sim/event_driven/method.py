@@ -10,7 +10,7 @@ next phase; at a touchdown the impact law (eq. 20-22) first decides the velociti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,23 +36,18 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
-from heelstrike.sim.event_driven.dynamics import Scene, evaluate, project
+from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
 from heelstrike.sim.event_driven.impact import REST, collide, heading, strike
 from heelstrike.sim.event_driven.location import integrate, shortest_step
-from heelstrike.sim.event_driven.modes import (
-    JOINT_STOP,
-    adopt_modes,
-    form_groups,
-    report_modes,
-)
+from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
-from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels
+from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, contact_capacity
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import log_event, note_residual
+from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual
 from heelstrike.sim.record.size import check_room, check_steps
 from heelstrike.sim.setting import Setting
 
@@ -646,20 +641,12 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 @kernel
 def decide(
-    controller: Any,
-    model: Model,
-    ground: GroundModel,
-    control: Control,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
     """Decide the contact modes if an event or a jump of forces left them open."""
-    scene = Scene(controller, model, ground)
     phase.row_every = clock.record_every
     jumped, phase.next_push = switch_at(phase.time, memory.pushes)
-    for i in range(model.nu):
+    for i in range(scene.model.nu):
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
@@ -679,36 +666,21 @@ def decide(
 
 @kernel
 def report(
-    controller: Any,
-    model: Model,
-    ground: GroundModel,
-    control: Control,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> None:
     """Append a row at events, at the end, and at every step if no period is asked for."""
     every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
     last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
     if phase.undecided == 0 and (phase.at_event == 1 or last):
-        scene = Scene(controller, model, ground)
         write_row(scene, phase.time, phase.begin, control, memory, phase, record)
 
 
 @kernel
 def move(
-    controller: Any,
-    model: Model,
-    ground: GroundModel,
-    control: Control,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
     """Take a step to the next event, at the longest to where something is due."""
-    scene = Scene(controller, model, ground)
+    model, ground = scene.model, scene.ground
     if phase.finished == 0:
         stop = next_stop(phase, clock)
         if stop - phase.time < shortest_step(phase.time):

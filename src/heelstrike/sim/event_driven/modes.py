@@ -12,16 +12,18 @@ from heelstrike.sim.event_driven.dynamics import tangential_place
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Assembly, Reaction, Reported
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import log_event
+from heelstrike.sim.record.recording import (
+    JOINT_SLIP,
+    JOINT_STICK,
+    JOINT_STOP,
+    LIFTOFF,
+    SLIP,
+    STICK,
+    TOUCHDOWN,
+    log_event,
+)
 
-TOUCHDOWN = int(EventKind.TOUCHDOWN)
-LIFTOFF = int(EventKind.LIFTOFF)
-SLIP = int(EventKind.SLIP)
-STICK_EVENT = int(EventKind.STICK)
 REVERSAL = int(EventKind.SLIP_REVERSAL)
-JOINT_STOP = int(EventKind.JOINT_STOP)
-JOINT_SLIP = int(EventKind.JOINT_SLIP)
-JOINT_STICK = int(EventKind.JOINT_STICK)
 
 # Two normals are one when the sine of the angle between them is below this.
 PARALLEL = 1e-9
@@ -147,7 +149,7 @@ def report_modes(
                 if not starting:
                     log_event(time, TOUCHDOWN, contact, 0.0, 0.0, record)
             if now != before:
-                kind = SLIP if before == 0 else STICK_EVENT if now == 0 else REVERSAL
+                kind = SLIP if before == 0 else STICK if now == 0 else REVERSAL
                 log_event(time, kind, contact, 0.0, 0.0, record)
         was_closed[contact] = closed[contact]
         reported.slipping[contact] = now if closed[contact] == 1 else 0

@@ -14,10 +14,11 @@ positions first and the new velocity computed there, which is the same sequence 
 them with the new velocity at the end of each step.
 """
 
+# ruff: noqa: ARG001 - the kernels of all methods have the same arguments
+
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,7 @@ from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels
+from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
@@ -182,13 +183,7 @@ class TimeStepping(Method):
 
 
 @dissolved_kernel
-def begin(
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,  # noqa: ARG001
-    work: Stepping,  # noqa: ARG001
-    record: Record,  # noqa: ARG001
-) -> int:
+def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
     """Begin: there is nothing to prepare."""
     return DONE
 
@@ -519,16 +514,10 @@ def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
 
 @dissolved_kernel
 def decide(
-    controller: Any,  # noqa: ARG001 - asked by the frame
-    model: Model,
-    ground: GroundModel,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
+    model = scene.model
     free_velocity(model, work, clock.time, memory)
     solved = solve_contacts(model, work, memory)
     note_extremes(model, memory)
@@ -538,14 +527,7 @@ def decide(
 
 @dissolved_kernel
 def report(
-    controller: Any,  # noqa: ARG001
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,  # noqa: ARG001
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> None:
     """Append a row if one is due."""
     note_row_when_due(record, memory, clock)
@@ -553,16 +535,10 @@ def report(
 
 @dissolved_kernel
 def move(
-    controller: Any,  # noqa: ARG001
-    model: Model,
-    ground: GroundModel,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,
-    record: Record,  # noqa: ARG001
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
     """Move on by a step."""
+    model = scene.model
     q, v, next_v = memory.q, memory.v, memory.next_v
     memory.tally.steps += 1
     if work.scheme == MOREAU_JEAN:
