@@ -183,11 +183,11 @@ def test_operations_are_those_that_are_recorded() -> None:
         state_equations,
         {
             "model": robot.model, "q": vector, "v": vector,
-            "work": Workspace.allocate(**robot.model.extents),
+            "tree": Workspace.allocate(**robot.model.extents),
             "matrix": matrix, "factor": matrix, "bias": vector,
         },
     )  # fmt: skip
-    recording = Recording(equations, known={"work.zero": np.zeros(robot.nv)})
+    recording = Recording(equations, known={"tree.zero": np.zeros(robot.nv)})
     results = [value for value in recording.tape.values if isinstance(value, Result)]
     count = Counter(value.operation for value in results)
     sines = count[Operation.SINE]

@@ -401,14 +401,14 @@ def state_equations(
     model: Model,
     q: Floats,
     v: Floats,
-    work: Workspace,
+    tree: Workspace,
     matrix: Floats,
     factor: Floats,
     bias: Floats,
 ) -> None:
     """Everything that follows from a state: kinematics, factor of the mass matrix, bias force."""
-    forward_kinematics(model, q, work)
-    link_velocities(model, v, work)
-    mass_matrix(model, work, matrix)
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    mass_matrix(model, tree, matrix)
     factorize(model, matrix, factor)
-    bias_force(model, work, bias)
+    bias_force(model, tree, bias)

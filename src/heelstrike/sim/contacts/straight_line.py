@@ -72,17 +72,13 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     pairs = np.zeros((model.nc, 2))
     known: dict[str, Any] = {
         "model": model, "q": np.zeros(model.nq), "v": np.zeros(nv), "x": np.zeros(nv),
-        "tree": Workspace.allocate(**extents), "work": Workspace.allocate(**extents),
+        "tree": Workspace.allocate(**extents),
         "matrix": np.zeros((nv, nv)), "factor": np.zeros((nv, nv)), "bias": np.zeros(nv),
         "points": points, "contacts": Contacts.allocate(**extents),
         "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((2 * size, 2 * size)),
         "velocity": pairs, "impulse": pairs, "force": np.zeros(nv),
     }  # fmt: skip
-    scratch = [
-        f"{tree}.{name}"
-        for tree in ("tree", "work")
-        for name in ("acceleration", "force", "composite", "zero")
-    ]
+    scratch = [f"tree.{name}" for name in ("acceleration", "force", "composite", "zero")]
     programs[:count] = straight_line_code(
         [
             Program(
@@ -92,6 +88,6 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
             )
             for kernel in KERNELS[:count]
         ],
-        known={"work.zero": np.zeros(nv)},
+        known={"tree.zero": np.zeros(nv)},
     )
     return programs

@@ -252,7 +252,7 @@ def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) 
 
 
 @dissolved_kernel
-def select_points(model: Model, work: Stepping, memory: Memory) -> int:
+def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
     """List the contact points that could act in this step, with their free terms."""
     contacts, assembly, step = memory.contacts, memory.assembly, work.step
     candidate, problem = assembly.candidate, assembly.problem
@@ -452,7 +452,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
     assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
-    near = select_points(model, work, memory)
+    near = select_candidates(model, work, memory)
     joints = select_stops(model, work, near, memory)
     count = select_dry_joints(
         model, joints, dry_joint, memory.reaction.dry_mode, memory.next_v, assembly
