@@ -176,3 +176,29 @@ def written_by(kernel: Kernel) -> frozenset[str]:
     finally:
         _being_read.pop()
     return frozenset(reading.written & set(arguments_of(kernel)))
+
+
+@cache
+def members_touched(kernel: Kernel, kind: type) -> frozenset[str]:
+    """Return the members of a bundle of a class that a kernel uses, itself or by what it calls."""
+    definition = definition_of(kernel)
+    names = set(arguments_of_kind(kernel, kind))
+    found: set[str] = set()
+    for node in ast.walk(definition):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            found |= {node.attr} if node.value.id in names else set()
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            called = kernel.py_func.__globals__.get(node.func.id)
+            handed = {value.id for value in node.args if isinstance(value, ast.Name)} & names
+            if isinstance(called, Kernel) and handed:
+                found |= members_touched(called, kind)
+    return frozenset(found)
+
+
+def arguments_of_kind(kernel: Kernel, kind: type) -> list[str]:
+    """Return the names of the arguments that are annotated with a class."""
+    return [
+        argument.arg
+        for argument in definition_of(kernel).args.args
+        if isinstance(argument.annotation, ast.Name) and argument.annotation.id == kind.__name__
+    ]

@@ -5,7 +5,14 @@ from __future__ import annotations
 import ast
 
 import pytest
-from written_arguments import arguments_of, definition_of, kernels_of, written_by
+from written_arguments import (
+    arguments_of,
+    arguments_of_kind,
+    definition_of,
+    kernels_of,
+    members_touched,
+    written_by,
+)
 
 import heelstrike.contact
 import heelstrike.dynamics
@@ -62,6 +69,15 @@ def test_a_method_writes_to_what_is_its_own(each: Kernel) -> None:
     last = [name for name in arguments if name not in FIRST_OF_A_METHOD]
     assert arguments[-len(last) :] == last
     assert written_by(each) <= set(last)
+
+
+@pytest.mark.parametrize(
+    "each",
+    [k for k in ALL if k not in OF_METHODS and arguments_of_kind(k, Memory)],
+    ids=named,
+)
+def test_the_whole_memory_goes_only_where_several_of_its_bundles_do(each: Kernel) -> None:
+    assert len(members_touched(each, Memory)) > 1
 
 
 @kernel

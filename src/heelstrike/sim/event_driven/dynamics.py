@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
+from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -35,9 +36,6 @@ from heelstrike.sim.memory import Assembly, Equations, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 from heelstrike.sim.record.recording import try_torque
 
-RANK_TOLERANCE = 1e-11
-"""Pivots below this, relative to the largest entry, count as zero: the forces are ambiguous."""
-
 
 @kernel
 def tangential_place(model: Model, tree: Workspace, contacts: Contacts, contact: int) -> float:
@@ -45,52 +43,6 @@ def tangential_place(model: Model, tree: Workspace, contacts: Contacts, contact:
     position, normal = contacts.position[contact], contacts.normal[contact]
     rolled = model.contact_radius[contact] * tree.angle[model.contact_link[contact]]
     return normal[1] * position[0] - normal[0] * position[1] - rolled
-
-
-@kernel
-def solve_system(size: int, system: Floats, column: Integers, unknown: Floats) -> int:
-    """Solve linear equations, their right-hand side in the last column, by complete pivoting.
-
-    Returns the rank; unknowns that the equations leave free are zero.
-    """
-    largest = 0.0
-    for i in range(size):
-        column[i] = i
-        unknown[i] = 0.0
-        for j in range(size):
-            largest = max(largest, abs(system[i, j]))
-    rank = size
-    for k in range(size):
-        best = RANK_TOLERANCE * largest
-        row = -1
-        place = -1
-        for i in range(k, size):
-            for j in range(k, size):
-                if abs(system[i, j]) > best:
-                    best = abs(system[i, j])
-                    row = i
-                    place = j
-        if row < 0:
-            rank = k
-            break
-        if row != k:
-            for j in range(size + 1):
-                system[k, j], system[row, j] = system[row, j], system[k, j]
-        if place != k:
-            column[k], column[place] = column[place], column[k]
-            for i in range(size):
-                system[i, k], system[i, place] = system[i, place], system[i, k]
-        for i in range(k + 1, size):
-            ratio = system[i, k] / system[k, k]
-            if ratio != 0.0:
-                for j in range(k + 1, size + 1):
-                    system[i, j] -= ratio * system[k, j]
-    for k in range(rank - 1, -1, -1):
-        total = system[k, size]
-        for j in range(k + 1, rank):
-            total -= system[k, j] * unknown[column[j]]
-        unknown[column[k]] = total / system[k, k]
-    return rank
 
 
 @kernel
@@ -269,7 +221,7 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
     constraint_matrix(size, 1.0, assembly.problem.delassus, phase)
     for i in range(size):
         phase.system[i, size] = -assembly.problem.free[phase.row[i]]
-    rank = solve_system(size, phase.system, phase.column, phase.unknown)
+    rank = solve_to_rank(size, phase.system, phase.column, phase.unknown)
     phase.deficient = 1 if rank < size else 0
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
@@ -365,7 +317,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
             for i in range(size):
                 system[i, size] = -row_product(assembly.jacobian, row[i], v)
         constraint_matrix(size, 0.0, assembly.problem.delassus, phase)
-        solve_system(size, system, phase.column, phase.unknown)
+        solve_to_rank(size, system, phase.column, phase.unknown)
         for i in range(2 * count):
             assembly.answer.impulse[i] = 0.0
         for i in range(size):
