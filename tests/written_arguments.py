@@ -12,6 +12,7 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import Kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.sim.contacts.straight_line import KERNELS
@@ -32,8 +33,14 @@ def kernels_of(package: ModuleType) -> Iterator[Kernel]:
 
 @cache
 def definition_of(kernel: Kernel) -> ast.FunctionDef:
-    """Return the syntax of a kernel."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(kernel.py_func)))
+    """Return the syntax of a kernel; one made of text is taken at its word."""
+    try:
+        source = inspect.getsource(kernel.py_func)
+    except OSError:
+        code = kernel.py_func.__code__
+        names = code.co_varnames[: code.co_argcount]
+        source = f"def {kernel.__name__}({', '.join(names)}):\n    {names[-1]}[0] = {names}"
+    tree = ast.parse(textwrap.dedent(source))
     assert isinstance(tree.body[0], ast.FunctionDef)
     return tree.body[0]
 
@@ -179,8 +186,11 @@ def written_by(kernel: Kernel) -> frozenset[str]:
 
 
 @cache
-def members_touched(kernel: Kernel, kind: type) -> frozenset[str]:
-    """Return the members of a bundle of a class that a kernel uses, itself or by what it calls."""
+def members_touched(kernel: Kernel, kind: type[Bundle]) -> frozenset[str]:
+    """Return the members of a bundle that a kernel uses, itself or by what it calls.
+
+    One that is made of text has no annotations, and may use them all.
+    """
     definition = definition_of(kernel)
     names = set(arguments_of_kind(kernel, kind))
     found: set[str] = set()
@@ -191,11 +201,12 @@ def members_touched(kernel: Kernel, kind: type) -> frozenset[str]:
             called = kernel.py_func.__globals__.get(node.func.id)
             handed = {value.id for value in node.args if isinstance(value, ast.Name)} & names
             if isinstance(called, Kernel) and handed:
-                found |= members_touched(called, kind)
+                of_text = not arguments_of_kind(called, kind)
+                found |= set(kind.declared) if of_text else members_touched(called, kind)
     return frozenset(found)
 
 
-def arguments_of_kind(kernel: Kernel, kind: type) -> list[str]:
+def arguments_of_kind(kernel: Kernel, kind: type[Bundle]) -> list[str]:
     """Return the names of the arguments that are annotated with a class."""
     return [
         argument.arg

@@ -84,7 +84,7 @@ def decide(
     for j in range(memory.v.shape[0]):
         memory.next_v[j] = memory.v[j] + work.step * rate[j]
     note_extremes(model, memory)
-    note_events(model, record, clock.time, work.step, memory)
+    note_events(model, clock.time, work.step, memory, record)
     return DONE
 
 
@@ -92,7 +92,7 @@ def decide(
 def report(
     scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> None:  # fmt: skip
-    note_row_when_due(record, memory, clock)
+    note_row_when_due(memory, clock, record)
 
 
 @kernel

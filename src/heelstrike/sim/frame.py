@@ -177,7 +177,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     report(scene, control, memory, work, record, clock)
                 if code != DONE:
                     return code
-                if center_height(model, ground, memory) < clock.fallen_height:
+                if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
                     return FELL
                 if clock.finishing == 1:
                     return DONE

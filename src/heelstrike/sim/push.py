@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -166,18 +167,15 @@ class Pushes(Bundle):
 def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:
     """Return the arrays of some pushes on a robot."""
     numbers = numbers_of_pushes(robot, pushes)
-    start, duration = numbers["window"].T
-    return Pushes.allocate(
-        np=len(pushes), axes=2, link=numbers["link"].astype(np.int64), point=numbers["point"],
-        force=numbers["force"], start=start.copy(), end=start + duration,
-    )  # fmt: skip
+    start, duration = numbers.pop("window").T.copy()
+    return Pushes.allocate(np=len(start), axes=2, start=start, end=start + duration, **numbers)
 
 
-def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Floats]:
+def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Any]:
     """Return some pushes on a robot as arrays that :func:`pushes_of_numbers` makes them of."""
     places = [push.place(robot) for push in pushes]
     return {
-        "link": np.array([link for link, _ in places], dtype=np.float64),
+        "link": np.array([link for link, _ in places], dtype=np.int64),
         "point": np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
         "force": np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
         "window": np.array([(p.start, p.duration) for p in pushes], dtype=np.float64).reshape(

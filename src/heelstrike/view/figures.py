@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
+from heelstrike.view.quantity_figure import draw_quantity
 from heelstrike.view.style import save_figure, styled
 
 if TYPE_CHECKING:
@@ -66,7 +67,8 @@ def plot(
     what : str
         One of :data:`FIGURES`: ``"tracking"``, ``"velocities"``, ``"zmp"`` and ``"friction"`` are
         the paper's Figures 3 to 6; ``"forces"``, ``"torque"``, ``"gaps"``, ``"energy"``,
-        ``"snapshots"``.
+        ``"snapshots"``. Or the name of an array of the run, such as ``"slip_velocity"``, which is
+        drawn as it is.
     gait : Gait, optional
         The gait that the run followed; without it no references are drawn.
     path : str or path, optional
@@ -87,11 +89,14 @@ def plot(
     GaitError
         If the gait does not fit the robot of the run.
     """
-    if what not in _DRAWINGS:
+    if what not in _DRAWINGS and what not in QUANTITIES:
         raise ViewError(_unknown(what))
     rows = _rows(run, span)
     with styled():
-        figure = _DRAWINGS[what][1](run, gait, rows)
+        if what in _DRAWINGS:
+            figure = _DRAWINGS[what][1](run, gait, rows)
+        else:
+            figure = draw_quantity(run, what, rows)
     if path is not None:
         save_figure(figure, path)
     return figure
@@ -117,7 +122,10 @@ def _rows(run: Run, span: tuple[float, float] | None) -> slice:
 
 
 def _unknown(what: str) -> str:
-    near = difflib.get_close_matches(str(what).lower(), FIGURES, n=1)
+    near = difflib.get_close_matches(str(what).lower(), (*FIGURES, *QUANTITIES), n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
     names = "; ".join(f"{name}: {words}" for name, (words, _) in _DRAWINGS.items())
-    return f"there is no figure called {what!r}.{guess} There are {names}."
+    return (
+        f"there is no figure called {what!r}.{guess} There are {names}; and what is recorded: "
+        f"{', '.join(QUANTITIES)}."
+    )

@@ -224,7 +224,7 @@ def compliant_workspace(
 def command(controller: Any, control: Control, time: float, model: Model, memory: Memory) -> None:
     """Ask the controller for its torques at the state now, within their limits."""
     ask(controller, time, memory.q, memory.v, model, memory, control, memory.torque)
-    try_torque(model, memory.q, memory.v, memory.torque, memory)
+    try_torque(model, memory.q, memory.v, memory.tally, memory.torque)
 
 
 @kernel
@@ -233,7 +233,7 @@ def try_command(
 ) -> None:
     """Torques that a controller would ask for, were this its next call; it remembers nothing."""
     consult(controller, time, memory.q, memory.v, model, memory, control, torque)
-    try_torque(model, memory.q, memory.v, torque, memory)
+    try_torque(model, memory.q, memory.v, memory.tally, torque)
 
 
 @kernel

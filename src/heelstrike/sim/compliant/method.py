@@ -216,7 +216,7 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
 
 
 @kernel
-def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace) -> float:
+def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspace) -> float:
     """Part of the step after which the first contact point that fell into the ground met it.
 
     One, if none began the step above the ground and ended it deeper than `depth`. The stages of a
@@ -224,7 +224,7 @@ def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace
     """
     first = 1.0
     for contact in range(model.contact_link.shape[0]):
-        gap = memory.contacts.gap[contact]
+        gap = gap_now[contact]
         before = work.base_gap[contact]
         if before > depth and gap < -depth:
             first = min(first, before / (before - gap))
@@ -232,13 +232,13 @@ def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace
 
 
 @kernel
-def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> float:
+def cone_residual(model: Model, friction: Floats, work: CompliantWorkspace) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
     for contact in range(model.contact_link.shape[0]):
         normal = work.force[contact, 0]
         tangent = abs(work.force[contact, 1])
-        excess = max(-normal, tangent - memory.surface.friction[contact] * normal)
+        excess = max(-normal, tangent - friction[contact] * normal)
         if excess > 0.0:
             worst = max(worst, excess / (abs(normal) + tangent))
     return worst
@@ -261,7 +261,7 @@ def sample(
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] = 0.0
         work.dry_impulse[joint] = 0.0
-    memory.assembly.answer.residual[1] = cone_residual(model, memory, work)
+    memory.assembly.answer.residual[1] = cone_residual(model, memory.surface.friction, work)
     span = work.step
     elapsed = 0.0
     h = work.proposed
@@ -293,7 +293,7 @@ def sample(
             rejected = True
             continue
         observe(model, ground, memory.q, memory.v, memory)
-        met = landing(model, work.atol, memory, work)
+        met = landing(model, work.atol, memory.contacts.gap, work)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
@@ -302,7 +302,7 @@ def sample(
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
         memory.assembly.answer.residual[1] = max(
-            memory.assembly.answer.residual[1], cone_residual(model, memory, work)
+            memory.assembly.answer.residual[1], cone_residual(model, memory.surface.friction, work)
         )
         memory.tally.steps += 1
         work.age += 1
@@ -329,23 +329,24 @@ def sample(
 
 @kernel
 def note_events(
-    model: Model, record: Record, time: float, memory: Memory, work: CompliantWorkspace
+    model: Model, time: float, work: CompliantWorkspace, memory: Memory, record: Record
 ) -> None:
     """Note what happened since the last sample; `time` is now.
 
     Touchdown and lift-off are timed where the gap passes zero, stick and slip to the sample.
     """
+    force = memory.contacts.force
     for contact in range(model.contact_link.shape[0]):
         touched = work.touched[contact]
         left = work.left[contact]
         if touched >= 0.0 or left >= 0.0:
             memory.reported.slipping[contact] = 0
         if left >= 0.0 and left < touched:
-            note_event(record, left, LIFTOFF, contact, memory)
+            note_event(left, LIFTOFF, contact, work.step, force, record)
         if touched >= 0.0:
-            note_event(record, touched, TOUCHDOWN, contact, memory)
+            note_event(touched, TOUCHDOWN, contact, work.step, force, record)
         if left >= 0.0 and left >= touched:
-            note_event(record, left, LIFTOFF, contact, memory)
+            note_event(left, LIFTOFF, contact, work.step, force, record)
         if left >= 0.0 or work.force[contact, 0] <= 0.0:
             continue
         sliding = slips(
@@ -357,30 +358,30 @@ def note_events(
         )
         if sliding and memory.reported.slipping[contact] == 0:
             memory.reported.slipping[contact] = 1
-            note_event(record, time, SLIP, contact, memory)
+            note_event(time, SLIP, contact, work.step, force, record)
         elif not sliding and memory.reported.slipping[contact] == 1:
             memory.reported.slipping[contact] = 0
-            note_event(record, time, STICK, contact, memory)
+            note_event(time, STICK, contact, work.step, force, record)
     for joint in range(model.parent.shape[0]):
         pressed = memory.reaction.stop_torque[joint] != 0.0
         if pressed and memory.reported.stopped[joint] == 0:
-            impulse = abs(memory.reaction.stop_torque[joint])
+            impulse = abs(memory.reaction.stop_torque[joint]) * work.step
             log_event(time, JOINT_STOP, joint, impulse, 0.0, record)
         memory.reported.stopped[joint] = 1 if pressed else 0
 
 
 @kernel
 def note_forces(
-    record: Record, row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory
+    row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory, record: Record
 ) -> None:
     """Write the forces of contacts and joints, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
     for contact in range(force.shape[0]):
-        record.force[row, contact, 0] = force[contact, 0]
-        record.force[row, contact, 1] = force[contact, 1]
-        record.slip[row, contact] = memory.reaction.slip[contact]
+        record.contact_force[row, contact, 0] = force[contact, 0]
+        record.contact_force[row, contact, 1] = force[contact, 1]
+        record.slip_velocity[row, contact] = memory.reaction.slip[contact]
     record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
@@ -423,9 +424,9 @@ def report(
     clock: Clock,
 ) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
-    work.row = note_row_when_due(record, memory, clock)
+    work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
-        note_forces(record, work.row, work.force, work.stop_force, work.dry_force, memory)
+        note_forces(work.row, work.force, work.stop_force, work.dry_force, memory, record)
 
 
 @kernel
@@ -439,17 +440,13 @@ def move(
     if code != DONE:
         return code
     step = work.step
-    first = record.events
-    note_events(model, record, clock.time + step, memory, work)
-    for place in range(first, record.events):
-        record.event_impulse[place, 0] *= step
-        record.event_impulse[place, 1] *= step
+    note_events(model, clock.time + step, work, memory, record)
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
         reaction = memory.reaction
         note_forces(
-            record, work.row, memory.contacts.force, reaction.stop_torque,
-            reaction.friction_torque, memory,
+            work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
+            memory, record,
         )  # fmt: skip
     if control.continuous == 1:
         for contact in range(model.contact_link.shape[0]):

@@ -256,7 +256,7 @@ def evaluate(
     watch_geometry(model, equations.tree, memory.contacts, state, phase)
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.torque)
-        try_torque(model, q, v, memory.torque, memory)
+        try_torque(model, q, v, memory.tally, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
     count = gather_closed(model, memory.contacts, phase, equations, assembly)
     phase.closed_count = count

@@ -47,7 +47,7 @@ from heelstrike.sim.memory import Assembly, Memory, Reported, contact_capacity
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual
+from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual, note_row
 from heelstrike.sim.record.size import check_room, check_steps
 from heelstrike.sim.setting import Setting
 
@@ -231,28 +231,17 @@ class EventDriven(Method):
 
 
 @kernel
-def copy_row(
-    time: float, state: Floats, torque: Floats, contacts: Contacts, residual: Floats, record: Record
-) -> None:
-    """Copy everything but the contact forces to the next row of the record."""
-    row, nv = record.rows, record.q.shape[1]
-    record.time[row] = time
-    for i in range(nv):
-        record.q[row, i] = state[i]
-        record.v[row, i] = state[nv + i]
+def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
+    """Write a state to a row, where no force acts as yet."""
+    for i in range(model.nv):
+        record.position[row, i] = state[i]
+        record.velocity[row, i] = state[model.nq + i]
         record.stop_torque[row, i] = 0.0
         record.friction_torque[row, i] = 0.0
-    for i in range(torque.shape[0]):
-        record.torque[row, i] = torque[i]
-    for i in range(contacts.gap.shape[0]):
-        for k in range(2):
-            record.point[row, i, k] = contacts.position[i, k]
-            record.normal[row, i, k] = contacts.normal[i, k]
-            record.force[row, i, k] = 0.0
-        record.gap[row, i] = contacts.gap[i]
-        record.slip[row, i] = 0.0
-    for k in range(3):
-        record.residual[row, k] = residual[k]
+    for contact in range(model.nc):
+        record.contact_force[row, contact, 0] = 0.0
+        record.contact_force[row, contact, 1] = 0.0
+        record.slip_velocity[row, contact] = 0.0
 
 
 @kernel
@@ -274,8 +263,9 @@ def write_row(
         friction, guess = memory.surface.friction, memory.reaction.mode
         solve_candidates(count, True, friction, guess, phase, assembly)
         note_residual(residual, memory.tally)
-    copy_row(time, trial, memory.torque, contacts, residual, record)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
+    note_row(time, memory, record)
+    note_state(model, row, trial, record)
     slide = phase.slide[phase.first_dry :]
     dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
     for contact in range(model.nc):
@@ -290,12 +280,11 @@ def write_row(
             stop = contact - model.nc
             record.stop_torque[row, phase.stop_joint[stop]] += phase.stop_side[stop] * normal
         else:
-            record.force[row, contact, 0] = normal
-            record.force[row, contact, 1] = tangent
-            _, record.slip[row, contact] = contact_velocity(
+            record.contact_force[row, contact, 0] = normal
+            record.contact_force[row, contact, 1] = tangent
+            _, record.slip_velocity[row, contact] = contact_velocity(
                 model, memory.equations.tree, contacts, contact
             )
-    record.rows = row + 1
     phase.last_row = time
     period = phase.output_period * phase.row_every
     if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from heelstrike.errors import RunFileError, WriteError
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset, unreadable
+from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset
 from heelstrike.sim.files.hdf5_contents import (
     Contents,
     HostileFileError,
@@ -24,6 +24,7 @@ from heelstrike.sim.files.hdf5_contents import (
 )
 from heelstrike.sim.files.robot_dataset import robot_to_dataset
 from heelstrike.sim.files.seal import seal, seal_holds
+from heelstrike.sim.files.settings import unreadable
 from heelstrike.sim.files.stored_run import stored_run
 from heelstrike.sim.run import Run
 from heelstrike.whole_file import write_whole

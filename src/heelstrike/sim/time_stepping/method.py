@@ -521,7 +521,7 @@ def decide(
     free_velocity(model, work, clock.time, memory)
     solved = solve_contacts(model, work, memory)
     note_extremes(model, memory)
-    note_events(model, record, clock.time, work.step, memory)
+    note_events(model, clock.time, work.step, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 
@@ -530,7 +530,7 @@ def report(
     scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> None:
     """Append a row if one is due."""
-    note_row_when_due(record, memory, clock)
+    note_row_when_due(memory, clock, record)
 
 
 @dissolved_kernel
