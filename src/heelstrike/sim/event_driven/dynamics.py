@@ -7,7 +7,7 @@ this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of th
 
 from __future__ import annotations
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import passive_force
@@ -74,7 +74,7 @@ def constraint_matrix(size: int, friction: float, delassus: Floats, phase: Phase
             phase.system[i, j] = entry
 
 
-@kernel
+@dissolved_kernel
 def friction_limit(
     leader: int, first: int, count: int, assembly: Assembly, friction: Floats, phase: Phase
 ) -> float:
@@ -87,7 +87,7 @@ def friction_limit(
     return limit
 
 
-@kernel
+@dissolved_kernel
 def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase) -> None:
     """Write the force of every contact point, that of a group split like its normal forces."""
     candidate, impulse, force = assembly.candidate, assembly.answer.impulse, phase.force
@@ -143,7 +143,7 @@ def watch_geometry(
             value[2 * contact + 1] = phase.slide[contact] * tangent
 
 
-@kernel
+@dissolved_kernel
 def watch_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase) -> None:
     """Event functions of closed points: normal forces, and what is left to the friction limit."""
     delassus, free = assembly.problem.delassus, assembly.problem.free
@@ -163,7 +163,7 @@ def watch_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
             phase.rate[2 * contact + 1] = phase.slide[contact] * acceleration
 
 
-@kernel
+@dissolved_kernel
 def free_acceleration(
     model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
 ) -> None:
@@ -203,7 +203,7 @@ def gather_closed(
     return count
 
 
-@kernel
+@dissolved_kernel
 def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory: Memory) -> None:
     """Contact forces that keep the modes of the candidates, and the acceleration under them."""
     assembly, impulse = memory.assembly, memory.assembly.answer.impulse

@@ -7,7 +7,7 @@ contact points, dry joints from the stops, and these kernels tell them apart.
 
 from __future__ import annotations
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.sets import press
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
@@ -55,7 +55,7 @@ def gap_rows(
         write_unit_row(phase.dry_joint[dry], 2 * place + 1, 1.0, assembly)
 
 
-@kernel
+@dissolved_kernel
 def free_gap_acceleration(
     model: Model, contacts: Contacts, equations: Equations, contact: int, place: int, phase: Phase,
     assembly: Assembly,
