@@ -12,6 +12,7 @@ Kernels written into the class are its methods, in compiled code as in Python.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import math
 import re
@@ -534,7 +535,12 @@ def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
     return kind(**members)
 
 
-def _address(array: np.ndarray[Any, Any]) -> int:
+_NOTHING = ctypes.c_char * 0
+
+
+def _address(array: Any) -> int:
+    if array.flags.writeable:  # four times as quick
+        return ctypes.addressof(_NOTHING.from_buffer(array))
     address: int = array.__array_interface__["data"][0]
     return address
 

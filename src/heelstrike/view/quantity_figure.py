@@ -6,27 +6,29 @@ from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
 from heelstrike.sim.files.dataset import DIMENSIONS, labels
-from heelstrike.sim.run import QUANTITIES, Run
-from heelstrike.view.style import figure_title, new_figure, time_axis
+from heelstrike.sim.run import QUANTITIES
+from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels
 
 
-def draw_quantity(run: Run, name: str, rows: slice) -> Figure:
+def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
     """Draw a line for each coordinate, actuator or contact point, a panel for each component."""
-    quantity = QUANTITIES[name]
+    run, quantity = excerpt.run, QUANTITIES[name]
     along = [DIMENSIONS[extent] for extent in quantity.shape]
     names = [labels(run.robot)[dimension] for dimension in along]
     if not names[0]:
         raise ViewError(f"robot {run.robot.name!r} has no {along[0]}s: there is nothing to show")
     components = names[1] if len(names) > 1 else [""]
-    values = getattr(run, name)[rows].reshape(-1, len(names[0]), len(components))
-    figure = new_figure(9.0, 1.2 + 2.6 * len(components))
-    panels = figure.subplots(len(components), 1, sharex=True, squeeze=False).ravel()
-    for k, axes in enumerate(panels):
-        for i, line in enumerate(names[0]):
-            axes.plot(run.time[rows], values[:, i, k], label=line.replace("_", " "))
-        axes.set_title(components[k], loc="left")
-        axes.set_ylabel(quantity.unit)
-        time_axis(axes, run.time[rows], labelled=axes is panels[-1])
-    panels[0].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
-    figure_title(figure, run.robot, quantity.label)
-    return figure
+    values = getattr(run, name).reshape(len(run.time), len(names[0]), len(components))
+    panels = [
+        Panel(
+            quantity.unit,
+            [
+                Curve(values[:, i, k], each.replace("_", " "), {"linewidth": THIN})
+                for i, each in enumerate(names[0])
+            ],
+            title=component,
+        )
+        for k, component in enumerate(components)
+    ]
+    height = 1.2 + 2.6 * len(panels)
+    return draw_panels(excerpt, quantity.label, panels, height=height, legends=False)
