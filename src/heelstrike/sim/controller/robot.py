@@ -152,7 +152,7 @@ class ControlledRobot(Bundle):
         """Jacobian (2, nv) of a contact point: along the ground's normal, then its tangent."""
         link, normal = self.model.contact_link[contact], contacts.normal[contact]
         write_point_rows(
-            self.model, state.kinematics, link, contacts.position[contact], normal, jacobian, 0
+            self.model, state.kinematics, link, contacts.position[contact], normal, 0, jacobian
         )
 
     @kernel
