@@ -113,7 +113,7 @@ def motion(
         q,
         v,
         point,
-        Workspace.allocate(**robot.model.extents),
+        Workspace.allocate(robot.model.extents),
         result.link_origin,
         result.link_angle,
         result.center_of_mass,

@@ -106,12 +106,12 @@ class ReadyLaw:
         shown: dict[str, Any] = {}
         self._shown: dict[str, Bundle] = {}
         if law.function.is_ours and tree is not None and contacts is not None:
-            shown["state"] = ControlState.allocate(kinematics=tree, **extents)
+            shown["state"] = ControlState.allocate(extents, kinematics=tree)
             shown["contacts"] = contacts
             shown["robot"] = controlled_robot(robot)
         else:
-            shown["state"] = guarded_bundle(ControlState.allocate(**extents))
-            shown["contacts"] = guarded_bundle(Contacts.allocate(**extents))
+            shown["state"] = guarded_bundle(ControlState.allocate(extents))
+            shown["contacts"] = guarded_bundle(Contacts.allocate(extents))
             shown["robot"] = guarded_bundle(controlled_robot(robot))
             self._shown = shown
         self.control = Control(
