@@ -9,7 +9,6 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 from numba.core.types.functions import BaseFunction
@@ -89,12 +88,13 @@ def test_what_has_passed_is_not_tested_again(
         PrivateNumba().test()
 
 
-def private_names(module: ModuleType) -> list[tuple[str, str]]:
-    """Modules and names that a module of ours takes from inside Numba."""
-    tree = ast.parse(Path(str(module.__file__)).read_text())
+def private_names() -> list[tuple[str, str]]:
+    """Modules and names that modules of ours take from inside Numba."""
+    files = (Path(str(module.__file__)) for module in (private_numba, private_members))
     return [
         (node.module, name.name)
-        for node in ast.walk(tree)
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text()))
         if isinstance(node, ast.ImportFrom)
         and node.module is not None
         and node.module.startswith(("numba.core", "numba.np"))
@@ -128,7 +128,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("kept")
 
 
-@pytest.mark.parametrize(("module", "name"), private_names(private_numba))
+@pytest.mark.parametrize(("module", "name"), private_names())
 def test_without_any_of_them_kernels_compute_the_same_after_one_warning(
     kept: Path, module: str, name: str
 ) -> None:
@@ -136,16 +136,6 @@ def test_without_any_of_them_kernels_compute_the_same_after_one_warning(
     assert out == f"DocumentedNumba {COMPUTED}"
     assert len(warnings) == 1
     assert "CompilerWarning: Numba" in warnings[0]
-
-
-@pytest.mark.parametrize("switch", ["", "1"])
-@pytest.mark.parametrize(("module", "name"), private_names(private_members))
-def test_members_of_bundles_are_found_without_any_of_them(
-    tmp_path: Path, module: str, name: str, switch: str
-) -> None:
-    way = "DocumentedNumba" if switch else "PrivateNumba"
-    found = told(tmp_path, GONE.format(module=module, name=name), switch)
-    assert found == (f"{way} {COMPUTED}", [])
 
 
 def test_no_other_module_takes_names_from_inside_numba() -> None:

@@ -26,11 +26,8 @@ Result = TypeVar("Result")
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 """Division by zero follows IEEE 754 instead of raising, and the GIL is released."""
 
-_SETTINGS = ("OPT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
-"""Settings of Numba (``NUMBA_OPT`` and so on) that shape machine code."""
-
-_OPTIMISATION = 1
-"""Every kernel is optimised again in each that calls it: 3 takes a quarter more time to compile."""
+_SETTINGS = ("LOOP_VECTORIZE", "SLP_VECTORIZE", "BOUNDSCHECK", "DEBUGINFO_DEFAULT")
+"""Settings of Numba (``NUMBA_BOUNDSCHECK`` and so on) that shape machine code, beside its level."""
 
 _alive: list[Any] = []
 """Functions whose addresses are known: they hold the code."""
@@ -45,10 +42,18 @@ class DocumentedNumba:
     shaping: tuple[str, ...] = ("heelstrike.compiler.bundle_type", __name__)
     """Modules that shape the machine code of every kernel."""
 
+    level: int = 1
+    """Highest level of optimisation; ``NUMBA_OPT`` may be less.
+
+    Every kernel is optimised again in each that calls it: that costs time.
+    """
+
     def made_of(self, function: Callable[..., Any]) -> str:
         """Return the fingerprint of a kernel and of what compiles it."""
         settings = (str(getattr(config, name, None)) for name in _SETTINGS)
-        return fingerprint(function, *settings, *map(import_module, self.shaping))
+        return fingerprint(
+            function, str(self._level()), *settings, *map(import_module, self.shaping)
+        )
 
     def declare(self, kind: Any) -> None:
         """Have compiled code find the members and methods of a type of bundles.
@@ -76,7 +81,7 @@ class DocumentedNumba:
         """Make a call that compiles something."""
         settings: Any = config
         with kept_interrupts(), no_garbage_collection(), _directory:
-            usual, settings.OPT = settings.OPT, min(settings.OPT, _OPTIMISATION)
+            usual, settings.OPT = settings.OPT, self._level()
             try:
                 return call()
             except OSError as error:  # it is compiled, but could not be kept
@@ -84,6 +89,12 @@ class DocumentedNumba:
                 return call()
             finally:
                 settings.OPT = usual
+
+    def _level(self) -> Any:
+        settings: Any = config
+        return type(settings.OPT)(
+            min(settings.OPT, self.level)
+        )  # an integer that Numba asks questions
 
     def entry(self, compiled: Any, signature: Any) -> Callable[..., Any]:  # noqa: ARG002
         """Return what may be called with arguments of exactly the right types."""

@@ -55,7 +55,8 @@ from heelstrike.interruption import kept_interrupts
 class PrivateNumba(DocumentedNumba):
     """The same, in half the time."""
 
-    shaping = (*DocumentedNumba.shaping, __name__)
+    shaping = (*DocumentedNumba.shaping, "heelstrike.compiler.private_members", __name__)
+    level = 3
 
     def part(self, function: Callable[..., Any], *, dissolved: bool) -> Any:
         """Return a kernel without machine code of its own; it counts no references."""
