@@ -237,7 +237,6 @@ def test_code_made_with_other_settings_is_not_taken(tmp_path: Path, documented: 
     assert answer("1") == "refused 0"
     assert answer("0") == "read 0"
     assert answer("0") == "read 1"
-    assert answer("1") == "refused 1"
 
 
 FACTORY = """

@@ -62,8 +62,8 @@ class BundleType(types.Type):
         super().__init__(name=f"{cls.__name__}_{digest}")
 
     def __reduce__(self) -> Any:
-        """Machine code on disk knows it by the class of the bundle."""
-        return bundle_type, (self.cls,)
+        """Machine code on disk knows it by its name: a class of a script cannot be imported."""
+        return _named, (self.name,)
 
     def member(self, name: str) -> Any:
         """Type of a member or an extent, or None."""
@@ -118,8 +118,18 @@ def bundle_type(cls: Any) -> BundleType:
     kind: type[BundleType] = type(cls.__name__, (BundleType,), {})
     register_model(kind)(_BundleModel)
     made = kind(cls)
+    _made[made.name] = made
     numba_in_use().declare(made)
     return made
+
+
+_made: dict[str, BundleType] = {}
+"""Types by their names."""
+
+
+def _named(name: str) -> Any:
+    """Return the type of a name; of one that is not made here, what is equal to no other."""
+    return _made.get(name) or types.Opaque(name)
 
 
 def _member_type(member: Any) -> Any:
