@@ -183,7 +183,7 @@ def test_operations_are_those_that_are_recorded() -> None:
         state_equations,
         {
             "model": robot.model, "q": vector, "v": vector,
-            "tree": Workspace.allocate(**robot.model.extents),
+            "tree": Workspace.allocate(robot.model.extents),
             "matrix": matrix, "factor": matrix, "bias": vector,
         },
     )  # fmt: skip

@@ -41,11 +41,11 @@ def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
     """Arguments of all kernels at a random state; the arrays that carry results are shared."""
     rng = np.random.default_rng(seed)
     model, nv, nc = case.robot().model, case.robot().nv, case.robot().nc
-    tree = Workspace.allocate(**model.extents)
+    tree = Workspace.allocate(model.extents)
     matrix, factor = np.zeros((nv, nv)), np.zeros((nv, nv))
     q = model.reference + rng.uniform(-1.0, 1.0, nv)
     v = rng.uniform(-3.0, 3.0, nv)
-    contacts = Contacts.allocate(**model.extents, components=2)
+    contacts = Contacts.allocate(model.extents, components=2)
     contacts.position[:] = rng.uniform(-1.0, 1.0, (nc, 2))
     contacts.normal[:] = rng.normal(size=(nc, 2))
     impulse = rng.uniform(-1.0, 1.0, (nc, 2))

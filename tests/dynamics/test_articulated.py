@@ -19,7 +19,7 @@ TOLERANCE = 1e-10
 def test_equals_the_factor_of_the_mass_matrix(case: RobotCase, implicit: bool) -> None:
     """A⁻¹ x and the D of A = Lᵀ D L, with and without a diagonal added to A."""
     model, nv = case.robot().model, case.robot().nv
-    work, bodies = Workspace.allocate(**model.extents), ArticulatedBodies.allocate(**model.extents)
+    work, bodies = Workspace.allocate(model.extents), ArticulatedBodies.allocate(model.extents)
     matrix, factor = np.zeros((nv, nv)), np.zeros((nv, nv))
     draw = np.random.default_rng(7)
     for q, force in case.states(3):

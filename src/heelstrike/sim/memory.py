@@ -276,23 +276,23 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     }  # fmt: skip
     programs = straight_line_programs(model, points)
     assembly = Assembly.allocate(
-        **extents,
+        extents,
         problem=ContactProblem.allocate(nc=capacity),
         answer=ContactAnswer.allocate(nc=capacity),
         solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
     )
     problem = assembly.problem
     return Memory.allocate(
-        **extents,
+        extents,
         torque=guarded(np.zeros(robot.nu)),
         dry_joint=dry.astype(np.int64),
-        equations=Equations.allocate(**extents, programs=programs),
+        equations=Equations.allocate(extents, programs=programs),
         surface=Surface.allocate(
-            **extents, friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0)
+            extents, friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0)
         ),
         assembly=assembly,
         usual=UsualPoints.allocate(
-            **extents,
+            extents,
             usual_problem=ContactProblem.allocate(
                 nc=len(points),
                 free=problem.free[: 2 * len(points)],
@@ -303,7 +303,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             usual_place=place,
             every_point=np.arange(nc),
         ),
-        reported=Reported.allocate(**extents, resting=np.full(len(dry), -1, dtype=np.int64)),
+        reported=Reported.allocate(extents, resting=np.full(len(dry), -1, dtype=np.int64)),
         pushes=pushes_on(robot, pushes),
     )
 

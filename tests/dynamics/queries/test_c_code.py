@@ -46,7 +46,7 @@ def called(function: Callable[..., Any], *arrays: np.ndarray) -> None:
 
 def by_kernels(robot: Robot, q: Any, v: Any, force: Any) -> dict[str, Any]:
     n = robot.nv
-    work = Workspace.allocate(**robot.model.extents)
+    work = Workspace.allocate(robot.model.extents)
     matrix, factor = np.zeros((n, n)), np.zeros((n, n))
     bias, acceleration = np.zeros(n), np.zeros(n)
     kernels.forward_kinematics(robot.model, q, work)

@@ -35,7 +35,7 @@ def free_acceleration(
         uncompiled(kernel, replace=functions)(*arguments)
 
     n = robot.nv
-    work = Workspace.allocate(dtype=dtype, **robot.model.extents)
+    work = Workspace.allocate(robot.model.extents, dtype=dtype)
     force, acceleration = np.zeros(n, dtype=dtype), np.zeros(n, dtype=dtype)
     run(kernels.forward_kinematics, robot.model, q, work)
     run(kernels.link_velocities, robot.model, v, work)
@@ -108,7 +108,7 @@ def test_held_contacts_equal_complex_step(
 
     def acceleration(x: np.ndarray) -> Any:
         position, velocity, gamma = np.split(x, [n, 2 * n])
-        work = Workspace.allocate(dtype=np.complex128, **model.extents)
+        work = Workspace.allocate(model.extents, dtype=np.complex128)
         run(kernels.forward_kinematics, model, position, work)
         run(kernels.link_velocities, model, velocity, work)
         matrix = np.zeros((n, n), dtype=complex)

@@ -65,7 +65,7 @@ def _solve(
 
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
     """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
-    tree = Workspace.allocate(**model.extents)
+    tree = Workspace.allocate(model.extents)
     square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
     arrays: dict[str, Any] = {
         "model": model, "tree": tree,

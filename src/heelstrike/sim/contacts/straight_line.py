@@ -72,9 +72,9 @@ def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
     pairs = np.zeros((model.nc, 2))
     known: dict[str, Any] = {
         "model": model, "q": np.zeros(model.nq), "v": np.zeros(nv), "x": np.zeros(nv),
-        "tree": Workspace.allocate(**extents),
+        "tree": Workspace.allocate(extents),
         "matrix": np.zeros((nv, nv)), "factor": np.zeros((nv, nv)), "bias": np.zeros(nv),
-        "points": points, "contacts": Contacts.allocate(**extents),
+        "points": points, "contacts": Contacts.allocate(extents),
         "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((2 * size, 2 * size)),
         "velocity": pairs, "impulse": pairs, "force": np.zeros(nv),
     }  # fmt: skip

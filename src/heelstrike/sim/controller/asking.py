@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.bundle import address_of
+from heelstrike.compiler.bundle_type import address_of
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers, Model

@@ -194,11 +194,9 @@ def extents_of(robot: Robot) -> dict[str, int]:
 
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that a controller has of a robot."""
-    extents = extents_of(robot)
     driven = set(robot.model.actuator_joint.tolist())
     view = ControlledRobot.allocate(
-        model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven),
-        **extents,
+        extents_of(robot), model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven)
     )  # fmt: skip
     view.contact_foot[:] = -1
     for index, foot in enumerate(robot.feet):

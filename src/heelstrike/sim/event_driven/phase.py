@@ -194,7 +194,7 @@ def allocate_phase(robot: Robot) -> Phase:
     dry = np.flatnonzero(model.dry_friction > 0.0)
     contacts = contact_capacity(robot)
     return Phase.allocate(
-        **model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
+        model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
