@@ -275,7 +275,8 @@ class Bundle:
             of an array, or no whole number.
         """
         kind: Any = cls
-        members = {name: value for name, value in given.items() if name in cls.declared}
+        members = {name: known[name] for name in _whole_numbers(kind) if name in known}
+        members |= {name: value for name, value in given.items() if name in cls.declared}
         extents = {name: size for name, size in known.items() if name in cls.extent_names}
         extents |= {name: members[name] for name in _whole_numbers(kind) if name in members}
         for name, value in given.items():
