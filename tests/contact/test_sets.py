@@ -62,6 +62,7 @@ def with_line(seed: int) -> ContactProblem:
 
 def solved(problem: ContactProblem, solver: int) -> Floats:
     work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
+    work.settings.amendments = 0
     assert solve_contact_kernel(problem, np.array([solver]), work, answer) == SOLVED
     return answer.impulse
 

@@ -120,7 +120,7 @@ def certify(
     prescribed to slide; its friction then lies on the given edge and its tangential velocity is not
     constrained.
 
-    Writes ``velocity`` and ``residual`` of the answer, and the rest of the yardstick.
+    Writes ``velocity``, ``residual`` and ``rest`` of the answer, and the rest of the yardstick.
     """
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
@@ -134,7 +134,7 @@ def certify(
     else:
         rounding = sum_velocities_sharply(problem, impulse, yardstick, velocity)
     yardstick.rounding = rounding
-    yardstick.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
+    answer.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
 
     complementarity = 0.0

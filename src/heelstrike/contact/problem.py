@@ -215,6 +215,7 @@ def run_solvers(
     work = _memory(count)
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
+    work.settings.amendments = 0  # nobody has guessed the modes
     work.settings.skewed = 0 if semidefinite else 1
     problem = ContactProblem.allocate(
         nc=count, count=count, delassus=matrix, free=offset, friction=friction
