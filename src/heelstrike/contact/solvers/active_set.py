@@ -213,9 +213,7 @@ def mode_of_slip(velocity: float, rest: float) -> int:
 
 
 @kernel
-def label(
-    count: int, answer: ContactAnswer, reduced: ReducedProblem, yardstick: Yardstick
-) -> bool:
+def label(count: int, answer: ContactAnswer, reduced: ReducedProblem, yardstick: Yardstick) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
@@ -241,7 +239,8 @@ def amend(problem: ContactProblem, work: ContactWorkspace) -> int:
     """Change the modes under trial that their own answer contradicts.
 
     What penetrates closes, and slips as it did; what pulls opens. Friction beyond its cone slips,
-    and slip against its friction sticks. Returns ``SOLVED``, or ``UNCERTIFIED`` if no mode is changed.
+    and slip against its friction sticks. Returns ``SOLVED``, or ``UNCERTIFIED`` if nothing is
+    changed.
     """
     mode, velocity, point = work.trial.mode, work.trial.velocity, work.equations.point
     root, rest, tangent = work.yardstick.root, work.trial.rest, work.reduced.tangent
