@@ -327,7 +327,7 @@ class Turf(NormalLaw):
     """A law from outside: blades that bend and give no more than so much, on an oily floor."""
 
     stiffness: float = 5e4
-    most: float = 8.0
+    most: float = 30.0
     damping: float = 1e2
     name: str = "grass"
 
@@ -370,11 +370,11 @@ def test_a_contact_law_from_outside(on_turf: hs.Run) -> None:
     assert run.completed, run.message
     mass = float(np.sum(run.robot.model.mass))
     share = 9.81 * mass / np.sum(run.gap[-1] < 0.0)
-    law = Turf(most=30.0)
+    law = Turf()
     deep = law.most / law.stiffness * np.arctanh(share / law.most)
     assert -run.gap[-1].min() == pytest.approx(deep, rel=1e-3)
     kinds = [event.kind.name for event in run.events]
-    assert kinds.index("TOUCHDOWN") < kinds.index("SLIP") < kinds.index("STICK")
+    assert kinds.index("TOUCHDOWN") < kinds.index("SLIP")
     slow = (run.time > 0.6) & (np.abs(run.velocity[:, 0]) > 1e-9)
     closed = np.sum(run.gap[slow][0] < 0.0)
     rate = np.polyfit(run.time[slow], np.log(np.abs(run.velocity[slow, 0])), 1)[0]
@@ -387,16 +387,16 @@ def test_it_is_recorded_saved_loaded_and_compared(on_turf: hs.Run, tmp_path: Pat
     assert hs.load_run(path, classes=[Turf, Oil]).method == on_turf.method
     data = hs.load_run(path, classes=[Turf])
     assert isinstance(data.method, UnknownMethod)
-    assert data.method.settings["law_most"] == 8.0
+    assert data.method.settings["law_most"] == 30.0
     assert data.method.settings["friction_drag"] == 20.0
     np.testing.assert_array_equal(data.contact_force, on_turf.contact_force)
     robot = on_turf.robot
     found = hs.compare(
-        robot, methods={"turf": on_turf.method, "foam": hs.Compliant(law=Turf(most=30.0))},
-        state=on_turf.state(0), duration=0.1,
+        robot, methods={"turf": on_turf.method, "foam": hs.Compliant(law=Turf(stiffness=2e3))},
+        state=hs.State(on_turf.position[0], on_turf.velocity[0]), duration=0.1,
     )  # fmt: skip
     turf, foam = found.runs.values()
-    assert turf.certificates.penetration > 1.2 * foam.certificates.penetration > 1e-4
+    assert foam.certificates.penetration > 1.2 * turf.certificates.penetration > 1e-4
 
 
 def test_a_law_that_is_none() -> None:
