@@ -29,6 +29,8 @@ class ContactProblem(Bundle):
         Free velocity (or acceleration), the free term b.
     friction : (nc,) float
         Friction coefficient of each contact, zero where its set is no cone.
+    bound : (nc,) float
+        Largest tangential impulse of each interval.
     set : (nc,) int
         Where its impulses may lie; see :mod:`heelstrike.contact.sets`.
     """
@@ -37,6 +39,7 @@ class ContactProblem(Bundle):
     delassus: Floats = array("2 nc", "2 nc")
     free: Floats = array("2 nc")
     friction: Floats = array("nc")
+    bound: Floats = array("nc")
     set: Integers = array("nc", of=int)
 
 

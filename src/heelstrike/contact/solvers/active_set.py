@@ -127,8 +127,8 @@ def expand(
         if tangent[contact] >= 0:
             limit = problem.friction[contact]
             across = -limit if mode[contact] == SLIP_FORWARD else limit
-        impulse[row] = along / math.sqrt(1.0 + across * across)
-        impulse[row + 1] = across * impulse[row]
+        along /= math.sqrt(1.0 + across * across)
+        impulse[row], impulse[row + 1] = projected(problem, contact, along, across * along)
 
 
 @kernel

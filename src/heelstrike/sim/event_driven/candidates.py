@@ -5,6 +5,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.robot.model import Integers
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
@@ -20,8 +21,10 @@ def solve_candidates(
     to go on doing so: their friction is known. Forces or impulses and modes go to
     ``memory.answer``. Returns the solver's status.
     """
+    dry = slide.shape[0] - memory.dry_joint.shape[0]
     for place in range(count):
         contact = memory.candidate[place]
+        memory.problem.set[place] = INTERVAL if contact >= dry else CONE
         memory.problem.friction[place] = memory.friction[contact]
         memory.answer.mode[place] = STICK
         if accelerations:

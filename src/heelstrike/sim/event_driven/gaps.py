@@ -8,7 +8,6 @@ contact points, dry joints from the stops, and these kernels tell them apart.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.sets import press
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
@@ -62,8 +61,8 @@ def free_gap_acceleration(
     """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under ``memory.rate``.
 
     Of a contact point it is that of the gap and of the sliding velocity: for a rolling disc the
-    acceleration of its centre and not of the material point that touches the ground. A dry joint
-    gets the normal row that presses it, too. The Jacobian rows must be those of the candidates'
+    acceleration of its centre and not of the material point that touches the ground. Of a dry
+    joint the bound is written, too. The Jacobian rows must be those of the candidates'
     `place`.
     """
     along_normal = 0.0
@@ -85,5 +84,4 @@ def free_gap_acceleration(
     memory.problem.free[2 * place + 1] = along_tangent
     dry = contact - phase.closed.shape[0] + phase.dry_joint.shape[0]
     if dry >= 0:
-        limit = model.dry_friction[phase.dry_joint[dry]]
-        press(memory.problem, place, limit)
+        memory.problem.bound[place] = model.dry_friction[phase.dry_joint[dry]]

@@ -34,7 +34,7 @@ from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
+from heelstrike.sim.contacts.dry_friction import note_dry_joint, select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -464,7 +464,7 @@ def solve_contacts(
     """Turn the free velocity into the velocity at the end of the step; return success."""
     near = select_candidates(model, step, scheme, activation, memory)
     count = select_stops(model, step, scheme, activation, near, memory)
-    count = select_dry_joints(model, count, memory)
+    count = select_dry_joints(model, step, count, memory)
     nv = model.parent.shape[0]
     points = model.contact_link.shape[0]
     dry = points + 2 * nv
@@ -491,7 +491,6 @@ def solve_contacts(
     else:
         write_rows(model, memory, count)
         assemble_delassus(model, memory, count)
-    press_dry_joints(model, step, count, memory)
     problem.count = count
     status = solve_contact_kernel(problem, order, memory.solver, memory.answer)
     if straight:
