@@ -20,8 +20,8 @@ projected, contains = (uncompiled(kernel) for kernel in (sets.projected, sets.co
 
 def one(kind: int, friction: float = 0.5) -> ContactProblem:
     problem = ContactProblem.allocate(nc=1, count=1)
-    problem.set[0], problem.friction[0] = kind, friction if kind == CONE else 0.0
-    problem.bound[0] = 0.7 if kind == INTERVAL else 0.0
+    problem.set[0], problem.bound[0] = kind, 0.7
+    problem.friction[0] = {CONE: friction, INTERVAL: 1.0}.get(kind, 0.0)
     return problem
 
 
@@ -36,9 +36,9 @@ def one(kind: int, friction: float = 0.5) -> ContactProblem:
         (HALF_LINE, (-2.0, 0.0), (0.0, 0.0)),
         (LINE, (-2.0, 0.0), (-2.0, 0.0)),
         (LINE, (-2.0, 0.3), (-2.0, 0.0)),
-        (INTERVAL, (0.0, 0.7), (0.0, 0.7)),
-        (INTERVAL, (0.0, 0.9), (0.0, 0.7)),
-        (INTERVAL, (5.0, -0.9), (5.0, -0.7)),
+        (INTERVAL, (0.7, 0.5), (0.7, 0.5)),
+        (INTERVAL, (0.0, 0.9), (0.7, 0.7)),
+        (INTERVAL, (5.0, -0.9), (0.7, -0.7)),
     ],
 )
 def test_projection(kind: int, impulse: tuple[float, float], nearest: tuple[float, float]) -> None:
@@ -113,7 +113,7 @@ def test_dry_friction_by_hand(solver: int, speed: float, impulse: float) -> None
     What is in the normal row of an interval does not matter.
     """
     problem = ContactProblem.allocate(
-        nc=4, count=2, friction=np.array([0.5, 9.0, 0.0, 0.0]), set=np.array([CONE, INTERVAL, 0, 0])
+        nc=4, count=2, friction=np.array([0.5, 1.0, 0.0, 0.0]), set=np.array([CONE, INTERVAL, 0, 0])
     )
     problem.delassus[[0, 1, 3], [0, 1, 3]] = 0.5
     problem.delassus[2, :4] = problem.free[2] = 8.0
@@ -132,7 +132,7 @@ def dry(seed: int, slack: int) -> ContactProblem:
         count=4,
         delassus=root @ root.T,
         free=root @ draw.standard_normal(slack),
-        friction=np.array([0.6, 0.0, 0.3, 0.0]),
+        friction=np.array([0.6, 1.0, 0.3, 1.0]),
         bound=np.array([0.0, 0.5, 0.0, 1.5]) * draw.uniform(0.1, 1.0, 4),
         set=np.array([CONE, INTERVAL, CONE, INTERVAL]),
     )

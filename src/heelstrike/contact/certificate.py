@@ -136,13 +136,13 @@ def certify(
     yardstick.rounding = rounding
     answer.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
-
     complementarity = cone = non_penetration = 0.0
     nothing = 0.0 * unit  # and stays nothing unless a number is infinite or none
     for contact in range(count):
         normal, tangent = 2 * contact, 2 * contact + 1
         normal_impulse, tangent_impulse = impulse[normal], impulse[tangent]
-        # What friction lacks to either edge.
+        if problem.set[contact] == INTERVAL:
+            normal_impulse = problem.bound[contact]
         upper, lower = room(problem, contact, normal_impulse, tangent_impulse, sharply)
         nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (upper + lower)
 
@@ -150,9 +150,8 @@ def certify(
         if problem.set[contact] != INTERVAL:
             speed = relative_speed(velocity[normal], root[normal], inverse)
             force_scale = root[normal] * inverse
-            force = normal_impulse * force_scale
-            if force_scale == 0.0:
-                force = sign(normal_impulse)  # it moves nothing
+            # An impulse that moves nothing is no better for being small.
+            force = normal_impulse * force_scale if force_scale > 0.0 else sign(normal_impulse)
             non_penetration = max(non_penetration, -speed)
             complementarity = max(complementarity, min(speed, force))
             if force <= 0.0:

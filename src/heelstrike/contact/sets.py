@@ -7,8 +7,9 @@
 ``INTERVAL``          ‖λ_t‖ ≤ bound               dry friction of a joint
 ====================  ==========================  =========================================
 
-A group has two rows, normal and tangent. Only cones have friction; that of other sets is zero. An
-interval has no normal row: what stands in its place belongs to the solvers (:func:`press`).
+A group has two rows, normal and tangent. Only cones have friction; that of half-lines and lines is
+zero. An interval is the section of a cone of friction 1 where the normal impulse is the bound, and
+has no normal row: what stands in its place belongs to the solvers (:func:`press`).
 """
 
 from __future__ import annotations
@@ -39,15 +40,6 @@ def press(problem: ContactProblem, group: int) -> None:
         problem.delassus[normal, i] = problem.delassus[i, normal] = 0.0
     problem.delassus[normal, normal] = weight
     problem.free[normal] = -weight * problem.bound[group]
-    problem.friction[group] = 1.0
-
-
-@kernel
-def most(problem: ContactProblem, group: int, normal: float) -> float:
-    """Largest tangential impulse beside a normal one."""
-    if problem.set[group] == INTERVAL:
-        return problem.bound[group]
-    return problem.friction[group] * normal
 
 
 @kernel
@@ -55,30 +47,33 @@ def projected(
     problem: ContactProblem, group: int, normal: float, tangent: float
 ) -> tuple[float, float]:
     """Return an impulse moved into its set, exactly, along the normal first."""
-    if normal < 0.0 and problem.set[group] != LINE:
+    if problem.set[group] == INTERVAL:
+        normal = problem.bound[group]
+    elif normal < 0.0 and problem.set[group] != LINE:
         normal = 0.0
-    limit = most(problem, group, normal)
+    limit = problem.friction[group] * normal
     return normal, min(max(tangent, -limit), limit)
 
 
 @kernel
 def contains(problem: ContactProblem, group: int, normal: float, tangent: float) -> bool:
     """Whether an impulse is in its set."""
-    if normal < 0.0 and problem.set[group] != INTERVAL:
+    if problem.set[group] == INTERVAL:
+        return abs(tangent) <= problem.bound[group]
+    if normal < 0.0:
         return problem.set[group] == LINE and tangent == 0.0
-    return abs(tangent) <= most(problem, group, normal)
+    return abs(tangent) <= problem.friction[group] * normal
 
 
 @kernel
 def room(
     problem: ContactProblem, group: int, normal: float, tangent: float, sharply: bool
 ) -> tuple[float, float]:
-    """What the tangential impulse lacks to the upper and to the lower edge of its set.
+    """What the tangential impulse lacks to the upper and to the lower edge of its cone.
 
     Negative outside; ``sharply`` in twice the precision.
     """
-    limit = most(problem, group, normal)
-    beyond = 0.0
-    if sharply and problem.set[group] != INTERVAL:
-        beyond = product_error(problem.friction[group], normal, limit)
+    friction = problem.friction[group]
+    limit = friction * normal
+    beyond = product_error(friction, normal, limit) if sharply else 0.0
     return (limit - tangent) + beyond, (limit + tangent) + beyond

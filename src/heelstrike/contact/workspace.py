@@ -28,7 +28,7 @@ class ContactProblem(Bundle):
     free : (2 nc,) float
         Free velocity (or acceleration), the free term b.
     friction : (nc,) float
-        Friction coefficient of each contact, zero where its set is no cone.
+        Friction coefficient of each contact: 1 for an interval, zero for lines and half-lines.
     bound : (nc,) float
         Largest tangential impulse of each interval.
     set : (nc,) int

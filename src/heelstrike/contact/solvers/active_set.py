@@ -114,21 +114,19 @@ def expand(
         impulse[row + 1] = 0.0
         if mode[contact] == OPEN:
             continue
-        sticks = tangent[contact] >= 0 and mode[contact] == STICK
-        across = point[place + 1] if sticks else 0.0
-        along, across = projected(problem, contact, point[place], across)
+        along = point[place]
         place += 1
-        if sticks:
-            impulse[row] = along
-            impulse[row + 1] = across
+        if tangent[contact] >= 0 and mode[contact] == STICK:
+            across = point[place]
             place += 1
-            continue
-        across = slope[contact]
-        if tangent[contact] >= 0:
-            limit = problem.friction[contact]
-            across = -limit if mode[contact] == SLIP_FORWARD else limit
-        along /= math.sqrt(1.0 + across * across)
-        impulse[row], impulse[row + 1] = projected(problem, contact, along, across * along)
+        else:
+            lean = slope[contact]
+            if tangent[contact] >= 0:
+                limit = problem.friction[contact]
+                lean = -limit if mode[contact] == SLIP_FORWARD else limit
+            along /= math.sqrt(1.0 + lean * lean)
+            across = lean * along
+        impulse[row], impulse[row + 1] = projected(problem, contact, along, across)
 
 
 @kernel

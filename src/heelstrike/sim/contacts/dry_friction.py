@@ -29,6 +29,7 @@ def select_dry_joints(model: Model, step: float, count: int, memory: Memory) -> 
         write_unit_row(memory, joint, 2 * count + 1, 1.0)
         memory.problem.free[2 * count + 1] = memory.next_v[joint]
         memory.problem.set[count] = INTERVAL
+        memory.problem.friction[count] = 1.0
         memory.problem.bound[count] = step * model.dry_friction[joint]
         memory.answer.mode[count] = memory.dry_mode[place]
         memory.candidate[count] = first + place
