@@ -36,7 +36,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.dry_friction import press_dry_joints, select_dry_joints
+from heelstrike.sim.contacts.dry_friction import select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -455,7 +455,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
     near = select_candidates(model, work, memory)
     joints = select_stops(model, work, near, memory)
     count = select_dry_joints(
-        model, joints, dry_joint, memory.reaction.dry_mode, memory.next_v, assembly
+        model, work.step, joints, dry_joint, memory.reaction.dry_mode, memory.next_v, assembly
     )
     for i in range(3):
         assembly.answer.residual[i] = 0.0
@@ -470,7 +470,6 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
     else:
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, equations, count, assembly)
-    press_dry_joints(model, work.step, count, dry_joint, problem)
     problem.count = count
     status = solve_contact_kernel(problem, work.order, assembly.solver, assembly.answer)
     if straight:
