@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
@@ -50,18 +50,26 @@ from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Memory, capacity
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
+from heelstrike.sim.time_stepping.impact import (
+    UNKNOWN,
+    Impact,
+    allocate_impact,
+    find_impact,
+    solve_impact,
+)
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
 PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
 PAPER_SYMPLECTIC = int(Scheme.PAPER_SYMPLECTIC)
 MOREAU_JEAN = int(Scheme.MOREAU_JEAN)
 LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
+IMPACT_RESOLVED = int(Scheme.IMPACT_RESOLVED)
 
 # A contact point enters the problem when it could close within a step at this speed (m/s) or at
 # twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
@@ -84,12 +92,15 @@ class Stepping(Bundle):
         Gap up to which a contact point takes part, for schemes that decide by it (m).
     order : (solvers,) int
         Contact solvers in the order in which they are tried.
+    impact : Impact
+        What closes in a step.
     """
 
     step: float = number(float)
     scheme: int = number(int)
     activation: float = number(float)
     order: Integers = array("solvers", of=int)
+    impact: Impact = part(Impact)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,24 +166,28 @@ class TimeStepping(Method):
         """Contact solver tried first."""
         return self.solver
 
-    def new_work(self, robot: Robot) -> Stepping:  # noqa: ARG002
+    def new_work(self, robot: Robot) -> Stepping:
         """Return what its kernels read."""
         return Stepping(
             step=self.step,
             scheme=int(self.scheme),
             activation=self.activation,
             order=solver_order(self.solver),
+            impact=allocate_impact(robot, capacity(robot)),
         )
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
         return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names)
 
+    def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
+        """What touched other ground says nothing of this one: gaps tell."""
+        work.impact.touching[: robot.nc] = UNKNOWN
+
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
-        if self.scheme is not Scheme.MOREAU_JEAN and np.any(
-            setting.ground.model().restitution > 0.0
-        ):
+        bounces = self.scheme in (Scheme.MOREAU_JEAN, Scheme.IMPACT_RESOLVED)
+        if not bounces and np.any(setting.ground.model().restitution > 0.0):
             raise SimulationError(
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
                 f"restitution; use Scheme.MOREAU_JEAN"
@@ -244,7 +259,7 @@ def select_candidates(
 ) -> int:
     """List the contact points that could act in this step, with their free terms."""
     contacts = memory.contacts
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
     farthest = FAR_STEPS * CLOSING_SPEED * step
     if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
         farthest = activation
@@ -307,7 +322,7 @@ def select_stops(
 ) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     points = model.contact_link.shape[0]
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
     for joint in range(model.parent.shape[0]):
         for end in range(2):
             sign = 1.0 - 2.0 * end
@@ -457,11 +472,21 @@ def push_candidates(model: Model, memory: Memory, near: int, count: int) -> None
             memory.next_v[j] += memory.answer.impulse[row] * memory.jacobian[row, j]
 
 
+@kernel
+def add_impulses(model: Model, memory: Memory, near: int, count: int, straight: bool) -> None:
+    """Add what the impulses of the candidates do to ``memory.next_v``."""
+    if straight:
+        push_candidates(model, memory, near, count)
+    else:
+        add_impulse(model, memory, count, memory.next_v)
+
+
 @dissolved_kernel
-def solve_contacts(
-    model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
-) -> bool:
+def solve_contacts(model: Model, memory: Memory, work: Stepping) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
+    step, scheme, activation, order = work.step, work.scheme, work.activation, work.order
+    impact = work.impact
+    impact.happens = 0
     near = select_candidates(model, step, scheme, activation, memory)
     count = select_stops(model, step, scheme, activation, near, memory)
     count = select_dry_joints(model, count, memory)
@@ -481,6 +506,8 @@ def solve_contacts(
     for i in range(3):
         memory.answer.residual[i] = 0.0
     if count == 0:
+        for place in range(impact.touching.shape[0]):
+            impact.touching[place] = 0
         return True
     straight = are_usual(memory, near)
     problem = memory.problem
@@ -493,11 +520,20 @@ def solve_contacts(
         assemble_delassus(model, memory, count)
     press_dry_joints(model, step, count, memory)
     problem.count = count
-    status = solve_contact_kernel(problem, order, memory.solver, memory.answer)
-    if straight:
-        push_candidates(model, memory, near, count)
-    else:
-        add_impulse(model, memory, count, memory.next_v)
+    solved = solve_contact_kernel(problem, order, memory.solver, memory.answer) == SOLVED
+    if scheme == IMPACT_RESOLVED:
+        members = find_impact(model, step, problem, memory, impact)
+        if members > 0:
+            impact.happens = 1
+            for j in range(nv):
+                impact.velocity[j] = memory.next_v[j]
+            add_impulses(model, memory, near, count, straight)
+            for j in range(nv):
+                arriving = memory.next_v[j]
+                memory.next_v[j] = impact.velocity[j]
+                impact.velocity[j] = arriving
+            solved = solve_impact(model, step, members, order, problem, memory, impact) and solved
+    add_impulses(model, memory, near, count, straight)
     for place in range(count):
         contact = memory.candidate[place]
         if contact >= dry:
@@ -514,7 +550,7 @@ def solve_contacts(
         contacts.force[contact, 1] = memory.answer.impulse[2 * place + 1] / step
         memory.slip[contact] = memory.answer.velocity[2 * place + 1]
         memory.mode[contact] = memory.answer.mode[place]
-    return status == SOLVED
+    return solved
 
 
 @dissolved_kernel
@@ -531,7 +567,7 @@ def decide(
     """Find the velocity at the end of the step, and note what happens in it."""
     free_velocity(model, work.step, work.scheme, memory)
     push_robot(model, clock.time, work.step, memory)
-    solved = solve_contacts(model, work.step, work.scheme, work.activation, work.order, memory)
+    solved = solve_contacts(model, memory, work)
     note_extremes(model, memory)
     note_events(model, record, clock.time, work.step, memory)
     return DONE if solved else SOLVER_FAILED
@@ -570,6 +606,8 @@ def move(
             memory.q[i] += work.step * memory.v[i]
         elif work.scheme == MOREAU_JEAN:
             memory.q[i] += 0.5 * work.step * (memory.v[i] + memory.next_v[i])
+        elif work.impact.happens == 1:
+            memory.q[i] += work.step * work.impact.velocity[i]
         else:
             memory.q[i] += work.step * memory.next_v[i]
         memory.v[i] = memory.next_v[i]
