@@ -49,8 +49,15 @@ class Impact(Bundle):
     touching : (places,) int
         Whether each contact point, and then each end of each joint, touched at the end of the last
         step; -1 where only its gap can tell.
-    velocity : (nv,) float
-        The free velocity; after an impact the one that positions move with.
+    touched : (places,) int
+        The same at the end of the step before.
+    called : (places,) int
+        What takes part although it seemed too far away; `calls` tells whether there is any.
+    calls : int
+    free : (nv,) float
+        The free velocity.
+    arriving : (nv,) float
+        Where there is an impact, the velocity that positions move with.
     member : (capacity,) int
         The candidates that take part.
     problem, answer : ContactProblem, ContactAnswer
@@ -59,7 +66,11 @@ class Impact(Bundle):
 
     happens: int = cell(int)
     touching: Integers = array("places", of=int)
-    velocity: Floats = array("nv")
+    touched: Integers = array("places", of=int)
+    called: Integers = array("places", of=int)
+    calls: int = cell(int)
+    free: Floats = array("nv")
+    arriving: Floats = array("nv")
     member: Integers = array("capacity", of=int)
     problem: ContactProblem = part(ContactProblem)
     answer: ContactAnswer = part(ContactAnswer)
@@ -90,6 +101,30 @@ def gap_of(model: Model, memory: Memory, candidate: int) -> float:
 
 
 @dissolved_kernel
+def begin_step(free: Floats, impact: Impact) -> None:
+    """Keep the free velocity and what touched; nothing touches yet, nothing is called."""
+    for j in range(free.shape[0]):
+        impact.free[j] = free[j]
+    for place in range(impact.touching.shape[0]):
+        impact.touched[place] = impact.touching[place]
+        impact.touching[place] = 0
+    if impact.calls > 0:
+        impact.calls = 0
+        for place in range(impact.called.shape[0]):
+            impact.called[place] = 0
+
+
+@dissolved_kernel
+def call(impact: Impact, place: int) -> bool:
+    """Call a contact point or stop to take part; return whether it was not called before."""
+    if impact.called[place] == 1:
+        return False
+    impact.called[place] = 1
+    impact.calls += 1
+    return True
+
+
+@dissolved_kernel
 def find_impact(
     model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
 ) -> int:
@@ -108,21 +143,17 @@ def find_impact(
             continue
         gap = gap_of(model, memory, candidate)
         there = gap <= TOUCHING
-        touched = (
-            there if impact.touching[candidate] == UNKNOWN else impact.touching[candidate] == 1
-        )
+        known = impact.touched[candidate]
+        touched = there if known == UNKNOWN else known == 1
         touches = step * memory.answer.velocity[2 * place] <= TOUCHING
         closes = problem.free[2 * place] < 0.0
-        happens = happens or (touches and closes and not touched and not there)
+        happens = happens or (
+            touches and (gap < -TOUCHING or (closes and not touched and not there))
+        )
+        impact.touching[candidate] = touches
         if there or (touches and (touched or closes)):
             impact.member[members] = place
             members += 1
-    for place in range(closable):
-        impact.touching[place] = 0
-    for place in range(problem.count):
-        candidate = memory.candidate[place]
-        if candidate < closable and step * memory.answer.velocity[2 * place] <= TOUCHING:
-            impact.touching[candidate] = 1
     return members if happens else 0
 
 

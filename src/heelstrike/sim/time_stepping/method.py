@@ -57,9 +57,12 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.impact import (
+    TOUCHING,
     UNKNOWN,
     Impact,
     allocate_impact,
+    begin_step,
+    call,
     find_impact,
     solve_impact,
 )
@@ -195,6 +198,40 @@ class TimeStepping(Method):
 
 
 @dissolved_kernel
+def is_linearised(scheme: int) -> bool:
+    """Whether a scheme bounds the gap at the end of the step."""
+    return scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
+
+
+@dissolved_kernel
+def call_missed(model: Model, step: float, near: int, memory: Memory, impact: Impact) -> bool:
+    """Call the contacts that would go through at the velocity that was found; return if any."""
+    points = model.contact_link.shape[0]
+    v = impact.arriving if impact.happens == 1 else memory.next_v
+    missed = False
+    for joint in range(model.parent.shape[0]):
+        after = memory.q[joint] + step * v[joint]
+        if after < model.lower[joint] - TOUCHING:
+            missed = call(impact, points + 2 * joint) or missed
+        if after > model.upper[joint] + TOUCHING:
+            missed = call(impact, points + 2 * joint + 1) or missed
+    contacts = memory.contacts
+    within = 0
+    for contact in range(points):
+        within += contacts.gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
+    if within > near:
+        point_velocities(
+            model, memory.every_point, memory.tree, contacts.position, contacts.normal, v,
+            memory.point_velocity,
+        )  # fmt: skip
+        for contact in range(points):
+            speed = memory.point_velocity[contact, 0]
+            if contacts.gap[contact] + step * speed < -TOUCHING:
+                missed = call(impact, contact) or missed
+    return missed
+
+
+@dissolved_kernel
 def begin(
     model: Model,  # noqa: ARG001
     ground: GroundModel,  # noqa: ARG001
@@ -255,11 +292,11 @@ def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
 
 @dissolved_kernel
 def select_candidates(
-    model: Model, step: float, scheme: int, activation: float, memory: Memory
+    model: Model, step: float, scheme: int, activation: float, called: Integers, memory: Memory
 ) -> int:
     """List the contact points that could act in this step, with their free terms."""
     contacts = memory.contacts
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
+    linearised = is_linearised(scheme)
     farthest = FAR_STEPS * CLOSING_SPEED * step
     if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
         farthest = activation
@@ -293,7 +330,7 @@ def select_candidates(
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if linearised:
-            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal) and called[contact] == 0:
                 continue
             normal += gap / step
         elif scheme == MOREAU_JEAN:
@@ -318,11 +355,17 @@ def select_candidates(
 
 @dissolved_kernel
 def select_stops(
-    model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
+    model: Model,
+    step: float,
+    scheme: int,
+    activation: float,
+    count: int,
+    called: Integers,
+    memory: Memory,
 ) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     points = model.contact_link.shape[0]
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
+    linearised = is_linearised(scheme)
     for joint in range(model.parent.shape[0]):
         for end in range(2):
             sign = 1.0 - 2.0 * end
@@ -331,7 +374,8 @@ def select_stops(
             normal = sign * memory.next_v[joint]
             before = sign * memory.v[joint]
             if linearised:
-                if not gap < step * max(CLOSING_RATE, -2.0 * normal):
+                near = gap < step * max(CLOSING_RATE, -2.0 * normal)
+                if not near and called[points + 2 * joint + end] == 0:
                     continue
                 normal += gap / step
             elif scheme == MOREAU_JEAN:
@@ -482,33 +526,47 @@ def add_impulses(model: Model, memory: Memory, near: int, count: int, straight: 
 
 
 @dissolved_kernel
-def solve_contacts(model: Model, memory: Memory, work: Stepping) -> bool:
-    """Turn the free velocity into the velocity at the end of the step; return success."""
-    step, scheme, activation, order = work.step, work.scheme, work.activation, work.order
-    impact = work.impact
-    impact.happens = 0
-    near = select_candidates(model, step, scheme, activation, memory)
-    count = select_stops(model, step, scheme, activation, near, memory)
-    count = select_dry_joints(model, count, memory)
-    nv = model.parent.shape[0]
-    points = model.contact_link.shape[0]
-    dry = points + 2 * nv
-    for j in range(nv):
+def forget_forces(model: Model, memory: Memory) -> None:
+    """Clear what the contacts of the last step did."""
+    for j in range(model.parent.shape[0]):
         memory.stop_torque[j] = 0.0
         memory.stop_mode[j, 0] = 0
         memory.stop_mode[j, 1] = 0
-    contacts = memory.contacts
     for contact in range(model.contact_link.shape[0]):
-        contacts.force[contact, 0] = 0.0
-        contacts.force[contact, 1] = 0.0
+        memory.contacts.force[contact, 0] = 0.0
+        memory.contacts.force[contact, 1] = 0.0
         memory.slip[contact] = 0.0
         memory.mode[contact] = 0
-    for i in range(3):
-        memory.answer.residual[i] = 0.0
-    if count == 0:
-        for place in range(impact.touching.shape[0]):
-            impact.touching[place] = 0
-        return True
+
+
+@dissolved_kernel
+def note_forces(model: Model, step: float, count: int, memory: Memory) -> None:
+    """Keep what the candidates do, as forces over the step."""
+    points = model.contact_link.shape[0]
+    dry = points + 2 * model.parent.shape[0]
+    contacts, answer = memory.contacts, memory.answer
+    for place in range(count):
+        contact = memory.candidate[place]
+        if contact >= dry:
+            impulse = answer.impulse[2 * place + 1]
+            note_dry_joint(contact - dry, impulse, step, answer.mode[place], memory)
+            continue
+        if contact >= points:
+            joint = (contact - points) // 2
+            sign = 1.0 - 2.0 * ((contact - points) % 2)
+            memory.stop_torque[joint] += sign * answer.impulse[2 * place] / step
+            memory.stop_mode[joint, (contact - points) % 2] = answer.mode[place] != 0
+            continue
+        contacts.force[contact, 0] = answer.impulse[2 * place] / step
+        contacts.force[contact, 1] = answer.impulse[2 * place + 1] / step
+        memory.slip[contact] = answer.velocity[2 * place + 1]
+        memory.mode[contact] = answer.mode[place]
+
+
+@dissolved_kernel
+def solve_candidates(model: Model, near: int, count: int, memory: Memory, work: Stepping) -> bool:
+    """Find the impulses of the candidates and add what they do to the velocity; return success."""
+    step, impact = work.step, work.impact
     straight = are_usual(memory, near)
     problem = memory.problem
     if straight:
@@ -520,36 +578,50 @@ def solve_contacts(model: Model, memory: Memory, work: Stepping) -> bool:
         assemble_delassus(model, memory, count)
     press_dry_joints(model, step, count, memory)
     problem.count = count
-    solved = solve_contact_kernel(problem, order, memory.solver, memory.answer) == SOLVED
-    if scheme == IMPACT_RESOLVED:
+    solved = solve_contact_kernel(problem, work.order, memory.solver, memory.answer) == SOLVED
+    if work.scheme == IMPACT_RESOLVED:
         members = find_impact(model, step, problem, memory, impact)
         if members > 0:
             impact.happens = 1
-            for j in range(nv):
-                impact.velocity[j] = memory.next_v[j]
             add_impulses(model, memory, near, count, straight)
-            for j in range(nv):
-                arriving = memory.next_v[j]
-                memory.next_v[j] = impact.velocity[j]
-                impact.velocity[j] = arriving
-            solved = solve_impact(model, step, members, order, problem, memory, impact) and solved
+            for j in range(model.parent.shape[0]):
+                impact.arriving[j] = memory.next_v[j]
+                memory.next_v[j] = impact.free[j]
+            solved = (
+                solve_impact(model, step, members, work.order, problem, memory, impact) and solved
+            )
     add_impulses(model, memory, near, count, straight)
-    for place in range(count):
-        contact = memory.candidate[place]
-        if contact >= dry:
-            impulse = memory.answer.impulse[2 * place + 1]
-            note_dry_joint(contact - dry, impulse, step, memory.answer.mode[place], memory)
-            continue
-        if contact >= points:
-            joint = (contact - points) // 2
-            sign = 1.0 - 2.0 * ((contact - points) % 2)
-            memory.stop_torque[joint] += sign * memory.answer.impulse[2 * place] / step
-            memory.stop_mode[joint, (contact - points) % 2] = memory.answer.mode[place] != 0
-            continue
-        contacts.force[contact, 0] = memory.answer.impulse[2 * place] / step
-        contacts.force[contact, 1] = memory.answer.impulse[2 * place + 1] / step
-        memory.slip[contact] = memory.answer.velocity[2 * place + 1]
-        memory.mode[contact] = memory.answer.mode[place]
+    return solved
+
+
+@dissolved_kernel
+def solve_contacts(model: Model, memory: Memory, work: Stepping) -> bool:
+    """Turn the free velocity into the velocity at the end of the step; return success.
+
+    What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
+    a candidate, is called and the step solved again.
+    """
+    step, scheme, activation, impact = work.step, work.scheme, work.activation, work.impact
+    begin_step(memory.next_v, impact)
+    again = True
+    solved = True
+    count = 0
+    while again:
+        impact.happens = 0
+        near = select_candidates(model, step, scheme, activation, impact.called, memory)
+        count = select_stops(model, step, scheme, activation, near, impact.called, memory)
+        count = select_dry_joints(model, count, memory)
+        if count > 0:
+            solved = solve_candidates(model, near, count, memory, work)
+        else:
+            for i in range(3):
+                memory.answer.residual[i] = 0.0
+        again = is_linearised(scheme) and solved and call_missed(model, step, near, memory, impact)
+        if again:
+            for j in range(model.parent.shape[0]):
+                memory.next_v[j] = impact.free[j]
+    forget_forces(model, memory)
+    note_forces(model, step, count, memory)
     return solved
 
 
@@ -607,7 +679,7 @@ def move(
         elif work.scheme == MOREAU_JEAN:
             memory.q[i] += 0.5 * work.step * (memory.v[i] + memory.next_v[i])
         elif work.impact.happens == 1:
-            memory.q[i] += work.step * work.impact.velocity[i]
+            memory.q[i] += work.step * work.impact.arriving[i]
         else:
             memory.q[i] += work.step * memory.next_v[i]
         memory.v[i] = memory.next_v[i]
