@@ -237,7 +237,9 @@ class _Steps:
             return
         rows = self.rows
         moved = np.einsum("tpc,tpc->tp", np.diff(rows.center, axis=0), rows.normal[:-1])
-        turning = moved - self.h * (rates(self.jacobian, self.moved)[..., 0] if self.split.any() else speed)
+        turning = moved - self.h * (
+            rates(self.jacobian, self.moved)[..., 0] if self.split.any() else speed
+        )
         deep = -rows.gap[1:] - np.maximum(-turning, 0.0)
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 

@@ -36,7 +36,7 @@ Floats = NDArray[np.float64]
 
 # A contact touches when its gap is no more than this (m).
 TOUCHING = 1e-9
-UNKNOWN = -1
+NEVER = -1
 
 
 class Impact(Bundle):
@@ -46,11 +46,12 @@ class Impact(Bundle):
     ----------
     happens : int
         Whether an impact falls into this step.
+    step : int
+        Number of this step.
     touching : (places,) int
-        Whether each contact point, and then each end of each joint, touched at the end of the last
-        step; -1 where only its gap can tell.
-    touched : (places,) int
-        The same at the end of the step before.
+        The last step at whose end each contact point, and then each end of each joint, touched.
+    touches : (capacity,) int
+        Whether each candidate touches at the end of this step.
     called : (places,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
@@ -65,8 +66,9 @@ class Impact(Bundle):
     """
 
     happens: int = cell(int)
+    step: int = cell(int)
     touching: Integers = array("places", of=int)
-    touched: Integers = array("places", of=int)
+    touches: Integers = array("capacity", of=int)
     called: Integers = array("places", of=int)
     calls: int = cell(int)
     free: Floats = array("nv")
@@ -84,7 +86,7 @@ def allocate_impact(robot: Robot, capacity: int) -> Impact:
         nc=capacity,
         capacity=capacity,
         places=places,
-        touching=np.full(places, UNKNOWN),
+        touching=np.full(places, NEVER),
     )
 
 
@@ -101,17 +103,26 @@ def gap_of(model: Model, memory: Memory, candidate: int) -> float:
 
 
 @dissolved_kernel
-def begin_step(free: Floats, impact: Impact) -> None:
-    """Keep the free velocity and what touched; nothing touches yet, nothing is called."""
-    for j in range(free.shape[0]):
-        impact.free[j] = free[j]
-    for place in range(impact.touching.shape[0]):
-        impact.touched[place] = impact.touching[place]
-        impact.touching[place] = 0
+def begin_step(velocity: Floats, impact: Impact) -> None:
+    """Keep the free velocity; nothing is called yet."""
+    free = impact.free
+    for j in range(velocity.shape[0]):
+        free[j] = velocity[j]
+    impact.step += 1
     if impact.calls > 0:
         impact.calls = 0
         for place in range(impact.called.shape[0]):
             impact.called[place] = 0
+
+
+@dissolved_kernel
+def note_touching(model: Model, count: int, memory: Memory, impact: Impact) -> None:
+    """Keep which of the candidates touch at the end of this step."""
+    closable = model.contact_link.shape[0] + 2 * model.parent.shape[0]
+    candidates, touches, touching = memory.candidate, impact.touches, impact.touching
+    for place in range(count):
+        if touches[place] == 1 and candidates[place] < closable:
+            touching[candidates[place]] = impact.step
 
 
 @dissolved_kernel
@@ -133,26 +144,27 @@ def find_impact(
     Zero if no contact is new. `problem` is that of the positions, solved.
     """
     closable = model.contact_link.shape[0] + 2 * model.parent.shape[0]
+    candidates, touches, member = memory.candidate, impact.touches, impact.member
+    free, velocity = problem.free, memory.answer.velocity
     members = 0
     happens = False
     for place in range(problem.count):
-        candidate = memory.candidate[place]
+        candidate = candidates[place]
         if candidate >= closable:  # dry friction is always there
-            impact.member[members] = place
+            member[members] = place
             members += 1
             continue
+        # With the linearised gap in the free term these are gaps at the end, divided by the step.
+        arrives = step * velocity[2 * place] <= TOUCHING
+        closes = free[2 * place] < 0.0
         gap = gap_of(model, memory, candidate)
         there = gap <= TOUCHING
-        known = impact.touched[candidate]
-        touched = there if known == UNKNOWN else known == 1
-        touches = step * memory.answer.velocity[2 * place] <= TOUCHING
-        closes = problem.free[2 * place] < 0.0
-        happens = happens or (
-            touches and (gap < -TOUCHING or (closes and not touched and not there))
-        )
-        impact.touching[candidate] = touches
-        if there or (touches and (touched or closes)):
-            impact.member[members] = place
+        touched = impact.touching[candidate] == impact.step - 1
+        new = closes and not touched and not there
+        happens = happens or (arrives and (new or gap < -TOUCHING))
+        touches[place] = arrives
+        if there or (arrives and (touched or closes)):
+            member[members] = place
             members += 1
     return members if happens else 0
 

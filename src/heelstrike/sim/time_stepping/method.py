@@ -57,8 +57,8 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.impact import (
+    NEVER,
     TOUCHING,
-    UNKNOWN,
     Impact,
     allocate_impact,
     begin_step,
@@ -185,7 +185,7 @@ class TimeStepping(Method):
 
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one: gaps tell."""
-        work.impact.touching[: robot.nc] = UNKNOWN
+        work.impact.touching[: robot.nc] = NEVER
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
@@ -208,17 +208,19 @@ def call_missed(model: Model, step: float, near: int, memory: Memory, impact: Im
     """Call the contacts that would go through at the velocity that was found; return if any."""
     points = model.contact_link.shape[0]
     v = impact.arriving if impact.happens == 1 else memory.next_v
+    q, lower, upper = memory.q, model.lower, model.upper
     missed = False
     for joint in range(model.parent.shape[0]):
-        after = memory.q[joint] + step * v[joint]
-        if after < model.lower[joint] - TOUCHING:
+        after = q[joint] + step * v[joint]
+        if after < lower[joint] - TOUCHING:
             missed = call(impact, points + 2 * joint) or missed
-        if after > model.upper[joint] + TOUCHING:
+        if after > upper[joint] + TOUCHING:
             missed = call(impact, points + 2 * joint + 1) or missed
     contacts = memory.contacts
+    gap = contacts.gap
     within = 0
     for contact in range(points):
-        within += contacts.gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
+        within += gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
     if within > near:
         point_velocities(
             model, memory.every_point, memory.tree, contacts.position, contacts.normal, v,
@@ -226,7 +228,7 @@ def call_missed(model: Model, step: float, near: int, memory: Memory, impact: Im
         )  # fmt: skip
         for contact in range(points):
             speed = memory.point_velocity[contact, 0]
-            if contacts.gap[contact] + step * speed < -TOUCHING:
+            if gap[contact] + step * speed < -TOUCHING:
                 missed = call(impact, contact) or missed
     return missed
 
@@ -622,6 +624,8 @@ def solve_contacts(model: Model, memory: Memory, work: Stepping) -> bool:
                 memory.next_v[j] = impact.free[j]
     forget_forces(model, memory)
     note_forces(model, step, count, memory)
+    if scheme == IMPACT_RESOLVED:
+        note_touching(model, count, memory, impact)
     return solved
 
 
