@@ -64,6 +64,7 @@ from heelstrike.sim.time_stepping.impact import (
     begin_step,
     call,
     find_impact,
+    note_touching,
     solve_impact,
 )
 
