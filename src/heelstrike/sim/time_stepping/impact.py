@@ -126,13 +126,10 @@ def note_touching(model: Model, count: int, memory: Memory, impact: Impact) -> N
 
 
 @dissolved_kernel
-def call(impact: Impact, place: int) -> bool:
-    """Call a contact point or stop to take part; return whether it was not called before."""
-    if impact.called[place] == 1:
-        return False
+def call(impact: Impact, place: int) -> None:
+    """Call a contact point or stop to take part."""
+    impact.calls += 1 - impact.called[place]
     impact.called[place] = 1
-    impact.calls += 1
-    return True
 
 
 @dissolved_kernel

@@ -30,7 +30,7 @@ from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import passive_force
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
@@ -137,7 +137,7 @@ class TimeStepping(Method):
     """
 
     step: float = 1e-3
-    scheme: Scheme = Scheme.GAP_LINEARISED
+    scheme: Scheme = Scheme.IMPACT_RESOLVED
     solver: str = "lemke"
     activation: float = 0.0
 
@@ -205,33 +205,40 @@ def is_linearised(scheme: int) -> bool:
 
 
 @dissolved_kernel
-def call_missed(model: Model, step: float, near: int, memory: Memory, impact: Impact) -> bool:
-    """Call the contacts that would go through at the velocity that was found; return if any."""
-    points = model.contact_link.shape[0]
-    v = impact.arriving if impact.happens == 1 else memory.next_v
+def may_go_through(model: Model, step: float, near: int, v: Floats, memory: Memory) -> bool:
+    """Whether the velocity that was found could take something through a stop or the ground."""
     q, lower, upper = memory.q, model.lower, model.upper
-    missed = False
-    for joint in range(model.parent.shape[0]):
+    beyond = 0
+    for joint in range(q.shape[0]):
         after = q[joint] + step * v[joint]
-        if after < lower[joint] - TOUCHING:
-            missed = call(impact, points + 2 * joint) or missed
-        if after > upper[joint] + TOUCHING:
-            missed = call(impact, points + 2 * joint + 1) or missed
-    contacts = memory.contacts
-    gap = contacts.gap
+        beyond += (after < lower[joint] - TOUCHING) | (after > upper[joint] + TOUCHING)
+    gap = memory.contacts.gap
     within = 0
-    for contact in range(points):
+    for contact in range(gap.shape[0]):
         within += gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
-    if within > near:
-        point_velocities(
-            model, memory.every_point, memory.tree, contacts.position, contacts.normal, v,
-            memory.point_velocity,
-        )  # fmt: skip
-        for contact in range(points):
-            speed = memory.point_velocity[contact, 0]
-            if gap[contact] + step * speed < -TOUCHING:
-                missed = call(impact, contact) or missed
-    return missed
+    return beyond > 0 or within > near
+
+
+@kernel
+def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Impact) -> bool:
+    """Call what would go through at the velocity that was found; return if any is new."""
+    points = model.contact_link.shape[0]
+    contacts = memory.contacts
+    point_velocities(
+        model, memory.every_point, memory.tree, contacts.position, contacts.normal, v,
+        memory.point_velocity,
+    )  # fmt: skip
+    calls = impact.calls
+    for contact in range(points):
+        if contacts.gap[contact] + step * memory.point_velocity[contact, 0] < -TOUCHING:
+            call(impact, contact)
+    for joint in range(model.parent.shape[0]):
+        after = memory.q[joint] + step * v[joint]
+        if after < model.lower[joint] - TOUCHING:
+            call(impact, points + 2 * joint)
+        if after > model.upper[joint] + TOUCHING:
+            call(impact, points + 2 * joint + 1)
+    return impact.calls > calls
 
 
 @dissolved_kernel
@@ -295,11 +302,11 @@ def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
 
 @dissolved_kernel
 def select_candidates(
-    model: Model, step: float, scheme: int, activation: float, called: Integers, memory: Memory
+    model: Model, step: float, scheme: int, activation: float, impact: Impact, memory: Memory
 ) -> int:
     """List the contact points that could act in this step, with their free terms."""
     contacts = memory.contacts
-    linearised = is_linearised(scheme)
+    linearised, calls = is_linearised(scheme), impact.calls
     farthest = FAR_STEPS * CLOSING_SPEED * step
     if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
         farthest = activation
@@ -333,7 +340,9 @@ def select_candidates(
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if linearised:
-            if gap > step * max(CLOSING_SPEED, -2.0 * normal) and called[contact] == 0:
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal) and (
+                calls == 0 or impact.called[contact] == 0
+            ):
                 continue
             normal += gap / step
         elif scheme == MOREAU_JEAN:
@@ -363,12 +372,12 @@ def select_stops(
     scheme: int,
     activation: float,
     count: int,
-    called: Integers,
+    impact: Impact,
     memory: Memory,
 ) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     points = model.contact_link.shape[0]
-    linearised = is_linearised(scheme)
+    linearised, calls = is_linearised(scheme), impact.calls
     for joint in range(model.parent.shape[0]):
         for end in range(2):
             sign = 1.0 - 2.0 * end
@@ -378,7 +387,7 @@ def select_stops(
             before = sign * memory.v[joint]
             if linearised:
                 near = gap < step * max(CLOSING_RATE, -2.0 * normal)
-                if not near and called[points + 2 * joint + end] == 0:
+                if not near and (calls == 0 or impact.called[points + 2 * joint + end] == 0):
                     continue
                 normal += gap / step
             elif scheme == MOREAU_JEAN:
@@ -611,15 +620,21 @@ def solve_contacts(model: Model, memory: Memory, work: Stepping) -> bool:
     count = 0
     while again:
         impact.happens = 0
-        near = select_candidates(model, step, scheme, activation, impact.called, memory)
-        count = select_stops(model, step, scheme, activation, near, impact.called, memory)
+        near = select_candidates(model, step, scheme, activation, impact, memory)
+        count = select_stops(model, step, scheme, activation, near, impact, memory)
         count = select_dry_joints(model, count, memory)
         if count > 0:
             solved = solve_candidates(model, near, count, memory, work)
         else:
             for i in range(3):
                 memory.answer.residual[i] = 0.0
-        again = is_linearised(scheme) and solved and call_missed(model, step, near, memory, impact)
+        v = impact.arriving if impact.happens == 1 else memory.next_v
+        again = (
+            is_linearised(scheme)
+            and solved
+            and may_go_through(model, step, near, v, memory)
+            and call_missed(model, step, v, memory, impact)
+        )
         if again:
             for j in range(model.parent.shape[0]):
                 memory.next_v[j] = impact.free[j]
