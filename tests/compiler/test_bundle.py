@@ -174,6 +174,23 @@ def test_contents_put_back_are_the_bundle_as_it_was() -> None:
             bundle.fill(spoilt)
 
 
+class Whole(Bundle):
+    own: np.ndarray = array("n")
+    inner: Inner = part(Inner, flat=True)
+    other: Inner = part(Inner)
+
+
+def test_a_flat_part_is_stored_under_the_names_of_its_own_members() -> None:
+    whole = Whole.allocate(n=2)
+    whole.inner.values[:] = [1.0, 2.0]
+    assert [name for name, _ in whole.storage()] == ["own", "values", "other.values"]
+    again = Whole.allocate(n=2)
+    again.fill(whole.contents())
+    assert again.inner.values.tolist() == [1.0, 2.0]
+    copied = whole.stored(lambda name, array: array + (name == "values"))
+    assert copied.inner.values.tolist() == [2.0, 3.0]
+
+
 @pytest.mark.parametrize(
     "name", ["table", "address", "members", "storage", "contents", "fill", "become", "dtype"]
 )

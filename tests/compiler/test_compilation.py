@@ -34,9 +34,9 @@ PROBE = """
 import numpy as np
 from heelstrike.robot import load_robot
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 robot = load_robot("bravo7")
-work = workspace(robot.nv)
+work = Workspace.allocate(**robot.model.extents)
 kernels.forward_kinematics(robot.model, robot.model.reference, work)
 kernels.link_velocities(robot.model, np.zeros(robot.nv), work)
 force = np.zeros(robot.nv)
@@ -386,7 +386,7 @@ def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:
     before.solver.solvers[:] = 0
     try_solvers.finish()
     memory.become(before)
-    assert memory.solver.solvers[0] == try_solvers.address[0] != 0
+    assert memory.assembly.solver.solvers[0] == try_solvers.address[0] != 0
 
 
 @pytest.mark.skipif(BY_DOCUMENTED_NAMES, reason="Numba counts references there")

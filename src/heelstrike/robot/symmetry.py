@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,16 +13,13 @@ from numpy.typing import ArrayLike
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
 from heelstrike.robot.robot import Foot
-from heelstrike.robot.warning import warn
 
 TOLERANCE = 1e-6
 """Relative difference up to which numbers of left and right are the same (files round)."""
 
-SHOWN = 6  # how many differences a message lists before it counts the rest
-
 _WORDS = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
 _SIDES = {"left": "left", "l": "left", "right": "right", "r": "right"}
-_OTHER = {"l": "r", "r": "l"}
+_OTHER = str.maketrans("lrLR", "rlRL")
 
 
 def find_mirror(
@@ -29,8 +28,7 @@ def find_mirror(
     link_names: tuple[str, ...],
     feet: tuple[Foot, ...],
     friction: Sequence[float],
-    source: str,
-) -> Mirror | None:
+) -> tuple[Mirror | None, list[str]]:
     """Find the exchange of left and right, and check it on every number of the robot.
 
     Sides are recognised by the words left, right, l, r in the names of joints (or else of links),
@@ -47,40 +45,34 @@ def find_mirror(
         Its feet.
     friction : sequence of nc float
         Friction of every contact point according to the robot's file.
-    source : str
-        What to call the robot in messages.
 
     Returns
     -------
-    Mirror or None
-        None if no names pair up, which is silent, or if a pair differs, which earns a
-        `RobotWarning` with the numbers in which it does.
+    mirror : Mirror or None
+        None if no names pair up, or if a pair differs.
+    differences : list of str
+        In what, with the numbers.
     """
     joint = _pairs(joint_names)
     if joint is None:
         joint = _pairs(_numbered(link_names))
     if joint is None:
-        return None
-    sign = _signs(model, joint)
-    contact = _contact_pairs(model, joint)
+        return None, []
+    mirror = Mirror(
+        joint, _signs(model, joint), _contact_pairs(model, joint), np.zeros(0, np.int64),
+        model.reference,
+    )  # fmt: skip
     findings = [
         *_unpaired(joint_names, joint),
-        *_differing_joints(model, joint, sign, joint_names),
-        *_differing_actuators(model, joint, sign, joint_names),
-        *_differing_contacts(model, joint, contact, friction, link_names),
+        *_differing_joints(model, mirror, joint_names),
+        *_differing_actuators(model, mirror, joint_names),
+        *_differing_contacts(model, mirror, friction, link_names),
     ]
-    differences = list(dict.fromkeys(findings))  # two points of a foot may say the same
-    if differences:
-        shown, more = "; ".join(differences[:SHOWN]), len(differences) - SHOWN
-        tail = f"; and {more} more" if more > 0 else ""
-        warn(
-            f"{source}: left and right differ, so the robot has no mirror image: {shown}{tail}. "
-            "Gaits whose steps mirror each other need two equal legs."
-        )
-        return None
+    if findings:
+        return None, list(dict.fromkeys(findings))  # two points of a foot may say the same
     by_link = {foot.link: i for i, foot in enumerate(feet)}
     foot = np.array([by_link[int(joint[foot.link])] for foot in feet], dtype=np.int64)
-    return Mirror(joint, sign, contact, foot)
+    return replace(mirror, foot=foot), []
 
 
 def _side(name: str, names: Sequence[str]) -> tuple[str, str]:
@@ -89,26 +81,14 @@ def _side(name: str, names: Sequence[str]) -> tuple[str, str]:
     A bare first letter, as in lhip, counts only if `names` has the other side's, rhip.
     """
     words = [word.lower() for word in _WORDS.findall(name)]
-    side = ""
-    rest: list[str] = []
-    for word in words:
-        if not side and word in _SIDES:
-            side = _SIDES[word]
-        elif not side and len(word) > 4 and word.startswith("left"):
-            side, rest = "left", [*rest, word[4:]]
-        elif not side and len(word) > 5 and word.startswith("right"):
-            side, rest = "right", [*rest, word[5:]]
-        else:
-            rest.append(word)
-    letter = name[:1].lower()
-    if not side and letter in _OTHER and _swapped(name) in names:
-        return _SIDES[letter], name[1:].lower()
-    return side, " ".join(rest)
-
-
-def _swapped(name: str) -> str:
-    other = _OTHER[name[0].lower()]
-    return (other.upper() if name[0].isupper() else other) + name[1:]
+    for k, word in enumerate(words):
+        side = _SIDES.get(word) or next((s for s in ("left", "right") if word.startswith(s)), "")
+        if side:
+            words[k : k + 1] = [] if word in _SIDES else [word.removeprefix(side)]
+            return side, " ".join(words)
+    if name[:1].translate(_OTHER) + name[1:] in names and name[:1].lower() in _SIDES:
+        return _SIDES[name[0].lower()], name[1:].lower()
+    return "", " ".join(words)
 
 
 def _numbered(names: Sequence[str]) -> tuple[str, ...]:
@@ -157,82 +137,83 @@ def _unpaired(names: Sequence[str], joint: Integers) -> Iterator[str]:
             yield f"{name} has no counterpart"
 
 
-def _differing_joints(
-    model: Model, joint: Integers, sign: Floats, names: Sequence[str]
-) -> Iterator[str]:
-    parent = model.parent
+def _differing_joints(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    joint, parent = mirror.joint, model.parent
     for i, j in enumerate(joint):
         expected = joint[parent[i]] if parent[i] >= 0 else -1
         if parent[j] != expected:
             yield f"{names[i]} and {names[j]} hang on links that are not counterparts"
+    ranges = (
+        np.transpose([model.lower, model.upper]),
+        np.transpose(mirror.ranges(model.lower, model.upper)),
+    )
+    rests = model.rest, mirror.position(model.rest)
     for i, j in enumerate(joint):
         if j <= i:
             continue
         pair = f"of {names[i]} and {names[j]}"
-        if not _same(model.axis[i], sign[i] * model.axis[j]):
+        if not _same(model.axis[i], mirror.sign[i] * model.axis[j]):
             yield f"axis {pair} (not parallel)"
-        for name in (name for name, number in NUMBERS.items() if number.alike):
-            a, b = getattr(model, name)[i], getattr(model, name)[j]
-            if not _same(a, b):
-                yield f"{label(name)} {pair} ({_text(a)}, {_text(b)})"
-        turned = slice(None) if sign[i] > 0 else slice(None, None, -1)
-        range_i = np.array([model.lower[i], model.upper[i]]) - model.reference[i]
-        range_j = sign[i] * (np.array([model.lower[j], model.upper[j]]) - model.reference[j])
-        if not _same(range_i, range_j[turned]):
-            yield f"range {pair} ({_text(range_i)}, {_text(range_j[turned])})"
+        compared = [
+            (label(name), *getattr(model, name)[[i, j]])
+            for name, number in NUMBERS.items()
+            if number.alike
+        ]
+        start = model.reference[i]
+        compared.append(("range", *(ends[i] - start for ends in ranges)))
         if model.stiffness[i] or model.stiffness[j]:
-            rest_i = model.rest[i] - model.reference[i]
-            rest_j = sign[i] * (model.rest[j] - model.reference[j])
-            if not _same(rest_i, rest_j):
-                yield f"rest of the spring {pair} ({_text(rest_i)}, {_text(rest_j)})"
+            compared.append(("rest of the spring", *(rest[i] - start for rest in rests)))
+        yield from _unequal(compared, pair)
 
 
-def _differing_actuators(
-    model: Model, joint: Integers, sign: Floats, names: Sequence[str]
-) -> Iterator[str]:
-    limits = {
-        int(k): np.array([low, high])
-        for k, low, high in zip(
-            model.actuator_joint, model.torque_lower, model.torque_upper, strict=True
+def _differing_actuators(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    limits = dict(
+        zip(
+            model.actuator_joint.tolist(),
+            np.transpose([model.torque_lower, model.torque_upper]),
+            strict=True,
         )
-    }
-    for i, j in enumerate(joint.tolist()):
-        if (i in limits) and (j not in limits):
+    )
+    for i, j in enumerate(mirror.joint.tolist()):
+        if i in limits and j not in limits:
             yield f"{names[i]} has an actuator, {names[j]} has none"
         elif j > i and i in limits:
-            there = sign[i] * limits[j]
-            there = there if sign[i] > 0 else there[::-1]
-            if not _same(limits[i], there):
-                yield (
-                    f"torque limits of {names[i]} and {names[j]} "
-                    f"({_text(limits[i])}, {_text(there)})"
-                )
+            image = np.sort(mirror.sign[i] * limits[j])
+            yield from _unequal(
+                [("torque limits", limits[i], image)], f"of {names[i]} and {names[j]}"
+            )
 
 
 def _differing_contacts(
-    model: Model,
-    joint: Integers,
-    contact: Integers,
-    friction: Sequence[float],
-    names: Sequence[str],
+    model: Model, mirror: Mirror, friction: Sequence[float], names: Sequence[str]
 ) -> Iterator[str]:
+    joint = mirror.joint
     for i, j in enumerate(joint):
         here, there = (int(np.sum(model.contact_link == k)) for k in (i, j))
         if i < j and here != there:
             yield f"number of contact points on {names[i]} and {names[j]} ({here}, {there})"
-    for i, j in enumerate(contact.tolist()):
+    for i, j in enumerate(mirror.contact.tolist()):
         link, other = model.contact_link[i], joint[model.contact_link[i]]
         if model.contact_link[j] != other or link > other:
             continue  # no counterpart at all (told above), or told from the other side
+        compared: list[tuple[Any, ...]] = [
+            ("radius of the contact points", *model.contact_radius[[i, j]]),
+            ("friction of the contact points", friction[i], friction[j]),
+        ]
+        places = ("contact points", *model.contact_position[[i, j]])
+        alone = mirror.contact[j] != i
         pair = f"of {names[link]} and {names[other]}"
-        for what, values, paired in (
-            ("contact points", model.contact_position, contact[j] == i),
-            ("radius of the contact points", model.contact_radius, True),
-            ("friction of the contact points", friction, True),
-        ):
-            a, b = values[i], values[j]
-            if not (paired and _same(a, b)):
-                yield f"{what} {pair} ({_text(a)}, {_text(b)})"
+        yield from _unequal([places], pair, alone=alone)
+        yield from _unequal(compared, pair)
+
+
+def _unequal(
+    compared: Iterable[tuple[Any, ...]], pair: str, *, alone: bool = False
+) -> Iterator[str]:
+    """Tell which numbers (what, on this side, on the other) are not the same, or stand alone."""
+    for what, here, there in compared:
+        if alone or not _same(here, there):
+            yield f"{what} {pair} ({_text(here)}, {_text(there)})"
 
 
 def _same(a: ArrayLike, b: ArrayLike) -> bool:

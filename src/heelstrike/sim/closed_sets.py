@@ -85,3 +85,8 @@ class Scheme(enum.IntEnum):
     MOREAU_JEAN = 3
     LINEARLY_IMPLICIT = 4
     IMPACT_RESOLVED = 5
+
+    @property
+    def label(self) -> str:
+        """Its name in prose and on the command line: ``moreau-jean``."""
+        return self.name.lower().replace("_", "-")

@@ -11,38 +11,25 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
+from heelstrike.view.panels import Excerpt
+from heelstrike.view.quantity_figure import draw_quantity
 from heelstrike.view.style import save_figure, styled
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-_DRAWINGS: dict[str, tuple[str, Callable[[Run, Gait | None, slice], Figure]]] = {
-    "tracking": (
-        "joint positions with the gait's reference (paper Figure 3)",
-        joint_figures.draw_tracking,
-    ),
-    "velocities": (
-        "joint velocities with the gait's reference (paper Figure 4)",
-        joint_figures.draw_velocities,
-    ),
-    "zmp": (
-        "zero moment point of the stance foot within its sole (paper Figure 5)",
-        contact_figures.draw_zero_moment_point,
-    ),
-    "friction": (
-        "tangential force of each foot within the friction cone (paper Figure 6)",
-        contact_figures.draw_friction,
-    ),
-    "forces": ("normal and tangential force on each foot", contact_figures.draw_forces),
-    "torque": ("joint torques with their limits", joint_figures.draw_torque),
-    "gaps": ("heights of the contact points above the ground", contact_figures.draw_gaps),
-    "energy": (
-        "mechanical energy, the work that changed it, and what no work explains",
-        energy_figure.draw_energy,
-    ),
-    "snapshots": ("the robot in the course of one step", snapshots.draw_snapshots),
+_DRAWINGS: dict[str, Callable[[Excerpt], Figure]] = {
+    "tracking": joint_figures.draw_tracking,
+    "velocities": joint_figures.draw_velocities,
+    "zmp": contact_figures.draw_zero_moment_point,
+    "friction": contact_figures.draw_friction,
+    "forces": contact_figures.draw_forces,
+    "torque": joint_figures.draw_torque,
+    "gaps": contact_figures.draw_gaps,
+    "energy": energy_figure.draw_energy,
+    "snapshots": snapshots.draw_snapshots,
 }
 
 FIGURES = tuple(_DRAWINGS)
@@ -66,7 +53,8 @@ def plot(
     what : str
         One of :data:`FIGURES`: ``"tracking"``, ``"velocities"``, ``"zmp"`` and ``"friction"`` are
         the paper's Figures 3 to 6; ``"forces"``, ``"torque"``, ``"gaps"``, ``"energy"``,
-        ``"snapshots"``.
+        ``"snapshots"``. Or the name of an array of the run, such as ``"slip_velocity"``, which is
+        drawn as it is.
     gait : Gait, optional
         The gait that the run followed; without it no references are drawn.
     path : str or path, optional
@@ -87,11 +75,12 @@ def plot(
     GaitError
         If the gait does not fit the robot of the run.
     """
-    if what not in _DRAWINGS:
+    if what not in _DRAWINGS and what not in QUANTITIES:
         raise ViewError(_unknown(what))
-    rows = _rows(run, span)
+    excerpt = Excerpt(run, _rows(run, span), gait)
     with styled():
-        figure = _DRAWINGS[what][1](run, gait, rows)
+        drawing = _DRAWINGS.get(what)
+        figure = draw_quantity(excerpt, what) if drawing is None else drawing(excerpt)
     if path is not None:
         save_figure(figure, path)
     return figure
@@ -117,7 +106,10 @@ def _rows(run: Run, span: tuple[float, float] | None) -> slice:
 
 
 def _unknown(what: str) -> str:
-    near = difflib.get_close_matches(str(what).lower(), FIGURES, n=1)
+    near = difflib.get_close_matches(str(what).lower(), (*FIGURES, *QUANTITIES), n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
-    names = "; ".join(f"{name}: {words}" for name, (words, _) in _DRAWINGS.items())
-    return f"there is no figure called {what!r}.{guess} There are {names}."
+    names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
+    return (
+        f"there is no figure called {what!r}.{guess} There are: {names} And what is recorded: "
+        f"{', '.join(QUANTITIES)}."
+    )

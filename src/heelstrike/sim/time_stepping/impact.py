@@ -30,7 +30,8 @@ from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.memory import Assembly, Equations, Surface, contact_capacity
 
 Floats = NDArray[np.float64]
 
@@ -78,8 +79,9 @@ class Impact(Bundle):
     answer: ContactAnswer = part(ContactAnswer)
 
 
-def allocate_impact(robot: Robot, capacity: int) -> Impact:
+def allocate_impact(robot: Robot) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
+    capacity = contact_capacity(robot)
     places = robot.nc + 2 * robot.nv
     return Impact.allocate(
         nv=robot.nv,
@@ -91,23 +93,21 @@ def allocate_impact(robot: Robot, capacity: int) -> Impact:
 
 
 @kernel
-def gap_of(model: Model, memory: Memory, candidate: int) -> float:
+def gap_of(model: Model, q: Floats, gap: Floats, candidate: int) -> float:
     """Gap of a contact point or a joint stop."""
-    points = model.contact_link.shape[0]
-    if candidate < points:
-        return memory.contacts.gap[candidate]
-    joint = (candidate - points) // 2
-    if (candidate - points) % 2 == 1:
-        return model.upper[joint] - memory.q[joint]
-    return memory.q[joint] - model.lower[joint]
+    stop = candidate - model.nc
+    if stop < 0:
+        return gap[candidate]
+    if stop % 2 == 1:
+        return model.upper[stop // 2] - q[stop // 2]
+    return q[stop // 2] - model.lower[stop // 2]
 
 
 @dissolved_kernel
 def begin_step(velocity: Floats, impact: Impact) -> None:
     """Keep the free velocity; nothing is called yet."""
-    free = impact.free
     for j in range(velocity.shape[0]):
-        free[j] = velocity[j]
+        impact.free[j] = velocity[j]
     impact.step += 1
     if impact.calls > 0:
         impact.calls = 0
@@ -116,49 +116,49 @@ def begin_step(velocity: Floats, impact: Impact) -> None:
 
 
 @dissolved_kernel
-def note_touching(model: Model, count: int, memory: Memory, impact: Impact) -> None:
-    """Keep which of the candidates touch at the end of this step."""
-    closable = model.contact_link.shape[0] + 2 * model.parent.shape[0]
-    candidates, touches, touching = memory.candidate, impact.touches, impact.touching
-    for place in range(count):
-        if touches[place] == 1 and candidates[place] < closable:
-            touching[candidates[place]] = impact.step
-
-
-@dissolved_kernel
-def call(impact: Impact, place: int) -> None:
+def call(place: int, impact: Impact) -> None:
     """Call a contact point or stop to take part."""
     impact.calls += 1 - impact.called[place]
     impact.called[place] = 1
 
 
 @dissolved_kernel
-def find_impact(
-    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
-) -> int:
-    """Note which contacts touch at the end of the step; return how many take part in an impact.
+def note_touching(model: Model, candidate: Integers, count: int, impact: Impact) -> None:
+    """Keep which of the candidates touch at the end of this step."""
+    closable = model.nc + 2 * model.nv
+    touches, touching = impact.touches, impact.touching
+    for place in range(count):
+        if touches[place] == 1 and candidate[place] < closable:
+            touching[candidate[place]] = impact.step
 
-    Zero if no contact is new. `problem` is that of the positions, solved.
+
+@dissolved_kernel
+def find_impact(
+    model: Model, step: float, q: Floats, gap: Floats, problem: ContactProblem,
+    assembly: Assembly, impact: Impact,
+) -> int:  # fmt: skip
+    """Find what touches at the end of the step; return how many take part in an impact.
+
+    Zero if there is none. `problem` is that of the positions, solved. Writes `impact`.
     """
-    closable = model.contact_link.shape[0] + 2 * model.parent.shape[0]
-    candidates, touches, member = memory.candidate, impact.touches, impact.member
-    free, velocity = problem.free, memory.answer.velocity
+    closable = model.nc + 2 * model.nv
+    touches, member = impact.touches, impact.member
     members = 0
     happens = False
     for place in range(problem.count):
-        candidate = candidates[place]
+        candidate = assembly.candidate[place]
         if candidate >= closable:  # dry friction is always there
             member[members] = place
             members += 1
             continue
         # With the linearised gap in the free term these are gaps at the end, divided by the step.
-        arrives = step * velocity[2 * place] <= TOUCHING
-        closes = free[2 * place] < 0.0
-        gap = gap_of(model, memory, candidate)
-        there = gap <= TOUCHING
+        arrives = step * assembly.answer.velocity[2 * place] <= TOUCHING
+        closes = problem.free[2 * place] < 0.0
+        now = gap_of(model, q, gap, candidate)
+        there = now <= TOUCHING
         touched = impact.touching[candidate] == impact.step - 1
         new = closes and not touched and not there
-        happens = happens or (arrives and (new or gap < -TOUCHING))
+        happens = happens or (arrives and (new or now < -TOUCHING))
         touches[place] = arrives
         if there or (arrives and (touched or closes)):
             member[members] = place
@@ -166,14 +166,13 @@ def find_impact(
     return members if happens else 0
 
 
-@dissolved_kernel
+@kernel
 def pose_impact(
-    model: Model, step: float, members: int, problem: ContactProblem, memory: Memory, impact: Impact
-) -> None:
+    model: Model, step: float, members: int, q: Floats, equations: Equations, contacts: Contacts,
+    surface: Surface, problem: ContactProblem, assembly: Assembly, impact: Impact,
+) -> None:  # fmt: skip
     """Write the problem of the impact: what takes part, without the gaps, with restitution."""
-    points = model.contact_link.shape[0]
-    closable = points + 2 * model.parent.shape[0]
-    contacts, its = memory.contacts, impact.problem
+    its = impact.problem
     for place in range(members):
         source = impact.member[place]
         for other in range(members):
@@ -182,35 +181,28 @@ def pose_impact(
                 for j in range(2):
                     entry = problem.delassus[2 * source + i, column + j]
                     its.delassus[2 * place + i, 2 * other + j] = entry
-        candidate = memory.candidate[source]
+        candidate = assembly.candidate[source]
         normal = problem.free[2 * source]
-        if candidate < closable:
-            normal -= gap_of(model, memory, candidate) / step
-        if candidate < points:
-            before, _ = contact_velocity(
-                model.contact_link[candidate],
-                contacts.position[candidate],
-                contacts.normal[candidate],
-                memory.tree,
-            )
-            normal += memory.restitution[candidate] * before
+        if candidate < model.nc + 2 * model.nv:
+            normal -= gap_of(model, q, contacts.gap, candidate) / step
+        if candidate < model.nc:
+            before, _ = contact_velocity(model, equations.tree, contacts, candidate)
+            normal += surface.restitution[candidate] * before
         its.free[2 * place] = normal
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]
         its.set[place] = problem.set[source]
-        impact.answer.mode[place] = memory.answer.mode[source]
+        impact.answer.mode[place] = assembly.answer.mode[source]
     its.count = members
 
 
-@dissolved_kernel
+@kernel
 def solve_impact(
-    model: Model, step: float, members: int, order: Integers, problem: ContactProblem,
-    memory: Memory, impact: Impact,
-) -> bool:  # fmt: skip
+    order: Integers, members: int, problem: ContactProblem, impact: Impact, assembly: Assembly
+) -> bool:
     """Put the answer of the impact in the place of that of the positions; return success."""
-    pose_impact(model, step, members, problem, memory, impact)
-    status = solve_contact_kernel(impact.problem, order, memory.solver, impact.answer)
-    answer, its = memory.answer, impact.answer
+    status = solve_contact_kernel(impact.problem, order, assembly.solver, impact.answer)
+    answer, its = assembly.answer, impact.answer
     for place in range(problem.count):
         answer.mode[place] = OPEN
         answer.impulse[2 * place] = 0.0
