@@ -35,6 +35,32 @@ class Foot:
     contacts: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class LockedJoint:
+    """A joint of a robot's file that the planar robot does not have.
+
+    Attributes
+    ----------
+    name, link : str
+        Name of the joint and of the body that it moves in the file.
+    kind : str
+        ``hinge``, ``slide``, ``ball`` or ``free``.
+    axis : (3,) float
+        Its axis in the world (x forward, y to the left, z up); zero where it has no single one.
+    position : float
+        Where it is locked (rad, m).
+    reason : str
+        Why it does not move.
+    """
+
+    name: str
+    link: str
+    kind: str
+    axis: tuple[float, float, float]
+    position: float
+    reason: str
+
+
 @dataclass(frozen=True, eq=False)
 class Robot:
     """A planar robot.
@@ -63,6 +89,8 @@ class Robot:
         simulation takes friction from its `Ground`.
     source : str
         File or builder the robot came from, for error messages.
+    locked : tuple of LockedJoint
+        Joints of its file that do not move here, as ``projected=True`` makes them.
     """
 
     name: str
@@ -76,6 +104,7 @@ class Robot:
     floating: bool
     contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
+    locked: tuple[LockedJoint, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if self.mirror is not None:

@@ -22,6 +22,8 @@ know have 200 kB."""
 DEEPEST_INCLUDE = 20
 """Most files that include one another in a chain."""
 
+_AROUND = "\0\ufeff \t\r\n"  # what a text may have before and after it
+
 MOST_FILES = 500
 """Most files that a robot is made of, each counted as often as it is included."""
 
@@ -88,8 +90,21 @@ def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:
         place = Place(source.parent, source.parent, (source,))
     else:
         place = Place(Path(), Path())
-    text = _read(source, reading.label) if isinstance(source, Path) else source
+    text = plain(_read(source, reading.label) if isinstance(source, Path) else source)
     return _tree(text, reading.label, place, reading), place, text
+
+
+def plain(text: str) -> str:
+    """Return a text without what editors leave around it, every line where it was.
+
+    That is null characters and byte order marks at both ends, and blank lines before the XML
+    declaration, which has to come first: it goes, since it says nothing.
+    """
+    bare = text.lstrip(_AROUND)
+    lines = text[: len(text) - len(bare)].count("\n")
+    if lines and bare.startswith("<?xml"):
+        bare = bare[bare.find("?>") + 2 :]
+    return "\n" * lines + bare.rstrip(_AROUND)
 
 
 def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
@@ -97,7 +112,7 @@ def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
     reading.characters += len(text)
     if reading.characters > LARGEST_FILE:
         raise RobotError(_too_large(reading.label))
-    if not text.strip("\ufeff \t\r\n"):
+    if not text.strip():
         raise RobotError(f"{label}: the file is empty.")
     if "\0" in text:
         raise RobotError(f"{label}: this is not a text file; MJCF and URDF are XML text.")
@@ -160,7 +175,7 @@ def _below(path: Path, label: str, where: str, place: Place, reading: Reading) -
             "which no robot needs. Join some of them."
         )
     below = Place(place.main, path.parent, (*place.above, here))
-    return _tree(_read(path, label), label, below, reading)
+    return _tree(plain(_read(path, label)), label, below, reading)
 
 
 def read_model(element: Element, label: str, place: Place, reading: Reading) -> tuple[Node, Place]:
