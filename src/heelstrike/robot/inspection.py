@@ -153,7 +153,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
             if path is None:
                 raise
             loadable = False
-            findings += _of_inertias(path)
+            findings += _of_inertias(path, how)
             try:
                 found = read_mjcf(path, lenient=True, **how)
             except RobotError as still:
@@ -162,7 +162,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
                 raise error from None
         else:
             if path is not None:
-                findings += _of_inertias(path)
+                findings += _of_inertias(path, how)
     said = dict.fromkeys(str(one.message) for one in caught if one.category is RobotWarning)
     told_below = ("left and right differ", UNLIKELY)
     findings += [
@@ -183,11 +183,12 @@ def _file(robot: str | os.PathLike[str]) -> Path | None:
     return path if is_readable(path) else None
 
 
-def _of_inertias(path: Path) -> Iterator[Finding]:
+def _of_inertias(path: Path, how: LoadOptions) -> Iterator[Finding]:
     """Inertias that the file states in three dimensions and no body can have; masses of zero."""
     from heelstrike.robot.files.mujoco_file import parsed_bodies
+    from heelstrike.robot.files.options import Options
 
-    for name, mass, tensor in parsed_bodies(path):
+    for name, mass, tensor in parsed_bodies(path, Options(**how)):
         if not mass >= MASSLESS:
             yield Finding(FindingKind.MASS, f"body {name!r} has the mass {mass:g} kg.")
         # Who states no other moment than one means a planar robot.

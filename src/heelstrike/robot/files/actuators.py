@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.robot.files.drives import EFFORT, Drive, drives_of
 from heelstrike.robot.files.flattening import BALL
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.snapping import IN_PLANE
@@ -59,7 +60,7 @@ def read_actuators(file: MujocoFile) -> Actuators:
     model = file.model
     place = {one.joint: index for index, one in enumerate(file.coordinates) if one.joint >= 0}
     if file.is_urdf and model.nu == 0:
-        return _from_effort_limits(file, place)
+        return _from_urdf(file, place)
     driven: list[int] = []  # coordinates
     actuators: list[int] = []
     gears: list[float] = []
@@ -96,14 +97,61 @@ def read_actuators(file: MujocoFile) -> Actuators:
     )
 
 
-def _from_effort_limits(file: MujocoFile, place: dict[int, int]) -> Actuators:
-    """Drive every joint of a URDF that has an effort limit: the format has no actuators."""
-    joints = [int(joint) for joint in np.flatnonzero(file.model.jnt_actfrclimited)]
-    joints = sorted((joint for joint in joints if joint in place), key=lambda joint: place[joint])
-    driven = [place[joint] for joint in joints]
-    names = [file.name("joint", joint) for joint in joints]
-    none = np.zeros(len(driven))
-    return _assembled(file, driven, file.model.jnt_actfrcrange[joints], names, none, none)
+def _from_urdf(file: MujocoFile, place: dict[int, int]) -> Actuators:
+    """Drive what the transmissions of a URDF name, without any every joint with an effort limit."""
+    model = file.model
+    drives = drives_of(file.xml, file.source)
+    index = {file.given_name("joint", joint): joint for joint in place}
+    known = {joint.get("name", "") for joint in file.xml.iterfind("joint")}
+    unknown = [name for name in drives if name not in known]
+    if unknown:
+        raise file.error(f"a transmission drives joint {unknown[0]!r}, but there is none.")
+    limited = {name for name, joint in index.items() if model.jnt_actfrclimited[joint]}
+    named = [name for name in index if name in drives] if drives else []
+    joints = sorted(named or limited, key=lambda name: place[index[name]])
+    limits, used = [], []
+    for name in joints:
+        drive = drives.get(name) or Drive(name, set())
+        torque = np.array([drive.lower, drive.upper])
+        if name in limited:
+            torque = _intersect(torque, model.jnt_actfrcrange[index[name]])
+        if not torque[0] < torque[1]:
+            raise file.error(f"the limits of the torque of joint {name!r} contradict each other.")
+        limits.append(torque)
+        used.append(drive)
+    _tell_of_drives(file, joints, used, limits, limited if named else set())
+    return _assembled(
+        file,
+        [place[index[name]] for name in joints],
+        np.array(limits, dtype=np.float64).reshape(-1, 2),
+        joints,
+        armature=np.array([drive.armature for drive in used]),
+        damping=np.zeros(len(joints)),
+    )
+
+
+def _tell_of_drives(
+    file: MujocoFile, joints: list[str], drives: list[Drive], limits: list[Floats], idle: set[str]
+) -> None:
+    """Say what the file means otherwise than it is taken, or leaves open."""
+    told = {
+        "are commanded by position or velocity in the file. They are loaded as motors that exert "
+        "the torque a heelstrike controller asks for": [
+            name
+            for name, drive in zip(joints, drives, strict=True)
+            if drive.commands and EFFORT not in drive.commands
+        ],
+        "have a motor and no effort limit: its torque is unlimited": [
+            name
+            for name, torque in zip(joints, limits, strict=True)
+            if not np.isfinite(torque).any()
+        ],
+        "have an effort limit and no transmission, in a file that gives others one: no motor "
+        "drives them": sorted(idle.difference(joints)),
+    }
+    for what, names in told.items():
+        if names:
+            warn(f"{file.source}: joints {', '.join(names)} {what}.")
 
 
 def _assembled(

@@ -6,7 +6,7 @@ import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -21,12 +21,15 @@ from heelstrike.robot.files.options import Options
 from heelstrike.robot.files.screening.screening import Screened, screen
 from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
 from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
+from heelstrike.robot.files.screening.xml_tree import xml_text
+from heelstrike.robot.files.sdf.translation import as_mjcf
 from heelstrike.robot.files.urdf import (
     WORLD,
     let_massless_links_pass,
     missing_moments,
     urdf_text,
 )
+from heelstrike.robot.files.xacro import expanded
 from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.robot import LockedJoint
 from heelstrike.robot.warning import warn
@@ -123,7 +126,7 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     """
     options = options or Options()
     label = str(source) if isinstance(source, Path) else "XML string"
-    file = screen(source, label)
+    file = _screened(source, options, label)
     xml = file.xml
     import mujoco
 
@@ -156,7 +159,21 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     )
 
 
-def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
+def _screened(source: Path | str, options: Options, label: str) -> Screened:
+    """Return a file that may be parsed, as MJCF or URDF."""
+    written = source
+    if options.arguments is not None and isinstance(source, Path):
+        written = expanded(source, options.arguments, options.packages, label)
+    file = screen(written, label)
+    if file.xml.tag != "sdf":
+        return file
+    directory = source.parent if isinstance(source, Path) else Path()
+    mjcf = as_mjcf(file.xml, directory, options.packages, label)
+    meshes = mjcf.find("asset/mesh") is not None
+    return replace(file, xml=mjcf, text=xml_text(mjcf), delicate=meshes, massless=True)
+
+
+def parsed_bodies(path: Path, options: Options) -> list[tuple[str, float, NDArray[np.float64]]]:
     """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
 
     Bodies that do not move, and those that leave their inertia to their geoms, are not among them.
@@ -169,11 +186,11 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
     import mujoco
 
     label = str(path)
-    file = screen(path, label)
+    file = _screened(path, options, label)
     try:
         with _warnings_into([]), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            spec = _parsed(path, file, label)
+            spec = _parsed(path, file, label, options.packages)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
     return _stated(spec)
@@ -229,8 +246,9 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False
-    if urdf:
+    if urdf or file.massless:
         let_massless_links_pass(spec)
+    if urdf:
         spec.compiler.balanceinertia = False  # which replaces moments that URDF states
     lift_sizes(spec)
     return spec

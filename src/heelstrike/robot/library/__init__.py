@@ -14,7 +14,7 @@ from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.robot import Robot
 
 _HERE = Path(__file__).parent
-_FILE_TYPES = (".xml", ".mjcf", ".urdf")
+_FILE_TYPES = (".xml", ".mjcf", ".urdf", ".sdf", ".world", ".xacro")
 
 
 def builtin_robots() -> tuple[str, ...]:
