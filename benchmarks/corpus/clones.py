@@ -7,9 +7,11 @@ What a clone lacks (large files kept elsewhere) is left out, as a reader would f
 from __future__ import annotations
 
 import csv
+import json
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 TABLE = Path(__file__).with_name("robots.csv")
 
@@ -29,7 +31,9 @@ class Published:
     path : str
         The file, from the root of the repository.
     kind : str
-        ``planar`` or ``spatial``.
+        ``planar``, loaded as it is, or ``spatial``, loaded with ``projected=True``.
+    options : str
+        Further options of `load_robot`, as JSON.
     """
 
     repository: str
@@ -37,6 +41,14 @@ class Published:
     folder: str
     path: str
     kind: str
+    options: str = ""
+
+    def how(self) -> dict[str, Any]:
+        """Options of `load_robot` for this file."""
+        options: dict[str, Any] = {"projected": True} if self.kind == "spatial" else {}
+        if self.path.endswith(".xacro"):
+            options["xacro"] = True
+        return options | (json.loads(self.options) if self.options else {})
 
 
 def published() -> list[Published]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import UNLIKELY, link_origins
-from heelstrike.robot.files.flattening import MASSLESS
+from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.files.saving import body_links
@@ -347,7 +347,7 @@ def _description(robot: Robot) -> str:
 
 
 def _of_locked(robot: Robot) -> list[str]:
-    rows = [("joint", "moves", "kind", "axis", "at", "why")]
+    rows: list[tuple[str, ...]] = [("joint", "moves", "kind", "axis", "at", "why")]
     for one in robot.locked:
         axis = ", ".join(f"{value:.3g}" for value in one.axis) if any(one.axis) else ""
         rows.append((one.name, one.link, one.kind, axis, f"{one.position:.4g}", one.reason))

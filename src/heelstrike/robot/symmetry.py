@@ -80,7 +80,8 @@ def find_mirror(
         tail = f"; and {more} more" if more > 0 else ""
         warn(
             f"{source}: left and right differ, so the robot has no mirror image: {shown}{tail}. "
-            'Gaits whose steps mirror each other need two equal legs: mirror="average" makes them so.'
+            "Gaits whose steps mirror each other need two equal legs, as load_robot makes them "
+            'with mirror="average".'
         )
         return None
     by_link = {foot.link: i for i, foot in enumerate(feet)}
@@ -129,7 +130,8 @@ def averaged(
     left = list(_structure(result, joint, sign, contact, joint_names, link_names))
     if left:
         raise RobotError(
-            f'{source}: mirror="average" cannot make left and right equal: {"; ".join(left[:SHOWN])}.'
+            f'{source}: mirror="average" cannot make left and right equal: '
+            f"{'; '.join(left[:SHOWN])}."
         )
     said = [
         f"{label(name)} by {_text(difference)} ({joint_names[place]})"
@@ -138,7 +140,8 @@ def averaged(
     ]
     if said:
         warn(
-            f"{source}: left and right are made equal by their means. They differed in {', '.join(said)}."
+            f"{source}: left and right are made equal by their means. They differed in "
+            f"{', '.join(said)}."
         )
     return result
 
@@ -263,10 +266,10 @@ def _corner(name: str, names: Sequence[str]) -> tuple[str, str] | None:
         side, place = _CORNERS[word.lower()]
         for other, (far, where) in _CORNERS.items():
             swapped = other.upper() if word.isupper() else other
-            if far != side and where == place:
-                if name[: found.start()] + swapped + name[found.end() :] in names:
-                    rest = f"{name[: found.start()]}{place} {name[found.end() :]}"
-                    return _SIDES[side], rest.lower()
+            twin = name[: found.start()] + swapped + name[found.end() :]
+            if far != side and where == place and twin in names:
+                rest = f"{name[: found.start()]}{place} {name[found.end() :]}"
+                return _SIDES[side], rest.lower()
     return None
 
 
@@ -303,14 +306,18 @@ def _signs(model: Model, joint: Integers) -> Floats:
 
 
 def _contact_pairs(model: Model, joint: Integers) -> Integers:
-    """Nearest contact point on the counterpart of the link of every contact point."""
+    """Counterpart of every contact point: those of two links are matched as near as they can be."""
+    from scipy.optimize import linear_sum_assignment
+
     result = np.arange(len(model.contact_link))
-    for i, link in enumerate(model.contact_link):
-        there = np.flatnonzero(model.contact_link == joint[link])
-        if len(there) and joint[link] != link:
-            apart = model.contact_position[there] - model.contact_position[i]
-            change = np.abs(model.contact_radius[there] - model.contact_radius[i])
-            result[i] = there[np.argmin(np.hypot(*apart.T) + change)]
+    for link, other in enumerate(joint):
+        if link >= other:
+            continue
+        here, there = (np.flatnonzero(model.contact_link == one) for one in (link, other))
+        apart = model.contact_position[here][:, None] - model.contact_position[there]
+        change = np.abs(model.contact_radius[here][:, None] - model.contact_radius[there])
+        one, twin = linear_sum_assignment(np.hypot(apart[..., 0], apart[..., 1]) + change)
+        result[here[one]], result[there[twin]] = there[twin], here[one]
     return result
 
 

@@ -86,6 +86,7 @@ def read_actuators(file: MujocoFile) -> Actuators:
         gears.append(gear)
         limits.append(_torque_limits(file, actuator, joint, gear))
         names.append(file.given_name("actuator", actuator) or file.coordinates[index].name)
+    _tell_of_laws(file, actuators)
     squared = np.square(gears)
     return _assembled(
         file,
@@ -203,24 +204,49 @@ def _driven_joint(file: MujocoFile, actuator: int) -> int:
     return int(model.actuator_trnid[actuator, 0])
 
 
+def _law(file: MujocoFile, actuator: int) -> str:
+    """Return what an actuator is if it is no motor, in words; the empty string for a motor."""
+    model = file.model
+    gain = float(model.actuator_gainprm[actuator, 0])
+    _, stiffness, damping = (float(number) for number in model.actuator_biasprm[actuator, :3])
+    filtered = model.actuator_dyntype[actuator] != NO_ACTIVATION
+    if model.actuator_gaintype[actuator] == FIXED_GAIN and stiffness == -gain != 0.0:
+        law = f"position servo (kp {gain:g}, kv {-damping:g})"
+    elif model.actuator_gaintype[actuator] == FIXED_GAIN and damping == -gain != 0.0:
+        law = f"velocity servo (kv {gain:g})"
+    elif (
+        model.actuator_gaintype[actuator] != FIXED_GAIN
+        or model.actuator_biastype[actuator] != NO_BIAS
+    ):
+        law = "actuator with a law of its own"
+    else:
+        return "motor behind a filter" if filtered else ""
+    return law + (" behind a filter" if filtered else "")
+
+
+def _tell_of_laws(file: MujocoFile, actuators: list[int]) -> None:
+    """Say what drives the robot in MuJoCo and is taken as a motor here."""
+    laws: dict[str, list[str]] = {}
+    for actuator in actuators:
+        if law := _law(file, actuator):
+            laws.setdefault(law, []).append(repr(file.name("actuator", actuator)))
+    if laws:
+        told = "; ".join(f"{', '.join(names)}: {law}" for law, names in laws.items())
+        warn(
+            f"{file.source}: these actuators have a control law of their own. They are loaded as "
+            "motors that exert the torque a heelstrike controller asks for; only their force "
+            f"limits are kept. {told}."
+        )
+
+
 def _torque_limits(file: MujocoFile, actuator: int, joint: int, gear: float) -> tuple[float, float]:
     """Range of the torque at the joint that control, force and joint limits leave."""
     model, name = file.model, file.name("actuator", actuator)
     if gear == 0.0:
         raise file.error(f"actuator {name!r} has gear 0 and can exert no torque.")
-    plain = (
-        model.actuator_gaintype[actuator] == FIXED_GAIN
-        and model.actuator_biastype[actuator] == NO_BIAS
-        and model.actuator_dyntype[actuator] == NO_ACTIVATION
-    )
     force = np.array([-np.inf, np.inf])
-    if not plain:
-        warn(
-            f"{file.source}: actuator {name!r} has a control law of its own (a position or "
-            "velocity servo, or a filter). It is loaded as a motor that exerts the torque a "
-            "heelstrike controller asks for; only its force limits are kept."
-        )
-    elif model.actuator_ctrllimited[actuator] and not file.disabled("clampctrl"):
+    plain = _law(file, actuator) == ""
+    if plain and model.actuator_ctrllimited[actuator] and not file.disabled("clampctrl"):
         gain = float(model.actuator_gainprm[actuator, 0])
         force = np.sort(gain * model.actuator_ctrlrange[actuator])
     if model.actuator_forcelimited[actuator]:

@@ -10,12 +10,14 @@ import copy
 import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.options import FORWARD, Options
 from heelstrike.robot.files.snapping import IN_PLANE, snap
 from heelstrike.robot.robot import LockedJoint
@@ -27,11 +29,10 @@ FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 KINDS = ("free", "ball", "slide", "hinge")
 MANY = 12  # joints that are named in a remark
 SHOWN = 4  # how many culprits a message lists before it counts the rest
-MASSLESS = 1e-14  # kg; no link that is meant to weigh anything weighs less
-
-LATERAL = 1e-2
-"""Asymmetry (share of the robot's size or moment of inertia) up to which a robot may be projected:
-cables and connectors of a symmetric design make a few parts in a thousand."""
+LATERAL = (1e-2, 5e-2)
+"""Asymmetry (share of the robot's size or moment of inertia) from which a projection is doubtful,
+and up to which it is made at all. Cables and connectors of a symmetric design make a few parts in a
+thousand."""
 
 ROOT = ("root_x", "root_z", "root_pitch")
 _PLANAR = ("_TX", "_TY", "_RZ")  # what MuJoCo makes of URDF's planar joint
@@ -152,7 +153,11 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
     mujoco.mj_kinematics(model, pose)
     floating = _floating_bodies(model, pose, options, label, hanging)
     keeps = _keeps(model, pose, floating)
-    spatial = [joint for joint in np.flatnonzero(~keeps) if model.jnt_bodyid[joint] not in floating]
+    spatial = [
+        joint
+        for joint in range(model.njnt)
+        if not keeps[joint] and model.jnt_bodyid[joint] not in floating
+    ]
     followers = list(_followers(model))
     why = dict.fromkeys(spatial, "leaves the plane")
     for _ in followers:
@@ -170,9 +175,12 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
                 f"{label}: no joint of this robot moves in the x–z plane, so there is nothing to "
                 "project. Turn it so that it walks along x, with its pitch joints about y."
             )
-        _refuse_asymmetry(model, pose, coordinates, label)
+        lateral = _asymmetry(model, pose, coordinates, label)
+    else:
+        lateral = []
     locked = tuple(_locked(model, pose, joint, why[joint]) for joint in sorted(why))
-    remarks = [*_of_snapped(model, snapped), *_of_locked(locked, options)]
+    remarks = [*_of_snapped(model, snapped), *_of_locked(locked, options), *lateral]
+    remarks += _of_root(model, floating)
     if coordinates is not found:
         remarks.append(
             "the trunk floats by joints in another order or sense than slide along x, slide along "
@@ -188,6 +196,24 @@ def _of_snapped(model: Any, snapped: dict[int, float]) -> Iterator[str]:
         names = ", ".join(f"{_name(model, joint)} by {snapped[joint]:.2g}" for joint in shown)
         more = f" and {len(snapped) - MANY} more" if len(snapped) > MANY else ""
         yield f"axes that miss the x–z plane by rounding are turned into it (rad): {names}{more}."
+
+
+def _of_root(model: Any, floating: list[int]) -> Iterator[str]:
+    """What joints had that give way to a floating root."""
+    for body in floating:
+        first, number = model.body_jntadr[body], model.body_jntnum[body]
+        held = [
+            joint
+            for joint in range(first, first + number)
+            if model.jnt_limited[joint]
+            or model.dof_damping[model.jnt_dofadr[joint]]
+            or model.dof_frictionloss[model.jnt_dofadr[joint]]
+        ]
+        if held:
+            yield (
+                f"{model.body(body).name or 'the trunk'} floats; the limits, damping and friction "
+                "that the file gives its root joint are left out."
+            )
 
 
 def _of_locked(locked: tuple[LockedJoint, ...], options: Options) -> Iterator[str]:
@@ -303,8 +329,8 @@ def _floating_bodies(
         if len(able) != 1:
             raise RobotError(
                 f"{label}: floating=True makes the one body that the file fixes to the world (or "
-                f"leaves free) float in the plane; here are {len(able)} such bodies. Give the trunk "
-                "its joints in the file: slide along x, slide along z, hinge about y."
+                f"leaves free) float in the plane; here are {len(able)} such bodies. Give the "
+                "trunk its joints in the file: slide along x, slide along z, hinge about y."
             )
         return able
     upright = []
@@ -312,11 +338,10 @@ def _floating_bodies(
         normal = pose.xaxis[model.body_jntadr[body] + 2]
         if np.hypot(normal[0], normal[2]) <= IN_PLANE:
             upright.append(body)
-    if options.projected:
-        if hanging and len(fixed) == 1 and not (free or planar):
-            return fixed
-        return [*free, *upright]
-    return upright
+    # Where no joint moves anything, or the robot is one of space, the trunk is meant to float.
+    if hanging and len(fixed) == len(top) == 1 and (options.projected or model.njnt == 0):
+        return fixed
+    return [*free, *upright] if options.projected else upright
 
 
 def _keeps(model: Any, pose: Any, floating: list[int]) -> NDArray[np.bool_]:
@@ -336,10 +361,9 @@ def _coordinates(
         if body in floating:
             lead = "" if body == floating[0] else f"{model.body(body).name}_"
             place = np.array(pose.xpos[body])
-            for name, axis, reference in zip(
-                ROOT, (X, Z, Y), (place[0], place[2], 0.0), strict=True
-            ):
-                yield Coordinate(lead + name, body, name == ROOT[2], axis, place, float(reference))
+            values = (place[0], place[2], 0.0)
+            for name, axis, value in zip(ROOT, (X, Z, Y), values, strict=True):
+                yield Coordinate(lead + name, body, name == ROOT[2], axis, place, float(value))
             continue
         first = model.body_jntadr[body]
         for joint in range(first, first + model.body_jntnum[body]):
@@ -373,7 +397,7 @@ def _in_order(coordinates: tuple[Coordinate, ...], model: Any) -> tuple[Coordina
         for body in set(bodies[:2]) - {bodies[2]}
     )
     chain = [0, *dict.fromkeys(bodies)]
-    alone &= all(model.body_parentid[b] == a for a, b in zip(chain, chain[1:], strict=False))
+    alone &= all(model.body_parentid[b] == a for a, b in pairwise(chain))
     driven = {int(joint) for joint in model.actuator_trnid[:, 0]} & {one.joint for one in root}
     slides = np.array([one.axis for one in root[:2]])
     which = np.abs(slides[:, [0, 2]]).argmax(axis=1)
@@ -467,15 +491,16 @@ def _refuse_spatial_joints(model: Any, pose: Any, spatial: list[int], label: str
     )
 
 
-def _refuse_asymmetry(
-    model: Any, pose: Any, coordinates: tuple[Coordinate, ...], label: str
-) -> None:
-    """Refuse a robot whose mass lies to one side: moving in the plane would turn it out of it."""
+def _asymmetry(model: Any, pose: Any, coordinates: tuple[Coordinate, ...], label: str) -> list[str]:
+    """Refuse a robot whose mass lies to one side: moving in the plane would turn it out of it.
+
+    Return what to say of a small asymmetry.
+    """
     moving = np.isin(model.body_rootid, [model.body_rootid[one.body] for one in coordinates])
     names = [model.body(body).name for body in np.flatnonzero(moving)]
     mass = model.body_mass[moving]
     if not mass.sum() > 0.0:
-        return  # which the reader says better
+        return []  # which the reader says better
     place = pose.xipos[moving]
     apart = np.abs(place - place[counterparts(names)]).sum(axis=0)
     if apart[0] > apart[1]:
@@ -495,18 +520,28 @@ def _refuse_asymmetry(
     joints = [one for one in coordinates if one.joint >= 0] or coordinates
     anchors = [one.anchor[1] for one in joints]
     aside = float(center[1] - 0.5 * (min(anchors) + max(anchors)))
-    if abs(aside) > LATERAL * size:
-        raise RobotError(
-            f"{label}: it cannot be projected onto the x–z plane, because its centre of mass is "
-            f"{aside:.3g} m to the side of its middle: left and right weigh differently."
-        )
     product = float(np.abs(inertia[1, ::2]).max())
-    if product > LATERAL * inertia[1, 1]:
-        raise RobotError(
-            f"{label}: it cannot be projected onto the x–z plane, because its products of inertia "
-            f"with y ({product:.3g} kg m² against {inertia[1, 1]:.3g} kg m²) turn it out of that "
-            "plane as soon as it pitches: left and right are not mirror images in this posture."
-        )
+    found = [
+        (
+            abs(aside) / size,
+            f"its centre of mass is {aside:.3g} m to the side of its middle: left and right weigh "
+            "differently",
+        ),
+        (
+            product / float(inertia[1, 1]),
+            f"its products of inertia with y ({product:.3g} kg m² against {inertia[1, 1]:.3g} kg "
+            "m²) turn it out of that plane as soon as it pitches: left and right are not mirror "
+            "images in this posture",
+        ),
+    ]
+    for share, words in found:
+        if share > LATERAL[1]:
+            raise RobotError(
+                f"{label}: it cannot be projected onto the x–z plane, because {words}."
+            )
+    return [
+        f"the projection is rough, because {words}." for share, words in found if share > LATERAL[0]
+    ]
 
 
 def _is_free(model: Any, body: int) -> bool:

@@ -20,6 +20,7 @@ from heelstrike.robot.warning import warn
 
 Floats = NDArray[np.float64]
 
+MASSLESS = 1e-14  # kg, kg m²; no link that is meant to weigh anything weighs less
 MARGIN = 1e-9  # share of the largest moment by which parsers may judge otherwise than we do
 
 
@@ -90,7 +91,7 @@ def put_back(model: Any, pose: Any, taken: list[tuple[Any, Floats]], label: str)
         name, place = body.name or f"body {body.id}", body.id
         normal = pose.ximat[place].reshape(3, 3)[1]
         moment = float(normal @ tensor @ normal)
-        if moment < -MARGIN * _size(tensor):
+        if moment < -MARGIN * _size(tensor) - MASSLESS:
             raise RobotError(
                 f"{label}: body {name!r} has the moment of inertia {moment:.6g} kg m² about the "
                 "normal of the plane in which the robot moves. It must not be negative."

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.robot.files.flattening import MASSLESS
+from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.model import Floats, Integers
 

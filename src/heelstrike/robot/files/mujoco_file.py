@@ -26,6 +26,7 @@ from heelstrike.robot.files.sdf.translation import as_mjcf
 from heelstrike.robot.files.urdf import (
     WORLD,
     let_massless_links_pass,
+    let_thin_meshes_pass,
     missing_moments,
     urdf_text,
 )
@@ -248,6 +249,7 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     spec.compiler.fusestatic = False
     if urdf or file.massless:
         let_massless_links_pass(spec)
+        let_thin_meshes_pass(spec)
     if urdf:
         spec.compiler.balanceinertia = False  # which replaces moments that URDF states
     lift_sizes(spec)

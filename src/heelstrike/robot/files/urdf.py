@@ -42,7 +42,8 @@ def urdf_text(root: Node, directory: Path, packages: Sequence[Path], label: str)
     RobotWarning
         Of links without inertia, and of meshes that are left out.
     """
-    _add_world(root)
+    _mend_world(root)
+    _take_the_first(root, label)
     _forget_idle_axes(root)
     _complete_inertias(root, label)
     _find_meshes(root, directory, packages, label)
@@ -51,6 +52,16 @@ def urdf_text(root: Node, directory: Path, packages: Sequence[Path], label: str)
             extension.remove(request)
     _keep_paths(root)
     return xml_text(root)
+
+
+def let_thin_meshes_pass(spec: Any) -> None:
+    """Let meshes without volume pass, such as plates, where nothing is weighed by them."""
+    import mujoco
+
+    weighing = {geom.meshname for geom in spec.geoms if not geom.parent.explicitinertial}
+    for mesh in spec.meshes:
+        if mesh.name not in weighing:
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
 
 
 def missing_moments(root: Element) -> dict[str, list[str]]:
@@ -72,13 +83,43 @@ def let_massless_links_pass(spec: Any) -> None:
     spec.compiler.boundinertia = max(spec.compiler.boundinertia, _SMALLEST)
 
 
-def _add_world(root: Node) -> None:
-    """Add the link ``world`` where joints hang on it and nobody wrote it down."""
-    parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
-    if WORLD in parents and all(link.get("name") != WORLD for link in root.iterfind("link")):
-        link = Node("link", {"name": WORLD})
-        link.line = root.line
-        root.insert(0, link)
+def _mend_world(root: Node) -> None:
+    """Have a link ``world`` where joints hang on it, without mass, and nowhere below others.
+
+    Parsers know the world by this name: it need not be written down, and it cannot be moved.
+    """
+    links = {link.get("name", ""): link for link in root.iterfind("link")}
+    parents = list(root.iterfind("joint/parent"))
+    children = [child for child in root.iterfind("joint/child") if child.get("link") == WORLD]
+    if WORLD not in links:
+        if any(parent.get("link") == WORLD for parent in parents):
+            link = Node("link", {"name": WORLD})
+            link.line = root.line
+            root.insert(0, link)
+        return
+    if not children:
+        for inertial in links[WORLD].findall("inertial"):
+            links[WORLD].remove(inertial)
+        return
+    other = WORLD
+    while other in links:
+        other += "_"
+    links[WORLD].set("name", other)
+    for end in (*children, *(parent for parent in parents if parent.get("link") == WORLD)):
+        end.set("link", other)
+
+
+def _take_the_first(root: Node, label: str) -> None:
+    """Of two ``<dynamics>`` of a joint the first counts, as for the parsers of ROS."""
+    several = []
+    for joint in root.iterfind("joint"):
+        if joint.get("type") == "planaraxis":  # what Dojo calls a planar joint
+            joint.set("type", "planar")
+        for more in joint.findall("dynamics")[1:]:
+            joint.remove(more)
+            several.append(joint.get("name", ""))
+    if several:
+        warn(f"{label}: {', '.join(several)} have two <dynamics>; the first one counts.")
 
 
 def _forget_idle_axes(root: Node) -> None:
@@ -101,7 +142,8 @@ def _complete_inertias(root: Node, label: str) -> None:
                     points.append(link.get("name", ""))
             if inertia is not None:
                 for name in _MOMENTS:
-                    inertia.attrib.setdefault(name, "0")
+                    if not inertia.get(name, "").strip():
+                        inertia.set(name, "0")
     if points:
         warn(
             f"{label}: {', '.join(points)} have a <mass> and no <inertia>; they are point masses. "
@@ -122,7 +164,7 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
         for visual in link.findall("visual"):
             link.remove(visual)
         has_inertia = link.find("inertial") is not None
-        if not has_inertia and link.find("collision") is not None:
+        if not has_inertia and any(not _is_point(shape) for shape in link.findall("collision")):
             weighed.append(name)
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
@@ -158,6 +200,12 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
             f"{label}: {', '.join(weighed)} have no <inertial>; their masses are those of their "
             "collision shapes at 1000 kg/m³. Give them an <inertial>."
         )
+
+
+def _is_point(collision: Element) -> bool:
+    """Whether a shape is a sphere of radius 0, which weighs nothing."""
+    sphere = collision.find("geometry/sphere")
+    return sphere is not None and float(sphere.get("radius", "1")) == 0.0
 
 
 def _keep_paths(root: Element) -> None:

@@ -98,13 +98,14 @@ def plain(text: str) -> str:
     """Return a text without what editors leave around it, every line where it was.
 
     That is null characters and byte order marks at both ends, and blank lines before the XML
-    declaration, which has to come first: it goes, since it says nothing.
+    declaration, which has to come first. The declaration goes: it says nothing, and some are wrong.
     """
     bare = text.lstrip(_AROUND)
-    lines = text[: len(text) - len(bare)].count("\n")
-    if lines and bare.startswith("<?xml"):
-        bare = bare[bare.find("?>") + 2 :]
-    return "\n" * lines + bare.rstrip(_AROUND)
+    if not bare:
+        return text  # which is refused
+    end = bare.find("?>") + 2 if bare.startswith("<?xml") else 0
+    lines = text[: len(text) - len(bare) + end].count("\n")
+    return "\n" * lines + bare[end:].rstrip(_AROUND)
 
 
 def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
@@ -112,7 +113,7 @@ def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
     reading.characters += len(text)
     if reading.characters > LARGEST_FILE:
         raise RobotError(_too_large(reading.label))
-    if not text.strip():
+    if not text.strip("\ufeff \t\r\n"):
         raise RobotError(f"{label}: the file is empty.")
     if "\0" in text:
         raise RobotError(f"{label}: this is not a text file; MJCF and URDF are XML text.")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.warning import warn
 
 RETIRED = {
     "flag": ("sensornoise",),
@@ -52,6 +53,8 @@ def renew(root: Element, names: set[str], label: str) -> bool:
         for body in root.iterfind("worldbody/body"):
             _make_local(body, np.zeros(3), label)
     changed = bool(world)
+    if any(each.get("inertiafromgeom") == "true" for each in root.iter("compiler")):
+        changed |= _forget_inertias(root)
     for tag, retired in RETIRED.items():
         if not names.isdisjoint(retired):
             for element in root.iter(tag):
@@ -63,13 +66,24 @@ def renew(root: Element, names: set[str], label: str) -> bool:
     return changed
 
 
+def _forget_inertias(root: Element) -> bool:
+    """Leave out ``<inertial>`` without a place, in files that weigh every body by its geoms."""
+    changed = False
+    for body in root.iter("body"):
+        for inertial in body.findall("inertial"):
+            if inertial.get("pos") is None:
+                body.remove(inertial)
+                changed = True
+    return changed
+
+
 def _make_local(body: Element, above: Floats, label: str) -> None:
     """Give a body, and all in it, places in the frame that they hang in.
 
     Every place and direction of such a file is one of the world, so the frames of its bodies can
     all be parallel to it: however they turn, it is the same robot.
     """
-    here = above if body.get("pos") is None else _numbers(body, "pos", 3, label)
+    here = _place_of(body, above, label)
     for attribute in TURNED:
         body.attrib.pop(attribute, None)
     body.set("pos", _text(here - above))
@@ -84,6 +98,17 @@ def _make_local(body: Element, above: Floats, label: str) -> None:
                 # A place that is not given is that of the body, in both kinds of coordinates.
                 place = _numbers(child, "pos", 3, label) if child.get("pos") else here
                 child.set("pos", _text(place - here))
+
+
+def _place_of(body: Element, above: Floats, label: str) -> Floats:
+    """Place of a body; nothing hangs on it here, so files with none that can be read were used."""
+    if body.get("pos") is None:
+        return above
+    try:
+        return _numbers(body, "pos", 3, label)
+    except RobotError as error:
+        warn(f"{error} In global coordinates the place of a body moves nothing: it is left out.")
+        return above
 
 
 def _numbers(element: Element, name: str, count: int, label: str) -> Floats:

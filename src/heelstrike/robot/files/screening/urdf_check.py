@@ -48,7 +48,10 @@ _CHILDREN: dict[str, set[str]] = {
     "geometry": {"box", "sphere", "cylinder", "capsule", "mesh"},
     "joint": {"origin", "parent", "child", "axis", "limit", "dynamics"},
 }
-_SEVERAL = {("robot", "link"), ("robot", "joint"), ("link", "collision")}
+_SEVERAL = {
+    *(("robot", "link"), ("robot", "joint"), ("link", "collision")),
+    ("joint", "dynamics"),  # of which the first counts
+}
 _REQUIRED = {
     "link": ("name",),
     "joint": ("name", "type"),
@@ -208,8 +211,8 @@ def _check(element: Element, where: str, label: str, strange: list[str], joint: 
 def _check_numbers(
     element: Element, name: str, text: str, count: int, where: str, label: str, joint: str
 ) -> None:
-    if count == 0:
-        return
+    if count == 0 or (element.tag == "inertia" and not text.strip()):
+        return  # a word, or a moment that is left out
     what = f"{_at(label, element)}: {name!r} of <{element.tag}> of {where}"
     try:
         values = [float(word) for word in text.split()]
