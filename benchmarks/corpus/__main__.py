@@ -1,4 +1,4 @@
-"""Published robots loaded and judged: what of them loads, and is it the robot of the file?
+"""Published robots loaded and judged by other engines.
 
     python -m corpus CLONES --scratch DIR [--only TEXT] [--page corpus/published.md]
 
@@ -21,11 +21,12 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from corpus.clones import Published, extracted, published
-from corpus.peers import Peer, Refused, MuJoCo, peer_of
+from corpus.peers import ROOT, MuJoCo, Peer, Refused, peer_of
 from heelstrike import dynamics
 from heelstrike.errors import HeelstrikeError
 from heelstrike.robot import Robot, load_robot
@@ -84,15 +85,16 @@ def outcome(robot: Published, clones: Path, scratch: Path) -> Outcome:
     result = Outcome(robot, _words(loaded), loaded=True, seconds=seconds)
     forward = np.array([0.0, 1.0, 0.0] if _any(remarks, FORWARD_Y) else [1.0, 0.0, 0.0])
     try:
-        peer = peer_of(path, _text(path, options), forward)
+        floating = ROOT[0] in loaded.joint_names
+        peer = peer_of(path, _text(path, options), forward, floating)
         result.engine, result.difference = peer.name, difference(loaded, peer)
-    except Refused as refused:
+    except (Refused, ElementTree.ParseError) as refused:
         result.said = " ".join(str(refused).split())[:160]
     if _any(remarks, TURNED) or np.isnan(result.difference):
         saved = loaded.save(scratch / "saved.xml")
         if not np.isnan(result.difference):
             result.said = f"turned into the plane; as the file has it {result.difference:.1g}"
-        result.engine = f"{'MuJoCo, of the saved file'}"
+        result.engine = "MuJoCo, of the saved file"
         result.difference = difference(loaded, MuJoCo(saved, np.array([1.0, 0.0, 0.0])))
     return result
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,7 @@ class Refused(Exception):
     """The engine cannot read the file, or has not what the robot has."""
 
 
-def peer_of(path: Path, text: str, forward: Floats) -> Peer:
+def peer_of(path: Path, text: str, forward: Floats, floating: bool) -> Peer:
     """Return the engine that reads a file: MuJoCo MJCF, Pinocchio URDF, Drake SDF and the rest.
 
     Parameters
@@ -34,15 +35,31 @@ def peer_of(path: Path, text: str, forward: Floats) -> Peer:
         What is in it, macros expanded.
     forward : (3,) float
         Where the robot walks in the file.
+    floating : bool
+        Whether a trunk that nothing holds floats.
     """
     if "<mujoco" in text and "<robot" not in text:
         return MuJoCo(path, forward)
     if "<sdf" in text:
-        return Drake(path, text, "sdf", forward)
+        return Drake(path, text, "sdf", forward, True)
+    mechanics = _mechanics(text)
     try:
-        return Pinocchio(text, forward)
+        return Pinocchio(mechanics, forward, floating)
     except Refused:
-        return Drake(path, text, "urdf", forward)
+        return Drake(path, mechanics, "urdf", forward, floating)
+
+
+def _mechanics(text: str) -> str:
+    """A URDF without shapes and drives, whose oddities keep engines from the rest."""
+    root = ElementTree.fromstring(text[text.index("<robot") :].rstrip("\0 \n"))
+    for child in list(root):
+        if child.tag not in ("link", "joint"):
+            root.remove(child)
+    for link in root.iter("link"):
+        for tag in ("visual", "collision"):
+            for shape in link.findall(tag):
+                link.remove(shape)
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 class Peer:
@@ -136,10 +153,12 @@ class MuJoCo(Peer):
         """Joint without a name on the body of that name."""
         import mujoco
 
-        body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, name)
-        if body < 0 or self.model.body_jntnum[body] != 1:
-            raise Refused(f"there is no joint {name!r}")
-        return int(self.model.body_jntadr[body])
+        stem, _, number = name.rpartition("_")
+        for body_name, place in ((name, 0), (stem, int(number) if number.isdigit() else -1)):
+            body = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, body_name)
+            if body >= 0 and 0 <= place < self.model.body_jntnum[body]:
+                return int(self.model.body_jntadr[body]) + place
+        raise Refused(f"there is no joint {name!r}")
 
 
 class Pinocchio(Peer):
@@ -147,13 +166,12 @@ class Pinocchio(Peer):
 
     name = "Pinocchio"
 
-    def __init__(self, text: str, forward: Floats) -> None:
+    def __init__(self, text: str, forward: Floats, floating: bool) -> None:
         import pinocchio as pin
 
         super().__init__(forward)
         self.pin = pin
-        links = {part.split('"')[0] for part in text.split('<link name="')[1:]}
-        self.floating = "world" not in links
+        self.floating = floating
         try:
             root = (pin.JointModelFreeFlyer(),) if self.floating else ()
             self.model = pin.buildModelFromXML(text, *root)
@@ -204,7 +222,7 @@ class Drake(Peer):
 
     name = "Drake"
 
-    def __init__(self, path: Path, text: str, kind: str, forward: Floats) -> None:
+    def __init__(self, path: Path, text: str, kind: str, forward: Floats, floating: bool) -> None:
         from pydrake.multibody.parsing import Parser
         from pydrake.multibody.plant import MultibodyPlant
 
@@ -216,7 +234,9 @@ class Drake(Peer):
                 above.name
             ) else None
         try:
-            parser.AddModelsFromString(text, kind)
+            (instance,) = parser.AddModelsFromString(text, kind)
+            if not floating:
+                self._weld(instance)
             self.plant.Finalize()
         except RuntimeError as error:
             raise Refused(str(error)[:300]) from error
@@ -227,8 +247,19 @@ class Drake(Peer):
             if not self.plant.IsAnchored(body)
         ]
         self.mass = float(sum(body.default_mass() for body in moving))
-        floating = [body for body in moving if body.is_floating()]
+        floating = [body for body in moving if body.is_floating_base_body()]
         self.root = floating[0] if len(floating) == 1 else None
+
+    def _weld(self, instance: object) -> None:
+        """Fix to the world what nothing holds."""
+        held = {
+            self.plant.get_joint(joint).child_body().index()
+            for joint in self.plant.GetJointIndices()
+        }
+        for body in self.plant.GetBodyIndices(instance):
+            if body not in held:
+                frame = self.plant.get_body(body).body_frame()
+                self.plant.WeldFrames(self.plant.world_frame(), frame)
 
     def _indices(self) -> list[object]:
         from pydrake.multibody.tree import BodyIndex

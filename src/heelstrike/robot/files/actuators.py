@@ -112,7 +112,7 @@ def _from_urdf(file: MujocoFile, place: dict[int, int]) -> Actuators:
     joints = sorted(named or limited, key=lambda name: place[index[name]])
     limits, used = [], []
     for name in joints:
-        drive = drives.get(name) or Drive(name, set())
+        drive = drives.get(name) or Drive()
         torque = np.array([drive.lower, drive.upper])
         if name in limited:
             torque = _intersect(torque, model.jnt_actfrcrange[index[name]])
@@ -141,6 +141,9 @@ def _tell_of_drives(
             name
             for name, drive in zip(joints, drives, strict=True)
             if drive.commands and EFFORT not in drive.commands
+        ],
+        "are driven by several transmissions, which are taken as one motor with the inertia of all": [
+            name for name, drive in zip(joints, drives, strict=True) if drive.motors > 1
         ],
         "have a motor and no effort limit: its torque is unlimited": [
             name

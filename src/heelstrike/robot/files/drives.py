@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
@@ -25,29 +25,21 @@ class Drive:
 
     Attributes
     ----------
-    name : str
-        What the file calls it, by default as its joint.
     commands : set of str
         What it is commanded in: effort, position, velocity; empty if the file does not say.
-    reduction : float
-        Ratio of its gear.
-    inertia : float
-        Inertia of the motor before the gear (kg m²).
+    armature : float
+        Inertia of its motors as the joint feels it, ``reduction**2 * inertia`` (kg m²).
+    motors : int
+        How many transmissions drive the joint.
     lower, upper : float
         Limits of its torque at the joint (N m, N) by ``ros2_control``.
     """
 
-    name: str
-    commands: set[str]
-    reduction: float = 1.0
-    inertia: float = 0.0
+    commands: set[str] = field(default_factory=set)
+    armature: float = 0.0
+    motors: int = 0
     lower: float = -math.inf
     upper: float = math.inf
-
-    @property
-    def armature(self) -> float:
-        """Inertia of the motor as the joint feels it (kg m²)."""
-        return self.reduction**2 * self.inertia
 
 
 def drives_of(robot: Element, label: str) -> dict[str, Drive]:
@@ -63,25 +55,17 @@ def drives_of(robot: Element, label: str) -> dict[str, Drive]:
     Raises
     ------
     RobotError
-        If a reduction, inertia or limit is no number, or two transmissions drive one joint.
+        If a reduction, inertia or limit is no number, or no possible one.
     """
     drives: dict[str, Drive] = {}
     for control in robot.iterfind("ros2_control"):
         for joint in control.iterfind("joint"):
             _add_commands(drives, joint, label)
     gears = [*robot.iterfind("transmission"), *robot.iterfind("ros2_control/transmission")]
-    geared: dict[str, Element] = {}
     for gear in gears:
         joints = [joint.get("name", "") for joint in gear.iterfind("joint")]
-        if len(joints) == 1 and joints[0] in geared:
-            raise RobotError(
-                f"{_where(gear, label)} is the second <transmission> of joint {joints[0]!r}. Keep "
-                "one."
-            )
-        for joint in gear.iterfind("joint"):
-            name = joint.get("name", "")
-            geared[name] = gear
-            drive = drives.setdefault(name, Drive(name, set()))
+        for name in joints:
+            drive = drives.setdefault(name, Drive())
             drive.commands |= set(_interfaces(gear))
             if len(joints) == 1:  # several joints and motors share what they reflect
                 _add_gear(drive, gear, label)
@@ -91,7 +75,7 @@ def drives_of(robot: Element, label: str) -> dict[str, Drive]:
 def _add_commands(drives: dict[str, Drive], joint: Element, label: str) -> None:
     for command in joint.iterfind("command_interface"):
         name = joint.get("name", "")
-        drive = drives.setdefault(name, Drive(name, set()))
+        drive = drives.setdefault(name, Drive())
         kind = command.get("name", "")
         drive.commands.add(kind)
         for limit in command.iterfind("param"):
@@ -104,20 +88,18 @@ def _add_commands(drives: dict[str, Drive], joint: Element, label: str) -> None:
 
 
 def _add_gear(drive: Drive, gear: Element, label: str) -> None:
-    motor = gear.find("actuator")
-    if motor is not None and motor.get("name"):
-        drive.name = motor.get("name", "")
     reductions = {_number(each, label) for each in gear.iter() if each.tag in REDUCTION}
     inertias = {_number(each, label) for each in gear.iter() if each.tag in INERTIA}
     for values, what in ((reductions, "reductions"), (inertias, "motor inertias")):
         if len(values) > 1:
             raise RobotError(f"{_where(gear, label)} has several {what}. Keep one.")
-    drive.reduction = next(iter(reductions), 1.0)
-    drive.inertia = next(iter(inertias), 0.0)
-    if drive.reduction == 0.0:
+    reduction, inertia = next(iter(reductions), 1.0), next(iter(inertias), 0.0)
+    if reduction == 0.0:
         raise RobotError(f"{_where(gear, label)} has the reduction 0, with which nothing moves.")
-    if drive.inertia < 0.0:
+    if inertia < 0.0:
         raise RobotError(f"{_where(gear, label)} has a negative motor inertia.")
+    drive.armature += reduction**2 * inertia
+    drive.motors += 1
 
 
 def _interfaces(gear: Element) -> Iterator[str]:

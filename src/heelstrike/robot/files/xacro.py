@@ -25,6 +25,8 @@ LONGEST = 60.0
 LARGEST = 16 * 2**20
 """Letters of an expanded file."""
 
+MACRO = "xacro:macro"
+
 LONGEST_REASON = 400  # letters of xacro's own words in a message
 
 
@@ -104,7 +106,19 @@ def _expand(file: str, arguments: dict[str, str], packages: list[str]) -> str:
 
     import xacro
 
-    return str(xacro.process_file(file, mappings=arguments).toprettyxml(indent=" "))
+    try:
+        document = xacro.process_file(file, mappings=arguments)
+    except xacro.XacroException as error:
+        # Xacro once read all macros first, and files of that time call them before.
+        if "unknown macro" not in str(error):
+            raise
+        xacro.init_stacks(file)
+        document = xacro.parse(None, file)
+        root = document.documentElement
+        for macro in reversed([each for each in root.childNodes if each.nodeName == MACRO]):
+            root.insertBefore(macro, root.firstChild)
+        xacro.process_doc(document, mappings=arguments)
+    return str(document.toprettyxml(indent=" "))
 
 
 if __name__ == "__main__":
