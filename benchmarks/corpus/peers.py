@@ -8,6 +8,7 @@ a projection locks rests at the position that is named.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from xml.etree import ElementTree
@@ -17,10 +18,11 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 ROOT = ("root_x", "root_z", "root_pitch")
+FREE, BALL = 0, 1  # MuJoCo's mjtJoint
 UP = np.array([0.0, 0.0, 1.0])
 
 
-class Refused(Exception):
+class Refused(Exception):  # noqa: N818 (what happened, not an error of ours)
     """The engine cannot read the file, or has not what the robot has."""
 
 
@@ -51,10 +53,17 @@ def peer_of(path: Path, text: str, forward: Floats, floating: bool) -> Peer:
 
 def _mechanics(text: str) -> str:
     """A URDF without shapes and drives, whose oddities keep engines from the rest."""
-    root = ElementTree.fromstring(text[text.index("<robot") :].rstrip("\0 \n"))
+    plain = re.sub(r"\sxmlns=[\"'][^\"']*[\"']", "", text[text.index("<robot") :].rstrip("\0 \n"))
+    root = ElementTree.fromstring(plain)
     for child in list(root):
         if child.tag not in ("link", "joint"):
             root.remove(child)
+    for joint in root.iter("joint"):
+        if joint.get("type") in ("revolute", "prismatic"):  # urdfdom wants limits, which do nothing
+            for limit in joint.findall("limit"):
+                joint.remove(limit)
+            free = {"lower": "-100", "upper": "100", "effort": "1", "velocity": "1"}
+            ElementTree.SubElement(joint, "limit", free)
     for link in root.iter("link"):
         for tag in ("visual", "collision"):
             for shape in link.findall(tag):
@@ -102,7 +111,9 @@ class MuJoCo(Peer):
             raise Refused(str(error)) from error
         self.data = mujoco.MjData(self.model)
         self.mass = float(self.model.body_mass[self.model.body_weldid > 0].sum())
-        self.free = np.flatnonzero(self.model.jnt_type == 0)
+        self.free = np.flatnonzero(self.model.jnt_type == FREE)
+        mujoco.mj_kinematics(self.model, self.data)
+        self.reference = self.data.xmat.reshape(-1, 3, 3).copy()
 
     def along(self, q: Mapping[str, float], v: Mapping[str, float]) -> tuple[Floats, Floats]:
         """See :class:`Peer`."""
@@ -112,14 +123,14 @@ class MuJoCo(Peer):
         data.qpos[:] = model.qpos0
         select = np.zeros((model.nv, len(q)))
         for column, (name, value) in enumerate(q.items()):
-            joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
-            if joint >= 0:
-                data.qpos[model.jnt_qposadr[joint]] = value
-                select[model.jnt_dofadr[joint], column] = 1.0
-            elif name in ROOT and len(self.free):
+            if name in ROOT and len(self.free):
                 self._root(name, value, select[:, column])
+                continue
+            joint = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+            joint = joint if joint >= 0 else self._nameless(name)
+            if model.jnt_type[joint] == BALL:
+                self._ball(joint, value, select[:, column])
             else:
-                joint = self._nameless(name)
                 data.qpos[model.jnt_qposadr[joint]] = value
                 select[model.jnt_dofadr[joint], column] = 1.0
         data.qvel[:] = select @ np.array(list(v.values()))
@@ -148,6 +159,18 @@ class MuJoCo(Peer):
             direction = self.forward if name == ROOT[0] else UP
             here[:3] += direction * (value - direction @ start[:3])
             column[velocity : velocity + 3] = direction
+
+    def _ball(self, joint: int, value: float, column: Floats) -> None:
+        """Turn a ball joint about the normal, which is one axis in the frame of its body."""
+        import mujoco
+
+        turn, result = np.zeros(4), np.zeros(4)
+        axis = self.reference[self.model.jnt_bodyid[joint]].T @ self.normal
+        position, velocity = self.model.jnt_qposadr[joint], self.model.jnt_dofadr[joint]
+        mujoco.mju_axisAngle2Quat(turn, axis, value)
+        mujoco.mju_mulQuat(result, self.model.qpos0[position : position + 4], turn)
+        self.data.qpos[position : position + 4] = result
+        column[velocity : velocity + 3] = axis
 
     def _nameless(self, name: str) -> int:
         """Joint without a name on the body of that name."""
@@ -253,11 +276,11 @@ class Drake(Peer):
     def _weld(self, instance: object) -> None:
         """Fix to the world what nothing holds."""
         held = {
-            self.plant.get_joint(joint).child_body().index()
+            int(self.plant.get_joint(joint).child_body().index())
             for joint in self.plant.GetJointIndices()
         }
         for body in self.plant.GetBodyIndices(instance):
-            if body not in held:
+            if int(body) not in held:
                 frame = self.plant.get_body(body).body_frame()
                 self.plant.WeldFrames(self.plant.world_frame(), frame)
 
@@ -268,8 +291,8 @@ class Drake(Peer):
 
     def along(self, q: Mapping[str, float], v: Mapping[str, float]) -> tuple[Floats, Floats]:
         """See :class:`Peer`."""
-        from pydrake.math import RigidTransform, RotationMatrix
         from pydrake.common.eigen_geometry import AngleAxis
+        from pydrake.math import RigidTransform, RotationMatrix
 
         plant, context = self.plant, self.context
         plant.SetPositions(context, plant.GetPositions(plant.CreateDefaultContext()))
