@@ -133,7 +133,7 @@ _HOME = {
     "contact_kinematics": "heelstrike.contact",
     "controller": "heelstrike.control",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
-    "human": "heelstrike.robot",
+    "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",

@@ -165,18 +165,19 @@ def figures() -> Summary:
     )
 
 
-PAGE = """\
+SOLVED = "7001: 6990 by the modes of the step before, 9 by lemke with 3 fallbacks, 2 unsolved"
+PAGE = f"""\
 bravo7: completed at t = 7 s
 status                 completed
 steps                  10
 distance               3.012 m in 7 s (0.43 m/s)
-gait                   0.3 m in 0.7 s a step, ∫ΓᵀΓ dt = 84.77 N²m²s
+gait                   0.3 m in 0.7 s a step, torque cost 84.77 N²m²s
 joint tracking error   0.00123 rad rms, 0.0235 rad at most
-zero moment point      −0.0568 … 0.0765 m (sole −0.1 … 0.12 m)
+zero moment point      -0.0568 … 0.0765 m (sole -0.1 … 0.12 m)
 friction use           0.346 of the cone
-slip                   1.2e−05 m
-penetration            5.7e−08 m
-contact problems       7001 solved by lemke, 3 fallbacks, 2 failures; complementarity 3.2e−13
+slip                   1.2e-05 m
+penetration            5.7e-08 m
+contact problems       {SOLVED}; complementarity 3.2e-13
 cost of transport      0.235 (0.123 positive work)
 torques at their limit 4
 computing time         0.177 s (39.7 × real time), compilation 0.988 s"""
@@ -209,10 +210,22 @@ def test_what_is_not_there_is_a_dash() -> None:
     )
     assert lines(page)[3:6] == [
         "distance 3.012 m in 0 s (– m/s)",
-        "zero moment point – … – m (sole −0.1 … 0.12 m)",
+        "zero moment point – … – m (sole -0.1 … 0.12 m)",
         "friction use – of the cone",
     ]
-    assert "contact problems 5 solved by lemke, 0 failures; complementarity 3.2e−13" in lines(page)
+    assert "contact problems 5: 5 by lemke; complementarity 3.2e-13" in lines(page)
+
+
+def test_shortcuts_are_not_said_to_be_solved_by_the_solver() -> None:
+    assert str(SolverCount("lemke", 9, 9, 0, 0)) == "9: 9 by the modes of the step before"
+    assert str(SolverCount("lemke", 0, 0, 0, 0)) == "none"
+
+
+def test_a_windows_console_can_print_it() -> None:
+    """Its letters are those of code page 1252."""
+    page = str(figures())
+    assert page.encode("cp1252").decode("cp1252") == page
+    assert "0.0765" in page
 
 
 @pytest.mark.parametrize(("status", "colour"), [("completed", "green"), ("fell", "red")])

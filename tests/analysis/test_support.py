@@ -78,6 +78,19 @@ def test_chatter_and_scuffing_are_no_steps() -> None:
     assert [(s.foot, s.touchdown) for s in walking_steps(run)] == [(1, 0.3)]
 
 
+def test_feet_that_chatter_in_turn_make_no_steps() -> None:
+    """Both feet stand and lose the ground for a few milliseconds, one after the other."""
+    robot = walking.bravo7()
+    events = []
+    for k in range(8):
+        contacts = (RIGHT, LEFT)[k % 2]
+        events += [liftoff(0.1 + 0.02 * k, contact) for contact in contacts]
+        events += [touchdown(0.105 + 0.02 * k, contact) for contact in contacts]
+    run = make_run(robot, ROWS, force=pushes(robot, [[0, 1]] * 11), events=events)
+    assert len(stances(run)) == 10
+    assert walking_steps(run) == ()
+
+
 @pytest.mark.parametrize(
     ("first", "expected"),
     [([0, 1], [(0, 0.4)]), ([], [(1, 0.5)])],

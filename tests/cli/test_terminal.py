@@ -15,7 +15,8 @@ from typer.testing import CliRunner
 import heelstrike
 from heelstrike.cli import run as heelstrike_command
 from heelstrike.cli.main import app
-from heelstrike.cli.terminal import Debug, spoken, stage
+from heelstrike.cli.options import Debug
+from heelstrike.cli.terminal import spoken, stage
 from heelstrike.errors import GaitError
 
 CONTROL_CHARACTERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 import heelstrike as hs
 from heelstrike.cli import walk as walk_module
 from heelstrike.cli.main import app
+from heelstrike.cli.options import method_called
 from heelstrike.sim import Scheme
 from heelstrike.view.figures import FIGURES
 
@@ -235,7 +236,9 @@ def test_interrupted_by_ctrl_c(
         (["--scheme", "runge-kutta"], "gap-linearised"),
         (["--method", "magic"], "time-stepping"),
         (["--stpe", "0.001"], "--step"),
-        (["--gait", "no/such/gait.json"], "there is no such file"),
+        (["--gait", "no/such/gait.json"], "error: no/such/gait.json: there is no such file"),
+        (["--method", "event-driven", "--scheme", "moreau-jean"], "event-driven has no schemes"),
+        (["--method", "compliant", "--scheme", "gap-linearised"], "compliant has no schemes"),
         (["--gait", "."], "directory"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
@@ -323,3 +326,6 @@ def test_out_is_a_file(tmp_path: Path) -> None:
 
 def test_schemes_are_those_of_the_library() -> None:
     assert [scheme.name for scheme in walk_module.Scheme] == [scheme.name for scheme in Scheme]
+    for scheme in walk_module.Scheme:
+        assert method_called(scheme, 1e-4) == hs.TimeStepping(step=1e-4, scheme=Scheme[scheme.name])
+        assert Scheme[scheme.name].label == scheme.value

@@ -10,7 +10,7 @@ import walking
 from rich.console import Console
 
 import heelstrike as hs
-from heelstrike.experiments.comparison import Comparison
+from heelstrike.experiments.comparison import Comparison, Difference
 from heelstrike.sim import Scheme
 
 
@@ -57,6 +57,21 @@ def test_the_table_and_the_figure(comparison: Comparison) -> None:
     labels = [axes.get_ylabel() for axes in comparison.plot().axes]
     assert any("J" in label for label in labels)
     assert all("(" in label for label in labels)
+
+
+def test_the_table_fits_a_terminal_of_eighty_columns() -> None:
+    """Nothing is cut, whatever the numbers."""
+    numbers = dict.fromkeys(("touchdown_s", "impulse_Ns", "zmp_m", "energy_J"), 1.2345e-13)
+    others = dict.fromkeys(("position", "penetration_m", "slip_m", "complementarity"), 6.7e-11)
+    each = Difference("linearly-implicit", "completed", 19, **numbers, **others, wall_s=0.0123)
+    console = Console(width=80, file=io.StringIO())
+    console.print(Comparison({}, "linearly-implicit", (each,)))
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert (text.count("1.2e-13"), text.count("6.7e-11"), text.count(each.method)) == (4, 4, 3)
+    for word in ("landings", "penetration", "residual", "computing"):
+        assert word in text
 
 
 def test_what_compare_refuses() -> None:

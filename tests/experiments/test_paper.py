@@ -80,19 +80,19 @@ def test_every_claim_has_a_verdict_that_is_tested() -> None:
 def test_default_scheme_walks_at_both_steps(evidence: Evidence) -> None:
     walked = {row.step: row for row in evidence.refinement if row.scheme is Scheme.GAP_LINEARISED}
     for step, tracking in ((1e-3, 2e-3), (1e-4, 1e-3)):
-        row = walked[step]
-        assert row.status is RunStatus.COMPLETED
-        assert row.steps == STEPS
-        assert row.tracking_rms <= tracking
-        assert row.penetration <= 1e-9
-        assert row.slip <= 1e-4
+        found = walked[step].summary
+        assert found.status == "completed"
+        assert found.steps == STEPS
+        assert found.tracking_rms_rad <= tracking
+        assert found.penetration_max_m <= 1e-9
+        assert found.slip_max_m <= 1e-4
 
 
 def test_the_paper_s_own_orderings_walk_at_a_small_step(evidence: Evidence) -> None:
     for scheme in (Scheme.PAPER_EXPLICIT, Scheme.PAPER_SYMPLECTIC):
         (row,) = [r for r in evidence.refinement if r.scheme is scheme and r.step == 1e-4]
-        assert row.status is RunStatus.COMPLETED
-        assert row.steps == STEPS
+        assert row.summary.status == "completed"
+        assert row.summary.steps == STEPS
 
 
 def test_order_is_that_of_made_up_errors(
@@ -114,7 +114,7 @@ def test_order_is_that_of_made_up_errors(
 
     monkeypatch.setattr("heelstrike.experiments.refinement.simulate", simulate)
     monkeypatch.setattr("heelstrike.experiments.refinement.EXACT_STEP", 1e-12)
-    found = converge(bravo7, gait)
+    found = converge(bravo7, gait, hs.Ground())
     assert [each.order for each in found] == pytest.approx([2.0] * len(SCHEMES))
     assert [each.scheme for each in found] == list(SCHEMES)
     lost = [0.1 if each.scheme is Scheme.PAPER_EXPLICIT else 0.0 for each in found]

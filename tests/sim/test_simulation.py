@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.sim import RunStatus, Scheme
+from heelstrike.sim import RunStatus, Scheme, simulation
 
 
 class Constant:
@@ -178,3 +181,36 @@ def test_every_scheme_says_what_it_is(scheme: Scheme) -> None:
 def test_a_run_introduces_itself_in_a_line() -> None:
     found = run(None, stop_when_fallen=False)
     assert repr(found) == "Run(bravo7, TimeStepping, 0.1 s, completed, 100 steps)"
+
+
+def test_what_is_not_a_robot_state_or_method_is_refused_in_words() -> None:
+    robot = hs.load_robot("compass_gait")
+    state = robot.reference_state()
+    wrong: list[tuple[Any, dict[str, Any], str]] = [
+        ("bravo7", {"state": state}, r"robot must be a Robot, got 'bravo7'; load_robot"),
+        (robot, {"state": (state.q, state.v)}, r"got tuple; write State\(q, v\)"),
+        (robot, {"state": state, "method": hs.TimeStepping}, r"write TimeStepping\(\)"),
+    ]
+    for given, options, words in wrong:
+        with pytest.raises(hs.SimulationError, match=words):
+            hs.simulate(given, duration=0.1, **options)
+
+
+def test_an_unknown_scheme_is_answered_with_names() -> None:
+    with pytest.raises(hs.SimulationError, match=r"Scheme\.GAP_LINEARISED, .*Scheme\.MOREAU_JEAN"):
+        hs.TimeStepping(scheme="moreau-jean")  # type: ignore[arg-type]
+
+
+def test_computing_time_is_without_compiling(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By a clock that goes on while something is compiled, by 100 s, and at no other time."""
+    now = [0.0]
+
+    def slow(*arguments: Any) -> Any:
+        now[0] += 100.0
+        return compiled_loop(*arguments)[0], 100.0
+
+    compiled_loop = simulation.compiled_loop
+    monkeypatch.setattr(simulation, "compiled_loop", slow)
+    monkeypatch.setattr(simulation, "clock_time", SimpleNamespace(perf_counter=lambda: now[0]))
+    timing = run(None).timing
+    assert (timing.compile_s, timing.wall_s) == (100.0, 0.0)

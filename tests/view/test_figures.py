@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import matplotlib
@@ -12,12 +13,12 @@ import pytest
 import walking
 from matplotlib.axes import Axes
 from PIL import Image
-from synthetic_runs import box, make_run, pendulum
+from synthetic_runs import box, liftoff, make_run, pendulum, pushes, touchdown
 
 import heelstrike as hs
 from heelstrike.analysis import energy_balance, reference_motion, zero_moment_point
 from heelstrike.view import FIGURES, ViewError, plot
-from heelstrike.view.impacts import impact_rows
+from heelstrike.view.panels import impact_rows
 
 
 def curve(axes: Axes, label: str) -> tuple[np.ndarray, np.ndarray]:
@@ -81,15 +82,15 @@ def test_what_a_robot_has_not_is_said() -> None:
         plot(lying, "torque")
 
 
-def test_tracking_shows_measured_and_reference() -> None:
+def test_tracking_shows_simulated_and_reference() -> None:
     run, gait = walking.walk(steps=4), walking.gait()
     axes = panel(plot(run, "tracking", gait=gait), "left knee")
     joint = run.robot.joint_names.index("left_knee")
-    np.testing.assert_array_equal(curve(axes, "measured")[1], run.position[:, joint])
+    np.testing.assert_array_equal(curve(axes, "simulated")[1], run.position[:, joint])
     reference = reference_motion(run, gait).position[:, run.robot.actuator_names.index("left_knee")]
     np.testing.assert_array_equal(curve(axes, "reference")[1], reference)
     without = panel(plot(run, "tracking"), "left knee")
-    assert [line.get_label() for line in without.get_lines()] == ["measured"]
+    assert [line.get_label() for line in without.get_lines()] == ["simulated"]
 
 
 def test_zero_moment_point_with_the_ends_of_the_sole() -> None:
@@ -99,9 +100,87 @@ def test_zero_moment_point_with_the_ends_of_the_sole() -> None:
         curve(axes, "right foot")[1],
         np.where(zero_moment_point(run).single_support, zero_moment_point(run).foot[:, 0], np.nan),
     )
-    dashed = [line for line in axes.get_lines() if line.get_linestyle() == "--"]
-    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in dashed) == [-0.1, 0.1]
+    bounds = [line for line in axes.get_lines() if len(np.asarray(line.get_xdata())) == 2]
+    assert sorted(float(np.asarray(line.get_ydata())[0]) for line in bounds) == [-0.1, 0.1]
+    assert {line.get_linestyle() for line in bounds} == {"--"}
     assert axes.get_ylim()[0] < -0.1 < 0.1 < axes.get_ylim()[1]
+
+
+def test_zero_moment_point_of_a_robot_that_stands_on_both_feet() -> None:
+    """It is there, thin: each foot's own. Only a foot that pushes alone is drawn as such."""
+    robot = walking.bravo7()
+    run = make_run(robot, 0.1 * np.arange(4), force=pushes(robot, [[0, 1], [0, 1], [0], [1]]))
+    (axes,) = plot(run, "zmp").axes
+    thin = [line for line in axes.get_lines() if line.get_linewidth() < 1.0]
+    own = zero_moment_point(run).foot
+    for line, expected, alone in zip(thin, own.T, (2, 3), strict=False):
+        np.testing.assert_array_equal(line.get_ydata(), expected)
+        assert np.isfinite(expected).sum() == 3
+        shown = curve(axes, "right foot" if alone == 2 else "left foot")[1]
+        assert np.flatnonzero(np.isfinite(shown)).tolist() == [alone]
+    assert len(thin) >= 2
+    assert "double support" in axes.figure.get_suptitle()  # type: ignore[union-attr]
+
+
+def snapshot_times(figure: matplotlib.figure.Figure) -> list[float]:
+    (axes,) = figure.axes
+    words = [text.get_text() for text in axes.texts]
+    return [float(word.removesuffix(" s")) for word in words if word.endswith(" s")]
+
+
+def stumbling() -> hs.Run:
+    """Make a run of bravo7: steps of 0.7 s, then both feet land within 10 ms, and it falls."""
+    robot = walking.bravo7()
+    right, left = (foot.contacts for foot in robot.feet)
+    happened = [
+        (touchdown, 0.7, left),
+        (liftoff, 0.71, right),
+        (touchdown, 1.4, right),
+        (liftoff, 1.0, left),
+        (touchdown, 1.41, left),
+        (liftoff, 1.411, right),
+        (touchdown, 1.413, right),
+        (liftoff, 1.414, left),
+        (touchdown, 1.416, left),
+    ]
+    events = [what(when, contact) for what, when, foot in happened for contact in foot]
+    time = 1e-3 * np.arange(1800)
+    force = pushes(robot, [[0]] * len(time))
+    return make_run(robot, time, force=force, events=sorted(events, key=lambda e: e.time))
+
+
+def test_snapshots_show_a_step_and_no_stumble() -> None:
+    figure = plot(stumbling(), "snapshots")
+    assert figure.get_suptitle() == "bravo7: from 0.70 s to 1.40 s"
+
+
+def test_snapshots_are_in_the_order_of_time() -> None:
+    """Also where hardly any row is without an impact."""
+    for span in (None, (1.39, 1.42), (1.411, 1.417)):
+        times = snapshot_times(plot(stumbling(), "snapshots", span=span))
+        assert len(times) == 7
+        assert times == sorted(times)
+    robot = walking.bravo7()
+    state = hs.State(robot.model.reference, np.full(robot.nv, 0.4))
+    times = snapshot_times(plot(hs.simulate(robot, state=state, duration=3.0), "snapshots"))
+    assert times == sorted(times)
+    assert times[-1] > times[0]
+
+
+def test_force_arrows_have_a_scale() -> None:
+    (axes,) = plot(walking.walk(steps=4), "snapshots").axes
+    assert "736 N" in [text.get_text() for text in axes.texts]
+
+
+@pytest.mark.parametrize("what", ["forces", "energy", "gaps"])
+def test_no_curve_hides_another(what: str) -> None:
+    """Of two that lie upon each other the lower one is wider, and its colour or stroke another."""
+    for axes in plot(walking.walk(steps=1), what).axes:
+        curves = [line for line in axes.get_lines() if len(np.asarray(line.get_xdata())) > 2]
+        widths = [line.get_linewidth() for line in curves]
+        assert len(curves) >= 2
+        assert all(below > above for below, above in pairwise(widths))
+        assert len({str(line.get_color()) for line in curves}) == len(curves)
 
 
 def test_friction_cone() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.support import NOTHING
+from heelstrike.analysis.support import NOTHING, foot_sums
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -37,8 +37,7 @@ class FrictionUse:
     @property
     def max(self) -> float:
         """Largest use by any foot at any time; NaN if no foot ever presses."""
-        used = self.foot[np.isfinite(self.foot) | np.isinf(self.foot)]
-        return float(used.max()) if used.size else float("nan")
+        return float(np.fmax.reduce(self.foot, axis=None, initial=np.nan))
 
 
 def friction_use(run: Run) -> FrictionUse:
@@ -58,20 +57,11 @@ def friction_use(run: Run) -> FrictionUse:
     tangential = run.contact_force[..., 1]
     allowed = friction_coefficient(run) * pressing
     floor = NOTHING * run.robot.weight
-    rows = len(run.time)
-    foot = np.full((rows, len(run.robot.feet)), np.nan)
-    for i, each in enumerate(run.robot.feet):
-        contacts = list(each.contacts)
-        foot[:, i] = _share(
-            tangential[:, contacts].sum(axis=1),
-            allowed[:, contacts].sum(axis=1),
-            pressing[:, contacts].sum(axis=1),
-            floor,
-        )
+    parts = (tangential, allowed, pressing)
     return FrictionUse(
-        contact=_share(tangential, allowed, pressing, floor),
-        foot=foot,
-        total=_share(tangential.sum(axis=1), allowed.sum(axis=1), pressing.sum(axis=1), floor),
+        contact=_share(*parts, floor=floor),
+        foot=_share(*(foot_sums(run, part) for part in parts), floor=floor),
+        total=_share(*(part.sum(axis=1) for part in parts), floor=floor),
     )
 
 
@@ -83,7 +73,7 @@ def friction_coefficient(run: Run) -> Floats:
     return np.asarray(ground.friction[np.clip(segment, 0, len(ground.friction) - 1)])
 
 
-def _share(tangential: Floats, allowed: Floats, pressing: Floats, floor: float) -> Floats:
+def _share(tangential: Floats, allowed: Floats, pressing: Floats, *, floor: float) -> Floats:
     """|tangential| / allowed; NaN where nothing presses, 0/0 of a frictionless ground is 0."""
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.abs(tangential) / allowed

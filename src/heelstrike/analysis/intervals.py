@@ -7,11 +7,13 @@ forces are averaged over the two ends, and the impulses of impacts stand apart, 
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import Event, Run
 
 Floats = NDArray[np.float64]
 
@@ -41,12 +43,7 @@ def event_impulse(run: Run) -> Floats:
     which its velocities jump.
     """
     impulse = np.zeros((max(len(run.time) - 1, 0), run.robot.nc, 2))
-    if not impulses_in_events(run) or not len(impulse):
-        return impulse
-    for event in run.events:
-        if event.kind not in IMPULSIVE or event.impulse == (0.0, 0.0):
-            continue
-        row = _interval_of(event.time, run.time)
+    for row, event in _jumps(run, IMPULSIVE):
         nx, nz = run.contact_normal[row, event.contact]
         normal, tangent = event.impulse
         impulse[row, event.contact] += (normal * nx + tangent * nz, normal * nz - tangent * nx)
@@ -59,17 +56,21 @@ def stop_impulse(run: Run) -> Floats:
     On the joint's coordinate, and like :func:`event_impulse` in the interval of its jump.
     """
     impulse = np.zeros((max(len(run.time) - 1, 0), run.robot.nv))
-    if not impulses_in_events(run) or not len(impulse):
-        return impulse
     model = run.robot.model
-    for event in run.events:
-        if event.kind is not EventKind.JOINT_STOP:
-            continue
-        row, joint = _interval_of(event.time, run.time), event.contact
+    for row, event in _jumps(run, (EventKind.JOINT_STOP,)):
+        joint = event.contact
         middle = 0.5 * (model.lower[joint] + model.upper[joint])  # infinite if it has one stop
         side = 1.0 if run.position[row, joint] < middle else -1.0
         impulse[row, joint] += side * event.impulse[0]
     return impulse
+
+
+def _jumps(run: Run, kinds: Sequence[EventKind]) -> Iterator[tuple[int, Event]]:
+    """Events of some kinds that alone know their impulse, each with the interval of its jump."""
+    if impulses_in_events(run) and len(run.time) > 1:
+        for event in run.events:
+            if event.kind in kinds:
+                yield _interval_of(event.time, run.time), event
 
 
 def _interval_of(instant: float, time: Floats) -> int:

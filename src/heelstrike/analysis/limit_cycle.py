@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import Chart, PoincareMap, Section
+from heelstrike.analysis.poincare_map import Chart, PoincareMap, Section, derivative
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
@@ -73,6 +74,7 @@ class LimitCycle:
         )
 
 
+# More arguments than eight: what walks, and how its steps are told apart, are a user's to say.
 def find_limit_cycle(
     robot: Robot,
     state: State,
@@ -157,9 +159,9 @@ def find_limit_cycle(
         end = step(state)
         change = chart.coordinates(end.state)
         residual = float(np.abs(change).max(initial=0.0))
-        derivative = _derivative(step, chart)
+        slope = derivative(partial(_image, step, chart), chart.size, DISTURBANCE)
         if residual <= tolerance:
-            multipliers = np.linalg.eigvals(derivative).astype(np.complex128)
+            multipliers = np.linalg.eigvals(slope).astype(np.complex128)
             return LimitCycle(
                 state=state,
                 period=end.time,
@@ -168,7 +170,7 @@ def find_limit_cycle(
                 residual=residual,
                 iterations=iteration,
             )
-        newton = np.asarray(np.linalg.lstsq(np.eye(chart.size) - derivative, change)[0], np.float64)
+        newton = np.asarray(np.linalg.lstsq(np.eye(chart.size) - slope, change)[0], np.float64)
         state = _moved_on(step, chart, newton)
     raise LimitCycleError(
         f"no limit cycle of robot {robot.name!r} in {max_iterations} iterations: its state still "
@@ -176,17 +178,8 @@ def find_limit_cycle(
     )
 
 
-def _derivative(step: PoincareMap, chart: Chart) -> Floats:
-    """Derivative of the map at the origin of a chart, (m, m), by central differences."""
-
-    def image(coordinates: Floats) -> Floats:
-        return chart.coordinates(step(chart.state(coordinates)).state)
-
-    columns = [
-        (image(change) - image(-change)) / (2.0 * DISTURBANCE)
-        for change in DISTURBANCE * np.eye(chart.size)
-    ]
-    return np.array(columns).reshape(chart.size, chart.size).T
+def _image(step: PoincareMap, chart: Chart, coordinates: Floats) -> Floats:
+    return chart.coordinates(step(chart.state(coordinates)).state)
 
 
 def _moved_on(step: PoincareMap, chart: Chart, newton: Floats) -> State:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import (
     center_of_mass,
@@ -24,8 +23,7 @@ from heelstrike.sim.run import Run
 Floats = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Bundle):
     """Motion of a robot in world axes, row by row.
 
     Attributes
@@ -42,12 +40,12 @@ class Motion:
         Energies in J; the kinetic one includes rotors, the potential one joint springs.
     """
 
-    link_origin: Floats
-    link_angle: Floats
-    center_of_mass: Floats
-    contact_velocity: Floats
-    kinetic: Floats
-    potential: Floats
+    link_origin: Floats = array("nt", "nl", "axes")
+    link_angle: Floats = array("nt", "nl")
+    center_of_mass: Floats = array("nt", "axes")
+    contact_velocity: Floats = array("nt", "nc", "axes")
+    kinetic: Floats = array("nt")
+    potential: Floats = array("nt")
 
 
 @kernel
@@ -57,27 +55,23 @@ def _follow(
     velocity: Floats,
     contact_point: Floats,
     work: Workspace,
-    origin: Floats,
-    angle: Floats,
-    center: Floats,
-    contact_velocity: Floats,
-    kinetic: Floats,
-    potential: Floats,
+    motion: Motion,
 ) -> None:
     for row in range(position.shape[0]):
         forward_kinematics(model, position[row], work)
         link_velocities(model, velocity[row], work)
         for link in range(model.nl):
-            origin[row, link, 0] = work.origin[link, 0]
-            origin[row, link, 1] = work.origin[link, 1]
-            angle[row, link] = work.angle[link]
-        center_of_mass(model, work, center[row])
-        kinetic_energy(model, velocity[row], work, kinetic[row : row + 1])
-        potential_energy(model, position[row], work, potential[row : row + 1])
+            motion.link_origin[row, link, 0] = work.origin[link, 0]
+            motion.link_origin[row, link, 1] = work.origin[link, 1]
+            motion.link_angle[row, link] = work.angle[link]
+        center_of_mass(model, work, motion.center_of_mass[row])
+        kinetic_energy(model, velocity[row], work, motion.kinetic[row : row + 1])
+        potential_energy(model, position[row], work, motion.potential[row : row + 1])
         for contact in range(model.nc):
             place = place_of(work, contact_point[row, contact])
             speed = velocity_at(work.velocity, model.contact_link[contact], place)
-            contact_velocity[row, contact, 0], contact_velocity[row, contact, 1] = speed
+            motion.contact_velocity[row, contact, 0] = speed[0]
+            motion.contact_velocity[row, contact, 1] = speed[1]
 
 
 def motion(
@@ -96,31 +90,9 @@ def motion(
     contact_point : (nt, nc, 2) array
         World positions (x, z) at which the links' velocities are asked for, in m.
     """
-    q = np.ascontiguousarray(position, dtype=np.float64)
-    v = np.ascontiguousarray(velocity, dtype=np.float64)
-    point = np.ascontiguousarray(contact_point, dtype=np.float64)
-    rows = len(q)
-    result = Motion(
-        link_origin=np.zeros((rows, robot.nl, 2)),
-        link_angle=np.zeros((rows, robot.nl)),
-        center_of_mass=np.zeros((rows, 2)),
-        contact_velocity=np.zeros((rows, robot.nc, 2)),
-        kinetic=np.zeros(rows),
-        potential=np.zeros(rows),
-    )
-    _follow(
-        robot.model,
-        q,
-        v,
-        point,
-        Workspace.allocate(**robot.model.extents),
-        result.link_origin,
-        result.link_angle,
-        result.center_of_mass,
-        result.contact_velocity,
-        result.kinetic,
-        result.potential,
-    )
+    q, v, point = (np.ascontiguousarray(a, np.float64) for a in (position, velocity, contact_point))
+    result = Motion.allocate(nt=len(q), **robot.model.extents)
+    _follow(robot.model, q, v, point, Workspace.allocate(**robot.model.extents), result)
     return result
 
 
@@ -138,3 +110,10 @@ def run_motion(run: Run) -> Motion:
         Where its links and its centre of mass are in each row.
     """
     return motion(run.robot, run.position, run.velocity, run.contact_point)
+
+
+def in_world(origin: Floats, angle: Floats, local: Floats) -> Floats:
+    """Places (..., 2) of points (x, z) in link frames whose poses are given, in m and rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, z = local[..., 0], local[..., 1]
+    return np.asarray(origin + np.stack((c * x + s * z, c * z - s * x), axis=-1))

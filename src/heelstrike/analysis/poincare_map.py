@@ -90,6 +90,14 @@ class Section:
         return State(q, state.v), distance
 
 
+def derivative(function: Callable[[Floats], Floats], size: int, change: float) -> Floats:
+    """Derivative of a function of a vector at zero, (m, size), by central differences."""
+    columns = [
+        (function(each) - function(-each)) / (2.0 * change) for each in change * np.eye(size)
+    ]
+    return np.array(columns).reshape(size, -1).T
+
+
 class Chart:
     """Coordinates of the states on the section near one of them, which is their origin.
 
@@ -102,13 +110,9 @@ class Chart:
         self._origin = np.concatenate((origin.q, origin.v))
         self._touching, self._at_rest = section.standing(origin)
         self._foothold = section.foothold(origin)
-        size = len(self._origin)
-        columns = [
-            (self._equations(self._origin + e) - self._equations(self._origin - e))
-            / (2.0 * DISTURBANCE)
-            for e in DISTURBANCE * np.eye(size)
-        ]
-        gradient = np.array(columns).T
+        gradient = derivative(
+            lambda change: self._equations(self._origin + change), len(self._origin), DISTURBANCE
+        )
         _, singular, directions = np.linalg.svd(gradient)
         rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
         self._normal = directions[:rank].T
@@ -215,8 +219,8 @@ class PoincareMap:
             self._relabelled = lambda state, _: symmetry(state)
         elif landing is not None:
             self._relabelled = lambda state, _: state
-        elif robot.mirror is not None:
-            self._relabelled = lambda state, _: exchanged(robot, state)
+        elif (mirror := robot.mirror) is not None:
+            self._relabelled = lambda state, _: mirror.state(state)
         elif is_wheel(robot):
             self._relabelled = lambda state, contact: turned(robot, state, contact)
         else:
@@ -273,14 +277,6 @@ class PoincareMap:
         )
 
 
-def exchanged(robot: Robot, state: State) -> State:
-    """Return a state with left and right exchanged."""
-    mirror = robot.mirror
-    if mirror is None:
-        raise LimitCycleError(f"robot {robot.name!r} has no mirror image")
-    return mirror.state(state)
-
-
 def is_wheel(robot: Robot) -> bool:
     """Whether all contact points are spokes of one wheel: evenly spaced, balanced on its hinge."""
     model = robot.model
@@ -289,7 +285,8 @@ def is_wheel(robot: Robot) -> bool:
         return False
     (link,) = links
     spokes = model.contact_position @ np.array([1j, 1.0])  # angles about +y, from the vertical
-    gaps = np.diff(np.sort(np.angle(spokes)), append=np.sort(np.angle(spokes))[0] + 2.0 * np.pi)
+    angles = np.sort(np.angle(spokes))
+    gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
     return bool(
         model.axis[link, 0] != 0.0
         and np.ptp(np.abs(spokes)) < 1e-9

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import string
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -120,10 +121,15 @@ class Summary:
     wall_s: float
     real_time_factor: float
 
+    @property
+    def speed(self) -> float:
+        """Mean speed of the centre of mass along x, in m/s."""
+        return self.distance_m / self.duration_s if self.duration_s > 0.0 else UNKNOWN
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain dictionaries, lists and numbers, with None for what does not exist."""
-        plain: dict[str, Any] = _plain(asdict(self))
-        return plain
+        found: dict[str, Any] = plain(asdict(self))
+        return found
 
     def to_json(self, *, indent: int | None = 2) -> str:
         """Return the summary as JSON text.
@@ -187,9 +193,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
     duration = float(run.time[-1] - run.time[0]) if len(run.time) else 0.0
     tracking = tracking_error(run, gait) if gait is not None and len(run.time) else None
     zmp = zero_moment_point(run, motion=motion)
-    alone = zmp.stance[np.isfinite(zmp.stance)]
     margin = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
-    margin = margin[np.isfinite(margin)]
     transport = cost_of_transport(run, motion=motion)
     return Summary(
         robot=run.robot.name,
@@ -198,13 +202,15 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         steps=len(walking_steps(run)),
         distance_m=transport.distance,
         duration_s=duration,
-        gait=None if gait is None else _gait_figures(gait),
+        gait=None
+        if gait is None
+        else GaitFigures(float(gait.step_length), float(gait.step_duration), float(gait.cost)),
         tracking_rms_rad=UNKNOWN if tracking is None else tracking.rms,
         tracking_max_rad=UNKNOWN if tracking is None else tracking.max,
-        zmp_min_m=float(alone.min()) if alone.size else UNKNOWN,
-        zmp_max_m=float(alone.max()) if alone.size else UNKNOWN,
+        zmp_min_m=float(np.fmin.reduce(zmp.stance, initial=UNKNOWN)),
+        zmp_max_m=float(np.fmax.reduce(zmp.stance, initial=UNKNOWN)),
         zmp_limits_m=zero_moment_point_limits(run.robot),
-        zmp_margin_min_m=float(margin.min()) if margin.size else UNKNOWN,
+        zmp_margin_min_m=float(np.fmin.reduce(margin, axis=None, initial=UNKNOWN)),
         friction_use_max=friction_use(run).max,
         slip_max_m=max_slip(run),
         penetration_max_m=run.certificates.penetration,
@@ -221,78 +227,52 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
     )
 
 
-def _gait_figures(gait: Gait) -> GaitFigures:
-    return GaitFigures(float(gait.step_length), float(gait.step_duration), float(gait.cost))
-
-
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return dictionaries, lists and numbers for JSON, None for numbers that are not finite."""
     if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
+        return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+        return [plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+class _Words(string.Formatter):
+    """Significant digits, and a dash for what does not exist."""
+
+    def format_field(self, value: Any, spec: str) -> str:
+        if not isinstance(value, float):
+            return str(value)
+        return f"{value:{spec}g}" if math.isfinite(value) else "–"
+
+
+# What a person reads, in letters that the consoles of Windows have.
+LINES = {
+    "status": "{s.status}",
+    "steps": "{s.steps}",
+    "distance": "{s.distance_m:.4} m in {s.duration_s:.4} s ({s.speed:.3} m/s)",
+    "gait": "{s.gait.step_length_m:.3} m in {s.gait.step_duration_s:.3} s a step, "
+    "torque cost {s.gait.cost_N2m2s:.4} N²m²s",
+    "joint tracking error": "{s.tracking_rms_rad:.3} rad rms, {s.tracking_max_rad:.3} rad at most",
+    "zero moment point": "{s.zmp_min_m:.3} … {s.zmp_max_m:.3} m "
+    "(sole {s.zmp_limits_m[0]:.3} … {s.zmp_limits_m[1]:.3} m)",
+    "friction use": "{s.friction_use_max:.3} of the cone",
+    "slip": "{s.slip_max_m:.2} m",
+    "penetration": "{s.penetration_max_m:.2} m",
+    "contact problems": "{s.solver}; complementarity {s.complementarity_max:.2}",
+    "cost of transport": "{s.cost_of_transport:.3} "
+    "({s.cost_of_transport_positive:.3} positive work)",
+    "torques at their limit": "{s.saturations}",
+    "computing time": "{s.wall_s:.3} s ({s.real_time_factor:.3} × real time), "
+    "compilation {s.compile_s:.3} s",
+}
+OF_A_GAIT = ("gait", "joint tracking error")
 
 
 def _rows(s: Summary) -> list[tuple[str, str]]:
     """Label and value of every line of the table a person reads."""
-    speed = s.distance_m / s.duration_s if s.duration_s > 0.0 else UNKNOWN
-    rows = [
-        ("status", s.status),
-        ("steps", str(s.steps)),
-        (
-            "distance",
-            f"{_number(s.distance_m, 4)} m in {_number(s.duration_s, 4)} s "
-            f"({_number(speed, 3)} m/s)",
-        ),
+    write = _Words().format
+    return [
+        (label, write(line, s=s))
+        for label, line in LINES.items()
+        if s.gait is not None or label not in OF_A_GAIT
     ]
-    if s.gait is not None:
-        rows.append(
-            (
-                "gait",
-                f"{_number(s.gait.step_length_m, 3)} m in "
-                f"{_number(s.gait.step_duration_s, 3)} s a step, "
-                f"∫ΓᵀΓ dt = {_number(s.gait.cost_N2m2s, 4)} N²m²s",
-            )
-        )
-        rows.append(
-            (
-                "joint tracking error",
-                f"{_number(s.tracking_rms_rad, 3)} rad rms, "
-                f"{_number(s.tracking_max_rad, 3)} rad at most",
-            )
-        )
-    fallen_back = f", {s.solver.fallbacks} fallbacks" if s.solver.fallbacks else ""
-    rows += [
-        (
-            "zero moment point",
-            f"{_number(s.zmp_min_m, 3)} … {_number(s.zmp_max_m, 3)} m "
-            f"(sole {_number(s.zmp_limits_m[0], 3)} … {_number(s.zmp_limits_m[1], 3)} m)",
-        ),
-        ("friction use", f"{_number(s.friction_use_max, 3)} of the cone"),
-        ("slip", f"{_number(s.slip_max_m, 2)} m"),
-        ("penetration", f"{_number(s.penetration_max_m, 2)} m"),
-        (
-            "contact problems",
-            f"{s.solver.solves} solved by {s.solver.name}{fallen_back}, "
-            f"{s.solver.failures} failures; complementarity {_number(s.complementarity_max, 2)}",
-        ),
-        (
-            "cost of transport",
-            f"{_number(s.cost_of_transport, 3)} "
-            f"({_number(s.cost_of_transport_positive, 3)} positive work)",
-        ),
-        ("torques at their limit", str(s.saturations)),
-        (
-            "computing time",
-            f"{_number(s.wall_s, 3)} s ({_number(s.real_time_factor, 3)} × real time), "
-            f"compilation {_number(s.compile_s, 3)} s",
-        ),
-    ]
-    return rows
-
-
-def _number(value: float, digits: int) -> str:
-    """Significant digits with a true minus sign; a dash for what does not exist."""
-    return f"{value:.{digits}g}".replace("-", "−") if math.isfinite(value) else "–"

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import Event, Run
 
 NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""
+
+CHATTER = 0.02
+"""A foot that lands again within this time (s) has not stepped: it chatters, or scuffs."""
 
 
 def pushing(run: Run) -> NDArray[np.bool_]:
@@ -26,9 +30,13 @@ def pushing(run: Run) -> NDArray[np.bool_]:
 
 def pushing_feet(run: Run) -> NDArray[np.bool_]:
     """Tell which feet push in each row, (nt, nf)."""
-    points = pushing(run)
-    feet = [points[:, list(foot.contacts)].any(axis=1) for foot in run.robot.feet]
-    return np.array(feet, dtype=bool).reshape(len(feet), len(points)).T
+    return np.asarray(foot_sums(run, pushing(run)) > 0)
+
+
+def foot_sums(run: Run, values: NDArray[Any]) -> NDArray[Any]:
+    """Sum what is of contact points, (nt, nc, ...), over those of each foot, (nt, nf, ...)."""
+    sums = [values[:, list(foot.contacts)].sum(axis=1) for foot in run.robot.feet]
+    return np.stack(sums, axis=1) if sums else np.zeros((len(values), 0, *values.shape[2:]))
 
 
 def single_support(run: Run) -> NDArray[np.bool_]:
@@ -165,15 +173,13 @@ def stances(run: Run) -> tuple[Stance, ...]:
     closed: dict[int, set[int]] = {foot: set() for foot in range(len(run.robot.feet))}
     current: dict[int, int] = {}
     found: list[Stance] = []
-    for contact in _first_contacts(run):
-        foot = foot_of.get(contact, -1)
-        if foot >= 0:
-            closed[foot].add(contact)
-    for foot, contacts in closed.items():
-        if contacts:
-            current[foot] = len(found)
-            found.append(Stance(foot, float(run.time[0]), np.inf, 0.0))
-    for event in run.events:
+    standing = np.any(pushing(run)[:1], axis=0).tolist()
+    begin = [
+        Event(float(run.time[0]), EventKind.TOUCHDOWN, contact, (0.0, 0.0))
+        for contact in foot_of
+        if standing[contact]
+    ]
+    for event in (*begin, *run.events):
         foot = foot_of.get(event.contact, -1)
         if foot < 0:
             continue
@@ -197,7 +203,8 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     """List the stances that end a walking step: the landing foot is not the one that landed last.
 
     The contact the robot starts with is no step, nor is the first landing of a robot dropped from
-    the air, nor a foot that lands again without the other one having landed in between.
+    the air, nor a foot that lands again without the other one having landed in between, nor one
+    that was in the air for less than `CHATTER`.
 
     Parameters
     ----------
@@ -211,18 +218,14 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     """
     taken: list[Stance] = []
     last: set[int] = set()
+    left: dict[int, float] = {}
     for stance in stances(run):
+        chatters = stance.touchdown - left.get(stance.foot, -np.inf) < CHATTER
+        left[stance.foot] = stance.liftoff
         if stance.touchdown == run.time[0]:
             last.add(stance.foot)
-            continue
-        if last and last != {stance.foot}:
-            taken.append(stance)
-        last = {stance.foot}
+        elif not chatters:
+            if last and last != {stance.foot}:
+                taken.append(stance)
+            last = {stance.foot}
     return tuple(taken)
-
-
-def _first_contacts(run: Run) -> list[int]:
-    """Contact points on the ground at the beginning."""
-    if not len(run.time):
-        return []
-    return [int(contact) for contact in np.flatnonzero(pushing(run)[0])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.motion import Motion, run_motion
+from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.sole import soles
 from heelstrike.sim.run import Run
 
@@ -49,9 +49,8 @@ def sole_points(run: Run, *, motion: Motion | None = None) -> Floats:
     motion = run_motion(run) if motion is None else motion
     points = np.zeros((len(run.time), len(run.robot.feet), 2))
     for i, sole in enumerate(soles(run.robot)):
-        angle = motion.link_angle[:, sole.foot.link]
-        c, s = np.cos(angle), np.sin(angle)
-        x, z = sole.reference
-        turned = np.stack((c * x + s * z, c * z - s * x), axis=-1)
-        points[:, i] = motion.link_origin[:, sole.foot.link] + turned
+        link = sole.foot.link
+        points[:, i] = in_world(
+            motion.link_origin[:, link], motion.link_angle[:, link], sole.reference
+        )
     return points

@@ -70,8 +70,7 @@ class ZeroMomentPoint:
     def stance(self) -> Floats:
         """Zero moment point of the stance foot in its frame, (nt,); NaN but in single support."""
         alone = np.where(self.single_support[:, None], self.foot, np.nan)
-        finite = np.isfinite(alone)
-        return np.where(finite.any(axis=1), np.where(finite, alone, 0.0).sum(axis=1), np.nan)
+        return np.asarray(np.fmax.reduce(alone, axis=1, initial=np.nan))
 
 
 def zero_moment_point(run: Run, *, motion: Motion | None = None) -> ZeroMomentPoint:

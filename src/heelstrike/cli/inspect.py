@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
 
-from heelstrike.cli.terminal import Debug, output, spoken, tell
+from heelstrike.cli.options import AsJson, Debug, RobotName
+from heelstrike.cli.terminal import output, spoken, tell
+
+if TYPE_CHECKING:
+    from heelstrike.robot.inspection import Inspection
 
 FOUND = 1
 """Exit code when something looks wrong, so that a script can tell."""
@@ -18,7 +22,7 @@ FOUND = 1
 
 @spoken
 def inspect(
-    robot: Annotated[str, typer.Argument(help="A built-in robot, or an MJCF or URDF file.")],
+    robot: RobotName,
     picture: Annotated[
         Path | None,
         typer.Option(
@@ -31,44 +35,46 @@ def inspect(
     projected: Annotated[
         bool, typer.Option("--projected", help="Lock the joints that leave the x–z plane.")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")] = False,
+    as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Look at a robot: tree, masses, limits, contact points, and what looks wrong.
 
     Ends with exit code 1 if something does.
     """
-    from heelstrike.robot.inspection import facts, inspect_robot
+    from heelstrike.robot.inspection import inspect_robot
 
     inspection = inspect_robot(robot, floating=floating, projected=projected)
-    if as_json:
-        typer.echo(json.dumps(facts(inspection), indent=2))
-    else:
-        if inspection.robot is not None:
-            from heelstrike.view.terminal import terminal_drawing
-
-            _draw(terminal_drawing(inspection.robot))
-        _print(inspection.text())
-    if picture is not None and inspection.robot is None:
-        tell(f"{picture} is not drawn, for there is no robot to draw")
-    elif picture is not None and inspection.robot is not None:
-        from heelstrike.view.drawing import robot_picture
-
-        robot_picture(inspection.robot, picture)
-        tell(f"drawn into {picture}")
+    look_at(inspection, picture, as_json=as_json)
     if not inspection.sound:
         raise typer.Exit(FOUND)
 
 
-def _print(text: str) -> None:
-    output().print(Text(text), soft_wrap=True)
+def look_at(inspection: Inspection, picture: Path | None, *, as_json: bool) -> None:
+    """Print what was found of a robot, and draw it into a file."""
+    from heelstrike.robot.inspection import facts
+    from heelstrike.view.drawing import robot_picture
+    from heelstrike.view.terminal import terminal_drawing
+
+    robot = inspection.robot
+    if as_json:
+        typer.echo(json.dumps(facts(inspection), indent=2))
+    else:
+        drawing = "" if robot is None else terminal_drawing(robot)
+        for text in (drawing if _has_letters_for(drawing) else "", inspection.text()):
+            if text:
+                output().print(Text(text), soft_wrap=True)
+    if picture is not None and robot is not None:
+        robot_picture(robot, picture)
+        tell(f"drawn into {picture}")
+    elif picture is not None:
+        tell(f"{picture} is not drawn, for there is no robot to draw")
 
 
-def _draw(text: str) -> None:
-    """Print a drawing, unless the terminal or pipe has no letters for it."""
+def _has_letters_for(text: str) -> bool:
+    """Whether the terminal or pipe can show a text."""
     try:
         text.encode(sys.stdout.encoding or "ascii")
     except UnicodeEncodeError:
-        return
-    if text:
-        _print(text)
+        return False
+    return True

@@ -21,11 +21,8 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-app.command()(walk)
-app.command()(paper)
-app.command()(compare)
-app.command()(robots)
-app.command()(inspect)
+for command in (walk, paper, compare, robots, inspect):
+    app.command()(command)
 
 
 def _show_version(wanted: bool) -> None:

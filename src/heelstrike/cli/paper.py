@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from heelstrike.cli.terminal import Debug, output, spoken, stage, tell
+from heelstrike.cli.options import Debug
+from heelstrike.cli.terminal import output, spoken, stage, tell
 
 
 @spoken
@@ -26,11 +27,8 @@ def paper(
         from heelstrike.experiments.paper import reproduce_paper
 
         report = reproduce_paper(out, progress=current.doing)
-    table = Table(show_lines=True)
-    table.add_column("where", max_width=20)
-    table.add_column("measured here")
-    table.add_column("verdict", max_width=8)
+    table = Table("where", "the paper", "measured here", "verdict", show_lines=True)
     for claim in report.claims:
-        table.add_row(claim.source, claim.measured, claim.verdict.value)
+        table.add_row(claim.source, claim.statement, claim.measured, claim.verdict.value)
     output().print(table)
     tell(f"{report.page}: the claims in full, with figures")

@@ -11,9 +11,10 @@ import io
 import sys
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 import typer
 from rich.console import Console
@@ -23,6 +24,7 @@ from rich.progress import (
     ProgressColumn,
     SpinnerColumn,
     Task,
+    TaskID,
     TimeElapsedColumn,
 )
 from rich.text import Text
@@ -36,10 +38,6 @@ FAILED = 1
 
 WRONG_INPUT = 2
 """Exit status when the request could not be carried out as it was made."""
-
-Debug = Annotated[
-    bool, typer.Option("--debug", help="Show where in the program an error arose.", hidden=True)
-]
 
 _Parameters = ParamSpec("_Parameters")
 _Result = TypeVar("_Result")
@@ -58,24 +56,15 @@ def messages() -> Console:
     return Console(stderr=True, highlight=False)
 
 
-def tell(message: str) -> None:
-    """Print something worth knowing that is not a result."""
-    messages().print(Text(message), soft_wrap=True)
+def tell(message: str, label: tuple[str, str] = ("", "")) -> None:
+    """Print something worth knowing that is not a result, after a label and its style."""
+    # `soft_wrap` leaves breaking lines to the terminal: a message in a log stays in one piece.
+    messages().print(Text.assemble(label, message), soft_wrap=True)
 
 
 def complain(message: str) -> None:
     """Print an error."""
-    _print_labelled("error", "bold red", message)
-
-
-def warn(message: str) -> None:
-    """Print a warning."""
-    _print_labelled("warning", "yellow", message)
-
-
-def _print_labelled(label: str, style: str, message: str) -> None:
-    # `soft_wrap` leaves breaking lines to the terminal: a message in a log stays in one piece.
-    messages().print(Text.assemble((f"{label}:", style), " ", message), soft_wrap=True)
+    tell(message, ("error: ", "bold red"))
 
 
 def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
@@ -91,7 +80,9 @@ def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _R
         with insistent_interrupts() as interrupts, warnings.catch_warnings():
             if options.get("debug"):
                 return function(*args, **options)
-            warnings.showwarning = lambda message, *_, **__: warn(str(message))
+            warnings.showwarning = lambda message, *_, **__: tell(
+                str(message), ("warning: ", "yellow")
+            )
             try:
                 return function(*args, **options)
             except KeyboardInterrupt as error:
@@ -126,14 +117,8 @@ def wrote(*files: Path) -> None:
 def tell_interruption(doing: str = "") -> None:
     """Say what Ctrl-C ended and what is kept."""
     names = ", ".join(str(path) for path in _written)
-    messages().print(
-        Text.assemble(
-            ("interrupted", "yellow"),
-            f" while {doing}" if doing else "",
-            f"; kept: {names}" if names else "; nothing was written",
-        ),
-        soft_wrap=True,
-    )
+    kept = f"kept: {names}" if names else "nothing was written"
+    tell(f"{f' while {doing}' if doing else ''}; {kept}", ("interrupted", "yellow"))
 
 
 def _file_trouble(error: OSError) -> str:
@@ -141,28 +126,27 @@ def _file_trouble(error: OSError) -> str:
     return f"{error.filename}: {reason}" if error.filename else reason
 
 
+@dataclass
 class Stage:
     """A piece of work in progress."""
 
-    def __init__(self, what: str, progress: Progress | None = None, task: Any = None) -> None:
-        self.what = what
-        """What is being done."""
-        self._progress = progress
-        self._task = task
-        self.outcome = ""
-        """What to say when it is over; nothing by default."""
+    what: str
+    """What is being done."""
+    outcome: str = ""
+    """What to say when it is over; nothing by default."""
+    progress: Progress | None = None
+    """Where it is shown, on a terminal."""
 
     def reached(self, fraction: float) -> None:
         """Show how much of the work is done, from 0 to 1."""
-        if self._progress is not None:
-            self._progress.update(self._task, completed=min(max(fraction, 0.0), 1.0), total=1.0)
+        if self.progress is not None:
+            share = min(max(fraction, 0.0), 1.0)
+            self.progress.update(TaskID(0), description=self.what, completed=share, total=1.0)
 
     def doing(self, what: str, fraction: float) -> None:
         """Show what is being done now, and how much of that is done."""
         self.what = what
-        if self._progress is not None:
-            self._progress.update(self._task, description=what)
-            self.reached(fraction)
+        self.reached(fraction)
 
 
 @contextmanager
@@ -178,34 +162,19 @@ def stage(doing: str, *, when_slow: str = "") -> Iterator[Stage]:
     when_slow : str
         Added when the work takes longer than it usually does to get going.
     """
-    console = messages()
-    if not console.is_terminal:
-        with _named_interrupt(Stage(doing)) as current:
+    current, console = Stage(doing), messages()
+    with ExitStack() as shown:
+        if console.is_terminal:
+            columns = (_Doing(when_slow), BarColumn(bar_width=24), TimeElapsedColumn())
+            current.progress = Progress(SpinnerColumn(), *columns, console=console, transient=True)
+            shown.enter_context(current.progress).add_task(doing, total=None)
+        try:
             yield current
-        return
-    progress = Progress(
-        SpinnerColumn(),
-        _Doing(when_slow),
-        BarColumn(bar_width=24),
-        TimeElapsedColumn(),
-        console=console,
-        transient=True,
-    )
-    with progress:
-        current = Stage(doing, progress, progress.add_task(doing, total=None))
-        with _named_interrupt(current):
-            yield current
-    if current.outcome:
+        except KeyboardInterrupt as error:
+            error.doing = current.what  # type: ignore[attr-defined]
+            raise
+    if current.outcome and console.is_terminal:
         console.print(current.outcome)
-
-
-@contextmanager
-def _named_interrupt(current: Stage) -> Iterator[Stage]:
-    try:
-        yield current
-    except KeyboardInterrupt as error:
-        error.doing = current.what  # type: ignore[attr-defined]
-        raise
 
 
 class _Doing(ProgressColumn):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,9 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.options import (
+    AsJson,
+    Debug,
+    Friction,
+    RobotName,
+    SavedGait,
+    Steps,
+    method_called,
+)
+from heelstrike.cli.planning import planned_gait
 from heelstrike.cli.terminal import (
     FAILED,
-    Debug,
     complain,
     output,
     spoken,
@@ -23,12 +31,14 @@ from heelstrike.cli.terminal import (
 )
 
 if TYPE_CHECKING:
+    from heelstrike.experiments.results import Results, Saved
     from heelstrike.gait import Gait
-    from heelstrike.robot import Robot
+    from heelstrike.sim import Run
     from heelstrike.sim.method import Method as TimeMethod
 
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"
+SUITS = "suits the robot's size"
 
 
 class Method(StrEnum):
@@ -57,48 +67,38 @@ class Animation(StrEnum):
     NONE = "none"
 
 
+# As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
 def walk(
-    robot: Annotated[
-        str, typer.Argument(help="A built-in robot, or an MJCF or URDF file.", show_default=True)
-    ] = "bravo7",
+    robot: RobotName = "bravo7",
     step_length: Annotated[
-        float | None,
-        typer.Option(help="Length of a step in m.", show_default="suits the robot's size"),
+        float | None, typer.Option(help="Length of a step in m.", show_default=SUITS)
     ] = None,
     step_duration: Annotated[
-        float | None,
-        typer.Option(help="Duration of a step in s.", show_default="suits the robot's size"),
+        float | None, typer.Option(help="Duration of a step in s.", show_default=SUITS)
     ] = None,
     clearance: Annotated[
-        float | None,
-        typer.Option(
-            help="Height of the swing foot's path in m.", show_default="suits the robot's size"
-        ),
+        float | None, typer.Option(help="Height of the swing foot's path in m.", show_default=SUITS)
     ] = None,
-    gait: Annotated[
-        Path | None, typer.Option(help="Walk this saved gait instead of designing one.")
-    ] = None,
-    steps: Annotated[int, typer.Option(min=1, help="Steps to walk.")] = 20,
+    gait: SavedGait = None,
+    steps: Steps = 20,
     method: Annotated[Method, typer.Option(help="Way through time.")] = Method.TIME_STEPPING,
     scheme: Annotated[
-        Scheme, typer.Option(help="Discretisation of time stepping.")
-    ] = Scheme.GAP_LINEARISED,
+        Scheme | None,
+        typer.Option(
+            help="Discretisation of time stepping.", show_default=Scheme.GAP_LINEARISED.value
+        ),
+    ] = None,
     step: Annotated[
         float, typer.Option(help="Time step h in s; of the record, for the other methods.")
     ] = 1e-3,
-    friction: Annotated[float, typer.Option(help="Friction coefficient of the ground.")] = 0.75,
+    friction: Friction = 0.75,
     out: Annotated[
         Path,
-        typer.Option(
-            file_okay=False,
-            help="Directory for the results; those of an earlier walk are replaced.",
-        ),
+        typer.Option(file_okay=False, help="For the results; those of an earlier walk go."),
     ] = Path("walk"),
     animation: Annotated[Animation, typer.Option(help="Kind of animation.")] = Animation.MP4,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the summary as JSON, and nothing else.")
-    ] = False,
+    as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Design (or load) a gait, walk it, and write figures, an animation and all data.
@@ -111,27 +111,43 @@ def walk(
     with stage("loading"):
         from heelstrike.contact.ground import Ground
         from heelstrike.experiments.results import Results
-        from heelstrike.experiments.walk import walk, why_unstable
+        from heelstrike.experiments.walk import walk
         from heelstrike.robot import load_robot
-        from heelstrike.sim import RunStatus
 
         # All that is cheap to refuse is refused before anything that takes long.
-        time_method = _time_method(method, step, scheme)
-        ground = Ground(friction=friction)
-        machine = load_robot(robot)
-        results = Results(out)
-    planned = _gait(machine, gait, step_length, step_duration, clearance, friction)
+        through = _through_time(method, scheme, step)
+        ground, machine, results = Ground(friction=friction), load_robot(robot), Results(out)
+    planned = planned_gait(
+        machine, gait, friction, length=step_length, duration=step_duration, clearance=clearance
+    )
     wrote(results.save_gait(planned))
     with stage(f"walking {steps} steps", when_slow=FIRST_TIME) as walking:
         run = walk(
-            machine,
-            planned,
-            steps=steps,
-            method=time_method,
-            ground=ground,
-            progress=walking.reached,
+            machine, planned, steps=steps, method=through, ground=ground, progress=walking.reached
         )
-    # After Ctrl-C one wants to have what there is and go: the data, but no pictures of them.
+    saved = _save(results, run, planned, animation)
+    _tell_outcome(run, planned, steps, saved, as_json=as_json)
+
+
+def _through_time(method: Method, scheme: Scheme | None, step: float) -> TimeMethod:
+    if method is Method.TIME_STEPPING:
+        return method_called(scheme or method, step)
+    if scheme is not None:
+        raise typer.BadParameter(
+            f"{method} has no schemes, which are those of time-stepping; leave one of the two out",
+            param_hint="--scheme",
+        )
+    if method is Method.EVENT_DRIVEN:
+        from heelstrike.sim import EventDriven
+
+        return EventDriven(output_period=step)
+    return method_called(method, step)
+
+
+def _save(results: Results, run: Run, gait: Gait, animation: Animation) -> tuple[Saved, ...]:
+    """Write what a walk leaves; after Ctrl-C, when one wants to go, the data but no pictures."""
+    from heelstrike.sim import RunStatus
+
     interrupted = run.status is RunStatus.INTERRUPTED
     kind = None if animation is Animation.NONE or interrupted else animation.value
     if interrupted:
@@ -139,75 +155,41 @@ def walk(
     with stage("writing results") as writing:
         try:
             saved = results.save_run(
-                run, planned, figures=not interrupted, animation=kind, progress=writing.reached
+                run, gait, figures=not interrupted, animation=kind, progress=writing.reached
             )
         finally:
             wrote(*results.written[1:])
     for each in saved:
         if each.error is not None:
             complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
-    if interrupted:
-        if as_json:
-            typer.echo(run.summary(gait=planned).to_json())
-        tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
-        raise typer.Exit(INTERRUPTED)
-    summary = run.summary(gait=planned)
+    return saved
+
+
+def _tell_outcome(
+    run: Run, gait: Gait, steps: int, saved: tuple[Saved, ...], *, as_json: bool
+) -> None:
+    """Show the figures of a walk and say how it went, by the exit status, too."""
+    from heelstrike.experiments.walk import why_unstable
+    from heelstrike.sim import EventDriven, RunStatus
+
+    summary = run.summary(gait=gait)
+    interrupted = run.status is RunStatus.INTERRUPTED
     if as_json:
         typer.echo(summary.to_json())
-    else:
+    elif not interrupted:
         output().print(summary)
         written = ", ".join(each.path.name for each in saved if each.error is None)
-        tell(f"in {out}: gait.json, {written}")
+        tell(f"in {saved[0].path.parent}: gait.json, {written}")
+    if interrupted:
+        tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
+        raise typer.Exit(INTERRUPTED)
     walked = run.completed and summary.steps >= steps
     if not run.completed:
         complain(run.message)
     elif not walked:
         complain(f"the robot took {summary.steps} of {steps} steps in {run.time[-1]:.3g} s")
-    if not walked and (reason := why_unstable(planned)):
+    if not walked and (reason := why_unstable(gait)):
         longer = " --method event-driven keeps to the gait for longer."
-        tell(reason + ("" if method is Method.EVENT_DRIVEN else longer))
+        tell(reason + ("" if isinstance(run.method, EventDriven) else longer))
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)
-
-
-def _time_method(method: Method, step: float, scheme: Scheme) -> TimeMethod:
-    from heelstrike import sim
-
-    match method:
-        case Method.TIME_STEPPING:
-            return sim.TimeStepping(step=step, scheme=sim.Scheme[scheme.name])
-        case Method.EVENT_DRIVEN:
-            return sim.EventDriven(output_period=step)
-        case Method.COMPLIANT:
-            return sim.Compliant(step=step)
-
-
-def _gait(
-    robot: Robot,
-    path: Path | None,
-    step_length: float | None,
-    step_duration: float | None,
-    clearance: float | None,
-    friction: float,
-) -> Gait:
-    from heelstrike.experiments.walk import design, typical_step
-    from heelstrike.gait import load_gait
-
-    asked = {"length": step_length, "duration": step_duration, "clearance": clearance}
-    given = {name: value for name, value in asked.items() if value is not None}
-    if path is not None:
-        if given:
-            raise typer.BadParameter(
-                "a saved gait has its own step length, duration and clearance; leave these options "
-                "out, or design a gait without --gait",
-                param_hint="--gait",
-            )
-        return load_gait(path, robot)
-    size = replace(typical_step(robot), **given)
-    with stage(f"designing a gait of {size.length:g} m in {size.duration:g} s") as designing:
-        gait = design(robot, size, friction=friction, progress=designing.reached)
-        designing.outcome = (
-            f"gait: {gait.step_length:.3g} m in {gait.step_duration:.3g} s, "
-            f"cost {gait.cost:.4g} N²m²s"
-        )
-    return gait

@@ -58,7 +58,8 @@ class Claim:
         What is measured here.
     criterion : str
         When the claim counts as holding.
-    verdict : Verdict
+    holds : bool
+        Whether it does.
     remark : str
         What a reader should know besides.
     """
@@ -67,12 +68,13 @@ class Claim:
     statement: str
     measured: str
     criterion: str
-    verdict: Verdict
+    holds: bool
     remark: str = ""
 
-
-def _judged(holds: bool) -> Verdict:
-    return Verdict.HOLDS if holds else Verdict.FAILS
+    @property
+    def verdict(self) -> Verdict:
+        """How it fares."""
+        return Verdict.HOLDS if self.holds else Verdict.FAILS
 
 
 def tracking(evidence: Evidence) -> Claim:
@@ -85,7 +87,7 @@ def tracking(evidence: Evidence) -> Claim:
         f"{error.rms:.2g} rad rms and {error.max:.2g} rad at most over "
         f"{len(walking_steps(evidence.run))} steps; the joints move through up to {motion:.2g} rad",
         "largest error below 2 % of the motion",
-        _judged(evidence.run.completed and error.max < 0.02 * motion),
+        evidence.run.completed and error.max < 0.02 * motion,
     )
 
 
@@ -103,11 +105,7 @@ def velocities(evidence: Evidence) -> Claim:
         f"(of {speed:.2g} rad/s rms); {walked} of {STEPS} steps walked on estimates, "
         f"tracking error {estimated.rms:.2g} rad rms",
         "all steps walked on estimates, velocity error below 10 %",
-        _judged(
-            evidence.estimated.completed
-            and walked >= STEPS
-            and _rms(estimated.velocity) < 0.1 * speed
-        ),
+        evidence.estimated.completed and walked >= STEPS and _rms(estimated.velocity) < 0.1 * speed,
     )
 
 
@@ -122,7 +120,7 @@ def zero_moment_point(evidence: Evidence) -> Claim:
         f"{summary.zmp_min_m:+.4f} … {summary.zmp_max_m:+.4f} m over all samples of single "
         f"support, sole {heel:+.2f} … {toe:+.2f} m; {summary.steps} steps without a fall",
         "inside the sole in every sample, no fall",
-        _judged(evidence.run.completed and inside),
+        evidence.run.completed and inside,
         "Ground that only pushes keeps this point within the sole by itself. The margin is the "
         f"figure that matters: {summary.zmp_margin_min_m:.2g} m at its least.",
     )
@@ -138,7 +136,7 @@ def friction(evidence: Evidence) -> Claim:
         f"{100.0 * summary.friction_use_max:.3g} % of the cone used at most, impacts included; "
         f"slip {summary.slip_max_m:.1g} m",
         "at most 100 %; slip below 0.1 mm",
-        _judged(summary.friction_use_max <= 1.0 + 1e-9 and summary.slip_max_m < 1e-4),
+        summary.friction_use_max <= 1.0 + 1e-9 and summary.slip_max_m < 1e-4,
     )
 
 
@@ -155,12 +153,10 @@ def unilateral(evidence: Evidence) -> Claim:
         f"complementarity residual {certificates.complementarity:.1g} (relative); "
         f"{run.solver.failures} of {run.solver.solves} contact problems unsolved",
         "penetration and residual at most 1e-9, no pulling, none unsolved",
-        _judged(
-            certificates.penetration <= 1e-9
-            and certificates.complementarity <= 1e-9
-            and normal.min() >= -1e-9
-            and run.solver.failures == 0
-        ),
+        certificates.penetration <= 1e-9
+        and certificates.complementarity <= 1e-9
+        and normal.min() >= -1e-9
+        and run.solver.failures == 0,
     )
 
 
@@ -182,7 +178,7 @@ def stance_foot(evidence: Evidence) -> Claim:
         "Both corners of the stance foot stay on the ground and do not move.",
         f"in single support a corner rises by {lift:.1g} m and moves by {drift:.1g} m at most",
         "both below 0.1 mm",
-        _judged(lift < 1e-4 and drift < 1e-4),
+        lift < 1e-4 and drift < 1e-4,
     )
 
 
@@ -203,7 +199,7 @@ def swing_foot(evidence: Evidence) -> Claim:
         f"halfway through a step its lower corner is {1e3 * height:.3g} mm or more above the "
         f"ground; {len(stays) - first} landings in {len(landed)} steps",
         "no scuffing: above the ground halfway, one landing a step",
-        _judged(height > 0.0 and len(stays) - first == len(landed)),
+        height > 0.0 and len(stays) - first == len(landed),
         "The paper does not print its path; here the foot stays above a clearance profile and "
         "lands flat.",
     )
@@ -225,7 +221,7 @@ def symmetry(evidence: Evidence) -> Claim:
         f"joint positions at the beginning of a step differ from the mirrored ones of the step "
         f"before by {difference:.2g} rad at most, by {settled:.2g} rad at the end of the walk",
         "below 0.01 rad",
-        _judged(difference < 0.01),
+        difference < 0.01,
     )
 
 
@@ -250,7 +246,7 @@ def plastic_impact(evidence: Evidence) -> Claim:
         f"their normal impulse is {measured:.4g} N s on average, {predicted:.4g} N s by eq. 22 for "
         f"the gait as designed",
         "at rest within 1 mm/s, impulses alike within 5 %",
-        _judged(rebound < 1e-3 and abs(measured - predicted) < 0.05 * abs(predicted)),
+        rebound < 1e-3 and abs(measured - predicted) < 0.05 * abs(predicted),
         "Of the two, the first closes the gap and the second ends the motion.",
     )
 
@@ -266,7 +262,7 @@ def energy(evidence: Evidence) -> Claim:
         f"the ground takes {lost:.3g} J a step; in no time step does it give more than "
         f"{gained:.1g} J",
         "never gives more than a millionth of what it takes a step",
-        _judged(gained < 1e-6 * lost),
+        gained < 1e-6 * lost,
     )
 
 
@@ -284,7 +280,7 @@ def shock_accumulation(evidence: Evidence) -> Claim:
         f"{len(landings)} instants; the run ended {run.status.value} after {run.steps} of {asked} "
         f"time steps",
         "two landings or more, and exactly as many time steps as asked for",
-        _judged(run.completed and len(landings) >= 2 and run.steps == asked),
+        run.completed and len(landings) >= 2 and run.steps == asked,
     )
 
 
@@ -296,23 +292,25 @@ def small_steps(evidence: Evidence) -> Claim:
         walked = [
             row
             for row in evidence.refinement
-            if row.scheme is scheme and row.status is RunStatus.COMPLETED and row.steps == STEPS
+            if row.scheme is scheme
+            and row.summary.status == RunStatus.COMPLETED.value
+            and row.summary.steps == STEPS
         ]
         if not walked:
-            outcomes.append(f"{scheme_name(scheme)}: none of the steps tried")
+            outcomes.append(f"{scheme.label}: none of the steps tried")
             continue
         coarsest = max(walked, key=lambda row: row.step)
         stable.append(coarsest)
         outcomes.append(
-            f"{scheme_name(scheme)}: {1e3 * coarsest.step:g} ms "
-            f"({coarsest.real_time_factor:.0f} × real time)"
+            f"{scheme.label}: {1e3 * coarsest.step:g} ms "
+            f"({coarsest.summary.real_time_factor:.0f} × real time)"
         )
     return Claim(
         "Sections 1 and 6",
         "Time stepping may require step sizes prohibitively small for numerical stability.",
         f"largest time step with which {STEPS} steps are walked: " + "; ".join(outcomes),
         "the claim holds if a scheme walks with no step that runs in real time",
-        _judged(len(stable) < len(SCHEMES) or any(row.real_time_factor < 1.0 for row in stable)),
+        len(stable) < len(SCHEMES) or any(row.summary.real_time_factor < 1.0 for row in stable),
         "See the table of steps and schemes.",
     )
 
@@ -325,17 +323,14 @@ def first_order(evidence: Evidence) -> Claim:
         "Section 1",
         "Time stepping is restricted to first-order methods with a fixed step.",
         "measured order of convergence: "
-        + ", ".join(f"{scheme_name(scheme)} {value:.2f}" for scheme, value in standing.items())
+        + ", ".join(f"{scheme.label} {value:.2f}" for scheme, value in standing.items())
         + "".join(
-            f"; {scheme_name(scheme)} loses the ground in {100.0 * share:.2g} % of its time steps"
+            f"; {scheme.label} loses the ground in {100.0 * share:.2g} % of its time steps"
             for scheme, share in falling.items()
         ),
         "schemes that keep the stance foot on the ground, the default among them, have an order "
         "between 0.8 and 1.2",
-        _judged(
-            Scheme.GAP_LINEARISED in standing
-            and all(0.8 < order < 1.2 for order in standing.values())
-        ),
+        Scheme.GAP_LINEARISED in standing and all(0.8 < order < 1.2 for order in standing.values()),
         "The paper's orderings lose and regain contact by round-off. Their errors are uneven and "
         "another processor's are others, so that no order is read from them.",
     )
@@ -352,7 +347,7 @@ def lemke(evidence: Evidence) -> Claim:
         f"{run.solver.solves} contact problems, {run.solver.shortcuts} of them answered by the "
         f"contact modes of the step before, verified; {run.solver.fallbacks} fallbacks",
         "faster than real time",
-        _judged(1e-6 * cost < TIME_STEP),
+        1e-6 * cost < TIME_STEP,
     )
 
 
@@ -373,7 +368,7 @@ def cost(evidence: Evidence) -> Claim:
         f"{gait.cost:.4g} N²m²s by design; in the simulation {spent:.4g} N²m²s a step, of which "
         f"{spent - smooth:.3g} in the {1e3 * SETTLING:g} ms after touchdowns",
         "alike within 5 % but for those",
-        _judged(abs(smooth - gait.cost) < 0.05 * gait.cost),
+        abs(smooth - gait.cost) < 0.05 * gait.cost,
         "Of the optimum itself only this can be measured; it is a local one.",
     )
 
@@ -390,7 +385,7 @@ def underactuated(evidence: Evidence) -> Claim:
         f"{robot.nv} coordinates, of which a flat foot at rest leaves {freedoms} free; "
         f"{robot.nu} actuators",
         "fewer actuators than free coordinates",
-        _judged(robot.nu < freedoms),
+        robot.nu < freedoms,
         "True in flight, and when the foot tips; not while it lies flat, which is what eq. 37 "
         "rests on.",
     )
@@ -407,7 +402,7 @@ def other_robots(evidence: Evidence) -> Claim:
         f"{run.robot.name} ({run.robot.total_mass:.3g} kg, its equations of motion made from its "
         f"file): {steps} of {STEPS} steps, {run.status.value}",
         "the claim of a limit holds if the other robot does not walk",
-        _judged(steps < STEPS or not run.completed),
+        steps < STEPS or not run.completed,
     )
 
 
@@ -436,11 +431,6 @@ CLAIMS: tuple[Callable[[Evidence], Claim], ...] = (
 def judge(evidence: Evidence) -> tuple[Claim, ...]:
     """Measure every claim of the paper."""
     return tuple(claim(evidence) for claim in CLAIMS)
-
-
-def scheme_name(scheme: Scheme) -> str:
-    """Name of a scheme in prose."""
-    return scheme.name.lower().replace("_", "-")
 
 
 def _rms(values: Floats) -> float:

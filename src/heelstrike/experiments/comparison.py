@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.box import SIMPLE_HEAD
+from rich.console import Group
 from rich.table import Table
 
 from heelstrike.analysis import (
@@ -18,6 +20,7 @@ from heelstrike.analysis import (
     zero_moment_point,
 )
 from heelstrike.analysis.intervals import IMPULSIVE, impulses_in_events
+from heelstrike.analysis.summary import plain
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
@@ -117,13 +120,7 @@ class Comparison:
         """Return the differences as plain numbers, NaN as None."""
         return {
             "reference": self.reference,
-            "methods": [
-                {
-                    name: None if isinstance(value, float) and not math.isfinite(value) else value
-                    for name, value in asdict(each).items()
-                }
-                for each in self.differences
-            ],
+            "methods": plain([asdict(each) for each in self.differences]),
             "left_out": self.left_out,
         }
 
@@ -136,33 +133,43 @@ class Comparison:
             times[name], series[name] = _against(run, self.runs[self.reference])
         return draw_comparison(self.runs[self.reference].robot, self.reference, times, series)
 
-    def __rich__(self) -> Table:
-        table = Table(
-            title=f"differences from {self.reference}",
-            title_justify="left",
-            caption="\n".join(f"{name} left out: {why}" for name, why in self.left_out.items()),
-            caption_justify="left",
-        )
-        columns = [
-            ("method", "left"),
-            ("status", "left"),
-            ("touchdowns", "right"),
-            ("time of touchdown (s)", "right"),
-            ("landing impulse (N s)", "right"),
-            ("ZMP (m)", "right"),
-            ("energy (J)", "right"),
-            ("last position (rad, m)", "right"),
-            ("penetration (m)", "right"),
-            ("slip (m)", "right"),
-            ("complementarity", "right"),
-            ("computing (s)", "right"),
-        ]
-        for heading, side in columns:
-            table.add_column(heading, justify=side)  # type: ignore[arg-type]
+    def __rich__(self) -> Group:
+        # Two tables, each within the eighty columns of a plain terminal.
+        apart = self._table(f"differences from {self.reference}", APART)
+        return Group(apart, "", self._table("each by itself", ALONE), *self._reasons())
+
+    def _table(self, title: str, columns: Mapping[str, str]) -> Table:
+        look = {"box": SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
+        table = Table(title=title, title_justify="left", **look)  # type: ignore[arg-type]
+        table.add_column("method", no_wrap=True)
+        for heading in columns.values():
+            table.add_column(heading, justify="right")
         for each in self.differences:
-            cells = [f"{v:.2g}" if isinstance(v, float) else str(v) for v in asdict(each).values()]
-            table.add_row(*(cell.replace("nan", "–") for cell in cells))
+            values = [getattr(each, name) for name in columns]
+            cells = [f"{v:.2g}" if isinstance(v, float) else str(v) for v in values]
+            table.add_row(each.method, *(cell.replace("nan", "–") for cell in cells))
         return table
+
+    def _reasons(self) -> list[str]:
+        return [f"{name} left out: {why}" for name, why in self.left_out.items()]
+
+
+APART = {
+    "touchdowns": "landings",
+    "touchdown_s": "time of landing s",
+    "impulse_Ns": "landing impulse N s",
+    "zmp_m": "ZMP m",
+    "energy_J": "energy J",
+    "position": "last position rad, m",
+}
+ALONE = {
+    "status": "status",
+    "penetration_m": "penetration m",
+    "slip_m": "slip m",
+    "complementarity": "residual",
+    "wall_s": "computing s",
+}
+"""Members of a difference and their headings: how runs lie apart, and what each is by itself."""
 
 
 def compare(
@@ -242,12 +249,10 @@ def compare(
 
 
 def _named(methods: Sequence[Method] | Mapping[str, Method]) -> dict[str, Method]:
-    if isinstance(methods, Mapping):
-        named = dict(methods)
-    else:
-        named = {str(method): method for method in methods}
-        if len(named) < len(methods):
-            raise SimulationError("two of the methods to compare are the same")
+    pairs = methods if isinstance(methods, Mapping) else {str(each): each for each in methods}
+    named = dict(pairs)
+    if len(named) < len(methods):
+        raise SimulationError("two of the methods to compare are the same")
     if not named:
         raise SimulationError("there is no method to compare")
     return named
@@ -325,11 +330,8 @@ def _against(run: Run, reference: Run) -> tuple[Floats, dict[str, Floats]]:
     end = min(run.time[-1], reference.time[-1])
     grid = np.linspace(0.0, end, max(2, round(end / GRID) + 1))
     ours, theirs = _sampled(run, grid), _sampled(reference, grid)
-    return grid, {
-        "position": np.abs(ours["position"] - theirs["position"]).max(axis=1),
-        "energy": ours["energy"] - theirs["energy"],
-        "zmp": ours["zmp"] - theirs["zmp"],
-    }
+    apart = {name: ours[name] - theirs[name] for name in ours}
+    return grid, apart | {"position": np.abs(apart["position"]).max(axis=1)}
 
 
 def _sampled(run: Run, grid: Floats) -> dict[str, Floats]:
@@ -345,7 +347,7 @@ def _sampled(run: Run, grid: Floats) -> dict[str, Floats]:
 
 
 def _largest(values: Floats) -> float:
-    return float(np.abs(values).max()) if len(values) else math.nan
+    return float(np.fmax.reduce(np.abs(values), initial=math.nan))
 
 
 def _root_mean_square(values: Floats) -> float:

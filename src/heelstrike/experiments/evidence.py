@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from heelstrike.experiments.refinement import Convergence, RefinedWalk, converge
 from heelstrike.experiments.walk import design, walk
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
-from heelstrike.sim import Run, TimeStepping, simulate
+from heelstrike.sim import Controller, Run, TimeStepping, simulate
 from heelstrike.sim.whole_run import whole
 
 FRICTION = 0.75
@@ -35,10 +36,8 @@ class Evidence:
 
     Attributes
     ----------
-    robot : Robot
-        The paper's robot.
     gait : Gait
-        Its gait.
+        The gait of the paper's robot.
     run : Run
         The walk under computed torque.
     estimated : Run
@@ -54,7 +53,6 @@ class Evidence:
         Order of convergence of the same schemes.
     """
 
-    robot: Robot
     gait: Gait
     run: Run
     estimated: Run
@@ -62,6 +60,11 @@ class Evidence:
     other: Run
     refinement: tuple[RefinedWalk, ...]
     convergence: tuple[Convergence, ...]
+
+    @property
+    def robot(self) -> Robot:
+        """The paper's robot."""
+        return self.run.robot
 
 
 def gather(progress: Callable[[str, float], None]) -> Evidence:
@@ -79,35 +82,24 @@ def gather(progress: Callable[[str, float], None]) -> Evidence:
     )
     ground = Ground(friction=FRICTION)
     method = TimeStepping(step=TIME_STEP)
-    run = whole(
-        walk(
-            robot,
-            gait,
-            steps=STEPS,
-            method=method,
-            ground=ground,
-            progress=lambda part: progress("walking", part),
-        )
-    )
-    estimated = whole(
-        walk(
-            robot,
-            gait,
-            steps=STEPS,
-            method=TimeStepping(step=ENCODER.period),
-            ground=ground,
-            controller=ComputedTorque(robot, gait, encoder=ENCODER),
-            progress=lambda part: progress("walking on estimated velocities", part),
-        )
-    )
-    refinement = refine(
-        robot, gait, ground=ground, progress=lambda part: progress("comparing time steps", part)
-    )
+    sampled = TimeStepping(step=ENCODER.period)
+    estimating = ComputedTorque(robot, gait, encoder=ENCODER)
+
+    def stroll(doing: str, method: TimeStepping, controller: Controller | None = None) -> Run:
+        return whole(
+            walk(
+                robot, gait, steps=STEPS, controller=controller, method=method, ground=ground,
+                progress=partial(progress, doing),
+            )
+        )  # fmt: skip
+
+    run = stroll("walking", method)
+    estimated = stroll("walking on estimated velocities", sampled, estimating)
+    refinement = refine(robot, gait, ground, STEPS, partial(progress, "comparing time steps"))
     progress("measuring the order of convergence", 0.0)
-    convergence = converge(robot, gait, ground=ground)
+    convergence = converge(robot, gait, ground)
     progress("walking another robot", 0.0)
     return Evidence(
-        robot=robot,
         gait=gait,
         run=run,
         estimated=estimated,

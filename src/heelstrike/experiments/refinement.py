@@ -7,19 +7,20 @@ range of steps, and their order of convergence is measured.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis import summarize
+from heelstrike.analysis import Summary, summarize
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
 from heelstrike.experiments.walk import walk
 from heelstrike.gait import Gait
 from heelstrike.robot import Robot
-from heelstrike.sim import Run, RunStatus, Scheme, TimeStepping, simulate
+from heelstrike.sim import Run, Scheme, TimeStepping, simulate
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
@@ -50,29 +51,13 @@ class RefinedWalk:
         Discretisation.
     step : float
         Time step in s.
-    status : RunStatus
-        How the run ended.
-    steps : int
-        Walking steps taken, of those asked for.
-    tracking_rms : float
-        Tracking error of the joints, in rad.
-    zmp_margin : float
-        Least distance of the zero moment point to the ends of the sole in single support, in m.
-    slip, penetration : float
-        Largest over the walk, in m.
-    real_time_factor : float
-        Simulated over computing time.
+    summary : Summary
+        What came of it.
     """
 
     scheme: Scheme
     step: float
-    status: RunStatus
-    steps: int
-    tracking_rms: float
-    zmp_margin: float
-    slip: float
-    penetration: float
-    real_time_factor: float
+    summary: Summary
 
 
 @dataclass(frozen=True)
@@ -104,73 +89,27 @@ class Convergence:
 
 
 def refine(
-    robot: Robot,
-    gait: Gait,
-    *,
-    ground: Ground | None = None,
-    walking_steps: int = 20,
-    time_steps: Sequence[float] = TIME_STEPS,
-    schemes: Sequence[Scheme] = SCHEMES,
-    progress: Callable[[float], None] | None = None,
+    robot: Robot, gait: Gait, ground: Ground, steps: int, progress: Callable[[float], None]
 ) -> tuple[RefinedWalk, ...]:
-    """Walk the same gait with several schemes and time steps.
+    """Walk so many steps of the same gait with all schemes and time steps.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
-    gait : Gait
-        Its gait.
-    ground : Ground, optional
-        The ground.
-    walking_steps : int
-        Walking steps of each walk.
-    time_steps : sequence of float
-        Time steps in s.
-    schemes : sequence of Scheme
-        Discretisations.
-    progress : callable, optional
+    robot, gait, ground, steps
+        As for :func:`heelstrike.experiments.walk.walk`.
+    progress : callable
         Called with the fraction of the walks that is done.
     """
-    walks = []
-    for scheme in schemes:
-        for step in time_steps:
-            run = whole(
-                walk(
-                    robot,
-                    gait,
-                    steps=walking_steps,
-                    method=TimeStepping(step=step, scheme=scheme),
-                    ground=ground,
-                )
-            )
-            summary = summarize(run, gait=gait)
-            walks.append(
-                RefinedWalk(
-                    scheme=scheme,
-                    step=step,
-                    status=run.status,
-                    steps=summary.steps,
-                    tracking_rms=summary.tracking_rms_rad,
-                    zmp_margin=summary.zmp_margin_min_m,
-                    slip=summary.slip_max_m,
-                    penetration=summary.penetration_max_m,
-                    real_time_factor=summary.real_time_factor,
-                )
-            )
-            if progress is not None:
-                progress(len(walks) / (len(schemes) * len(time_steps)))
+    walks: list[RefinedWalk] = []
+    for scheme, step in product(SCHEMES, TIME_STEPS):
+        method = TimeStepping(step=step, scheme=scheme)
+        run = whole(walk(robot, gait, steps=steps, method=method, ground=ground))
+        walks.append(RefinedWalk(scheme, step, summarize(run, gait=gait)))
+        progress(len(walks) / (len(SCHEMES) * len(TIME_STEPS)))
     return tuple(walks)
 
 
-def converge(
-    robot: Robot,
-    gait: Gait,
-    *,
-    ground: Ground | None = None,
-    time_steps: Sequence[float] = FINE_STEPS,
-    schemes: Sequence[Scheme] = SCHEMES,
-) -> tuple[Convergence, ...]:
+def converge(robot: Robot, gait: Gait, ground: Ground) -> tuple[Convergence, ...]:
     """Measure the order of convergence of several schemes on the first step of a gait.
 
     Parameters
@@ -179,12 +118,8 @@ def converge(
         The robot.
     gait : Gait
         Its gait.
-    ground : Ground, optional
+    ground : Ground
         The ground.
-    time_steps : sequence of float
-        Time steps in s, two or more.
-    schemes : sequence of Scheme
-        Discretisations.
     """
 
     def motion(step: float, scheme: Scheme, record_every: int = 1) -> Run:
@@ -202,16 +137,16 @@ def converge(
         )
 
     sole = list(robot.feet[gait.stance_foot].contacts)
-    coarsest = max(time_steps)
+    coarsest = max(FINE_STEPS)
     instant = round(COMPARED_AT * gait.step_duration / coarsest) * coarsest
     last = round(instant / EXACT_STEP)
     exact = motion(EXACT_STEP, Scheme.GAP_LINEARISED, last).position[-1]
     found = []
-    for scheme in schemes:
-        runs = [motion(step, scheme) for step in time_steps]
+    for scheme in SCHEMES:
+        runs = [motion(step, scheme) for step in FINE_STEPS]
         errors = [float(np.abs(run.position[-1] - exact).max()) for run in runs]
-        order = float(np.polyfit(np.log(time_steps), np.log(errors), 1)[0])
+        order = float(np.polyfit(np.log(FINE_STEPS), np.log(errors), 1)[0])
         carried = np.concatenate([run.contact_force[1:][:, sole, 0] for run in runs])
         lost = float((carried <= 0.0).any(axis=1).mean())
-        found.append(Convergence(scheme, tuple(time_steps), tuple(errors), order, lost))
+        found.append(Convergence(scheme, FINE_STEPS, tuple(errors), order, lost))
     return tuple(found)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import heelstrike
 from heelstrike.analysis import summarize
-from heelstrike.experiments.claims import Claim, Verdict, scheme_name
+from heelstrike.experiments.claims import Claim
 from heelstrike.experiments.evidence import STEPS, TIME_STEP, Evidence
 from heelstrike.experiments.refinement import EXACT_STEP, Convergence, RefinedWalk
 from heelstrike.whole_file import write_whole
@@ -78,7 +78,7 @@ def _setting(evidence: Evidence) -> str:
 
 
 def _tally(claims: Sequence[Claim]) -> str:
-    hold = sum(claim.verdict is Verdict.HOLDS for claim in claims)
+    hold = sum(claim.holds for claim in claims)
     return f"Of {len(claims)} claims {hold} hold here; each is judged by the criterion beside it."
 
 
@@ -97,29 +97,22 @@ def _claims(claims: Sequence[Claim]) -> str:
 
 
 def _refinement(rows: Sequence[RefinedWalk]) -> str:
+    figures = {
+        "steps walked": "steps",
+        "tracking rad rms": "tracking_rms_rad",
+        "margin m": "zmp_margin_min_m",
+        "slip m": "slip_max_m",
+        "penetration m": "penetration_max_m",
+    }
     return _table(
-        (
-            "scheme",
-            "step ms",
-            "ended",
-            "steps walked",
-            "tracking rad rms",
-            "margin m",
-            "slip m",
-            "penetration m",
-            "× real time",
-        ),
+        ("scheme", "step ms", "ended", *figures, "× real time"),
         [
             (
-                scheme_name(row.scheme),
+                row.scheme.label,
                 f"{1e3 * row.step:g}",
-                row.status.value.replace("_", " "),
-                str(row.steps),
-                _number(row.tracking_rms),
-                _number(row.zmp_margin),
-                _number(row.slip),
-                _number(row.penetration),
-                f"{row.real_time_factor:.0f}",
+                row.summary.status.replace("_", " "),
+                *(_number(getattr(row.summary, name)) for name in figures.values()),
+                f"{row.summary.real_time_factor:.0f}",
             )
             for row in rows
         ],
@@ -132,7 +125,7 @@ def _convergence(found: Sequence[Convergence]) -> str:
         ("scheme", *(f"{1e3 * step:g} ms" for step in steps), "order", "off the ground"),
         [
             (
-                scheme_name(each.scheme),
+                each.scheme.label,
                 *map(_number, each.errors),
                 "–" if each.lost else f"{each.order:.2f}",
                 f"{100.0 * each.lost:.2g} %",
@@ -150,4 +143,6 @@ def _table(heading: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _number(value: float) -> str:
+    if isinstance(value, int):
+        return str(value)
     return f"{value:.2g}" if math.isfinite(value) else "–"

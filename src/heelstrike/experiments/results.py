@@ -61,9 +61,8 @@ class Results:
         """Write gait.json, and remove the results of an earlier walk, which belong to another."""
         path = self.directory / "gait.json"
         gait.save(path)
-        for stale in ("run.nc", "summary.json", *(f"{figure}.png" for figure in FIGURES)):
-            (self.directory / stale).unlink(missing_ok=True)
-        for stale in ("walk.mp4", "walk.gif"):
+        pictures = ("walk.mp4", "walk.gif", *(f"{figure}.png" for figure in FIGURES))
+        for stale in ("run.nc", "summary.json", *pictures):
             (self.directory / stale).unlink(missing_ok=True)
         self.saved.append(Saved(path))
         return path
@@ -107,7 +106,12 @@ class Results:
             tasks[f"walk.{animation}"] = run.animate
         first = len(self.saved)
         for done, (name, write) in enumerate(tasks.items(), start=1):
-            self.saved.append(_attempt(self.directory / name, write))
+            path, error = self.directory / name, None
+            try:
+                write(path)
+            except Exception as caught:  # whatever it is, the other files are still wanted
+                error = caught
+            self.saved.append(Saved(path, error))
             if progress is not None:
                 progress(done / len(tasks))
         return tuple(self.saved[first:])
@@ -115,11 +119,3 @@ class Results:
 
 def _drawing(run: Run, gait: Gait, figure: str) -> Callable[[Path], object]:
     return lambda path: run.plot(figure, gait=gait, path=path)
-
-
-def _attempt(path: Path, write: Callable[[Path], object]) -> Saved:
-    try:
-        write(path)
-    except Exception as error:  # whatever it is, the other files are still wanted
-        return Saved(path, error)
-    return Saved(path)

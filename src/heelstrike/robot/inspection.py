@@ -16,7 +16,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
-from heelstrike.robot.files.options import LoadOptions
+from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.saving import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import builtin_robots, load_robot
@@ -140,6 +140,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
     True
     """
     if isinstance(robot, Robot):
+        Options(**how)  # which says what is wrong with them
         return Inspection(robot.source or robot.name, robot, tuple(_of_robot(robot)))
     findings: list[Finding] = []
     path = _file(robot)

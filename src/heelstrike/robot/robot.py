@@ -363,7 +363,7 @@ class Robot:
         Raises
         ------
         RobotError
-            If the robot does not float, or has no contact points.
+            If nothing lifts the robot, as a floating trunk does, or it has no contact points.
 
         Examples
         --------
@@ -397,7 +397,7 @@ class Robot:
         Raises
         ------
         RobotError
-            If the robot does not float, or has no contact points.
+            If nothing lifts the robot, as a floating trunk does, or it has no contact points.
 
         Examples
         --------

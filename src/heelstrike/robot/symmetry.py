@@ -152,6 +152,8 @@ def _means(
     """Mean of left and right for every number, their largest difference and where it is."""
 
     def mean(values: Floats, mirrored: Floats, floor: float) -> tuple[Floats, float, int]:
+        if not len(values):
+            return values, 0.0, 0
         equal = values == mirrored
         with np.errstate(invalid="ignore"):
             apart = np.where(equal, 0.0, np.abs(values - mirrored))
@@ -159,14 +161,13 @@ def _means(
         rows = apart.reshape(len(apart), -1).max(axis=1, initial=0.0)
         size = np.abs(np.where(np.isfinite(values), values, 0.0)).reshape(len(apart), -1)
         rows[rows <= TOLERANCE * size.max(axis=1, initial=0.0) + floor] = 0.0
-        place = int(rows.argmax()) if len(rows) else 0
-        return middle, float(rows[place]) if len(rows) else 0.0, place
+        place = int(rows.argmax())
+        return middle, float(rows[place]), place
 
     for name, number in NUMBERS.items():
         if number.alike:
             values = getattr(model, name)
             yield name, mean(values, values[joint], SAME_PLACE if name in PLACES else ROUND_OFF)
-    yield "axis", mean(model.axis, sign[:, None] * model.axis[joint], TOLERANCE)
     about = model.reference
     ends = np.stack((model.lower - about, model.upper - about))
     there = sign * ends[:, joint]
@@ -174,9 +175,10 @@ def _means(
     for name, here, other in (("lower", ends[0], there[0]), ("upper", ends[1], there[1])):
         middle, difference, place = mean(here, other, ROUND_OFF)
         yield name, (middle + about, difference, place)
-    rest = np.where(model.stiffness > 0.0, model.rest - about, 0.0)
+    sprung, rest = model.stiffness > 0.0, model.rest - about
+    rest = np.where(sprung | ~sprung[joint], rest, sign * rest[joint])
     middle, difference, place = mean(rest, sign * rest[joint], ROUND_OFF)
-    yield "rest", (np.where(model.stiffness > 0.0, middle + about, model.rest), difference, place)
+    yield "rest", (middle + about, difference if np.any(sprung) else 0.0, place)
     of_joint = {int(k): i for i, k in enumerate(model.actuator_joint)}
     pair = [of_joint.get(int(joint[k]), i) for i, k in enumerate(model.actuator_joint)]
     turned = sign[model.actuator_joint] < 0.0

@@ -80,3 +80,8 @@ class Scheme(enum.IntEnum):
     PAPER_SYMPLECTIC = 2
     MOREAU_JEAN = 3
     LINEARLY_IMPLICIT = 4
+
+    @property
+    def label(self) -> str:
+        """Its name in prose and on the command line: ``moreau-jean``."""
+        return self.name.lower().replace("_", "-")

@@ -89,6 +89,16 @@ class SolverCount:
     fallbacks: int
     failures: int
 
+    def __str__(self) -> str:
+        backed = f" with {self.fallbacks} fallbacks" if self.fallbacks else ""
+        counts = {
+            "by the modes of the step before": self.shortcuts,
+            f"by {self.name}{backed}": self.solves - self.shortcuts - self.failures,
+            "unsolved": self.failures,
+        }
+        parts = ", ".join(f"{count} {how}" for how, count in counts.items() if count)
+        return f"{self.solves}: {parts}" if parts else "none"
+
 
 @dataclass(frozen=True)
 class Timing:

@@ -89,6 +89,10 @@ def checked_setting(
     SimulationError
         If something is not usable.
     """
+    if not isinstance(robot, Robot):
+        raise SimulationError(
+            f"robot must be a Robot, got {robot!r}; load_robot gives one by its name or file"
+        )
     ground = Ground() if ground is None else ground
     if not isinstance(ground, Ground):
         raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
@@ -141,6 +145,11 @@ def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, 
 
 
 def _check_state(robot: Robot, state: State) -> None:
+    if not isinstance(state, State):
+        raise SimulationError(
+            f"state must be a State, got {type(state).__name__}; write State(q, v) with positions "
+            "q and velocities v, or robot.reference_state()"
+        )
     for name, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
         if vector.shape != (size,):
             raise SimulationError(

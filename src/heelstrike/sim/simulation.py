@@ -824,7 +824,8 @@ def checked_method(method: Method | None) -> Method:
         )
     if not isinstance(method, Method):
         raise SimulationError(
-            f"method must be a way through time such as TimeStepping(), got {type(method).__name__}"
+            f"method must be a way through time such as TimeStepping(), got {method!r}"
+            + (f"; write {method.__name__}()" if isinstance(method, type) else "")
         )
     return method
 

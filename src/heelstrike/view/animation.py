@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from heelstrike.errors import ViewError, WriteError
+from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view.film import Film
 from heelstrike.view.mp4 import write_mp4
-from heelstrike.view.style import styled
+from heelstrike.view.style import styled, view_errors
 from heelstrike.whole_file import check_target, whole_file
 
 GIF_COLORS = 64
@@ -55,10 +55,8 @@ def animate(
         If the run is empty, an option is out of range, or the file cannot be written.
     """
     target = Path(path)
-    try:
+    with view_errors():
         check_target(target)
-    except WriteError as error:
-        raise ViewError(str(error)) from error
     kind = target.suffix.lower()
     if kind not in (".mp4", ".gif"):
         raise ViewError(f"cannot write {target}: the name of an animation ends in .mp4 or .gif")
@@ -73,17 +71,13 @@ def animate(
         raise ViewError(f"the size of an animation is 64 to 8192 pixels each way, got {size}")
     if kind == ".gif":
         fps = 100.0 / max(2, round(100.0 / fps))  # the format counts hundredths of a second
-    with styled():
+    with styled(), view_errors():
         film = Film(run, (width, height), fps, speed)
-        try:
-            with whole_file(target) as beside:
-                if kind == ".mp4":
-                    pictures = (film.draw(index) for index in range(len(film)))
-                    write_mp4(pictures, film.size, fps, beside)
-                else:
-                    _write_gif(film, beside, fps)
-        except WriteError as error:
-            raise ViewError(str(error)) from error
+        with whole_file(target) as beside:
+            if kind == ".mp4":
+                write_mp4(map(film.draw, range(len(film))), film.size, fps, beside)
+            else:
+                _write_gif(film, beside, fps)
     return target
 
 

@@ -58,3 +58,21 @@ class Arrows:
         self.shafts.set_segments(list(np.stack((start, neck), axis=1)))
         tip = start + length * along
         self.heads.set_verts(list(np.stack((neck - across, tip, neck + across), axis=1)))
+
+
+def draw_scale(
+    axes: Axes, place: Floats, size: float, weight: float, *, width: float, fontsize: float
+) -> None:
+    """Draw the arrow of a robot's weight (N) at a place (2,), in m, and say how much that is."""
+    if weight > 0.0:
+        Arrows(axes, size, weight, width=width).show(place[None], np.array([[0.0, weight]]))
+        axes.annotate(
+            f"{weight:.3g} N",
+            (place[0], place[1]),
+            xytext=(0.0, -fontsize),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            fontsize=fontsize,
+            color=FORCE_COLOR,
+        )

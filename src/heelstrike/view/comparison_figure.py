@@ -9,7 +9,14 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from heelstrike.robot import Robot
-from heelstrike.view.style import figure_title, legend_above, new_figure, styled
+from heelstrike.view.style import (
+    FOOT_COLORS,
+    INK,
+    figure_title,
+    legend_above,
+    new_figure,
+    styled,
+)
 
 Floats = NDArray[np.float64]
 
@@ -18,9 +25,7 @@ PANELS = (
     ("energy", "energy (J)"),
     ("zmp", "zero moment point (m)"),
 )
-# Okabe and Ito's colours, which colour-blind readers can tell apart, and strokes for those who
-# print.
-COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+COLORS = (*FOOT_COLORS, INK)
 STROKES = ("-", "--", "-.", ":")
 SMALLEST = 1e-16
 
@@ -56,7 +61,7 @@ def draw_comparison(
                     np.where(values > SMALLEST, values, np.nan),
                     color=COLORS[i % len(COLORS)],
                     linestyle=STROKES[i % len(STROKES)],
-                    linewidth=1.0,
+                    linewidth=1.0 + 0.35 * (len(others) - 1 - i),  # none hides another
                     label=name,
                 )
             axes.set_ylabel(label)

@@ -13,20 +13,22 @@ import os
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
+from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.view.style import (
-    FOOT_COLORS,
     INK,
     ORANGE,
     PALE,
+    foot_color,
+    in_words,
     legend_above,
     new_figure,
     save_figure,
@@ -80,7 +82,7 @@ class Skeleton:
     @property
     def colors(self) -> list[str]:
         """Colour of each segment: legs as their feet, the rest dark."""
-        return [INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)] for foot in self.foot]
+        return [foot_color(foot) for foot in self.foot]
 
     def segments(self, origin: Floats, angle: Floats) -> Floats:
         """Place the segments in the world.
@@ -97,58 +99,28 @@ class Skeleton:
         (..., ns, 2, 2) float
             Segments, ends, (x, z).
         """
-        theta = angle[..., self.link]
-        c, s = np.cos(theta), np.sin(theta)
-        x, z = self.local[..., 0], self.local[..., 1]
-        return np.asarray(origin[..., self.link, :] + np.stack((c * x + s * z, c * z - s * x), -1))
+        return in_world(origin[..., self.link, :], angle[..., self.link], self.local)
+
+    def lines(self, segments: Floats, scale: float = 1.0) -> LineCollection:
+        """Lines to draw, from segments (ns, 2, 2) in the world and a factor of all widths."""
+        return LineCollection(
+            list(segments),
+            colors=self.colors,
+            linewidths=scale * self.width,
+            capstyle="round",
+            zorder=3,
+        )
 
 
 def skeleton(robot: Robot) -> Skeleton:
     """Make the line segments of a robot, those in front last."""
     model = robot.model
     reference = link_poses(robot, model.reference).origin
-    leg = legs(robot)
-    side = _sides(robot)
-    bones: list[Bone] = []
     share = np.cbrt(model.mass / max(robot.total_mass, 1e-12))
     width = np.maximum(THINNEST, THICKEST * share)
-    nowhere = np.zeros(2)
-    for link in range(robot.nv):
-        if model.mass[link] == 0.0:
-            continue
-        before = len(bones)
-        center = model.center_of_mass[link]
-        # The frame of a slide may be anywhere; that of a hinge is on the link.
-        home = nowhere if model.axis[link, 0] != 0.0 else center
-        children = np.flatnonzero(model.parent == link)
-        joints = reference[children] - reference[link]
-        if _is_trunk(robot, link, joints):
-            if np.hypot(*(center - joints[0])) > SAME_PLACE:
-                bones.append((link, joints[0], link, 2.0 * center - joints[0], width[link]))
-            continue
-        for child, place in zip(children, joints, strict=True):
-            if np.hypot(*(place - home)) > SAME_PLACE:
-                bones.append((link, home, int(child), nowhere, width[link]))
-        contacts = np.flatnonzero(model.contact_link == link)
-        points = model.contact_position[contacts]
-        thickness = width[link]
-        if len(bones) == before and _are_around(points):
-            lines = [(home, p) for p in points]
-            thickness = THINNEST
-        elif len(bones) == before:
-            lines = _outline(points)
-        else:
-            ends = np.array([home, *joints])
-            lines = [(home, p) for p in points if np.hypot(*(ends - p).T).min() > SAME_PLACE]
-        for start, end in lines:
-            bones.append((link, start, link, end, thickness))
-        for contact in contacts:
-            radius = float(model.contact_radius[contact])
-            if radius > SAME_PLACE:
-                for start, end in _disc(model.contact_position[contact], radius):
-                    bones.append((link, start, link, end, DISC_WIDTH))
-        if len(bones) == before and np.hypot(*(center - home)) > SAME_PLACE:
-            bones.append((link, nowhere, link, 2.0 * center, width[link]))
+    side = _sides(robot)
+    massive = np.flatnonzero(model.mass).tolist()
+    bones = [bone for i in massive for bone in _bones(robot, i, reference, float(width[i]))]
     bones.sort(key=lambda bone: side[bone[0]])
     links = np.array([(a, b) for a, _, b, _, _ in bones], dtype=np.int64).reshape(-1, 2)
     return Skeleton(
@@ -156,8 +128,47 @@ def skeleton(robot: Robot) -> Skeleton:
         local=np.array([(p, r) for _, p, _, r, _ in bones], dtype=np.float64).reshape(-1, 2, 2),
         width=np.array([bone[4] for bone in bones], dtype=np.float64),
         side=side[links[:, 0]],
-        foot=leg[links[:, 0]],
+        foot=legs(robot)[links[:, 0]],
     )
+
+
+def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bone]:
+    """Bones of a link that has a mass."""
+    model = robot.model
+    center, nowhere = model.center_of_mass[link], np.zeros(2)
+    # The frame of a slide may be anywhere; that of a hinge is on the link.
+    home = nowhere if model.axis[link, 0] != 0.0 else center
+    children = np.flatnonzero(model.parent == link)
+    joints = reference[children] - reference[link]
+    if _is_trunk(robot, link, joints):
+        end = 2.0 * center - joints[0]
+        return [(link, joints[0], link, end, width)] if _apart(center, joints[0]) else []
+    bones: list[Bone] = [
+        (link, home, int(child), nowhere, width)
+        for child, place in zip(children, joints, strict=True)
+        if _apart(place, home)
+    ]
+    contacts = np.flatnonzero(model.contact_link == link)
+    points = model.contact_position[contacts]
+    thickness = width
+    if bones:
+        lines = [(home, p) for p in points if all(_apart(p, end) for end in (home, *joints))]
+    elif _are_around(points):
+        lines, thickness = [(home, p) for p in points], THINNEST
+    else:
+        lines = _outline(points)
+    bones += [(link, start, link, end, thickness) for start, end in lines]
+    for point, radius in zip(points, model.contact_radius[contacts], strict=True):
+        if radius > SAME_PLACE:
+            rim = _disc(point, float(radius))
+            bones += [(link, start, link, end, DISC_WIDTH) for start, end in rim]
+    if not bones and _apart(center, home):
+        bones = [(link, nowhere, link, 2.0 * center, width)]
+    return bones
+
+
+def _apart(a: Floats, b: Floats) -> bool:
+    return bool(np.hypot(*(a - b)) > SAME_PLACE)
 
 
 def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
@@ -191,7 +202,7 @@ def _outline(points: Floats) -> list[tuple[Floats, Floats]]:
     corners = [np.zeros(2), *points]
     if len(points) > 1:
         corners.append(np.zeros(2))
-    return [(a, b) for a, b in pairwise(corners) if np.hypot(*(b - a)) > SAME_PLACE]
+    return [(a, b) for a, b in pairwise(corners) if _apart(a, b)]
 
 
 def _disc(center: Floats, radius: float) -> list[tuple[Floats, Floats]]:
@@ -219,10 +230,7 @@ def leg_labels(robot: Robot) -> list[tuple[str, str]]:
     """Colours of the legs with the names of their feet; none for a robot of one leg."""
     if len(robot.feet) < 2:
         return []
-    return [
-        (FOOT_COLORS[i % len(FOOT_COLORS)], foot.name.replace("_", " "))
-        for i, foot in enumerate(robot.feet)
-    ]
+    return [(foot_color(i), in_words(foot.name)) for i, foot in enumerate(robot.feet)]
 
 
 def _sides(robot: Robot) -> NDArray[np.int64]:
@@ -241,36 +249,6 @@ def _sides(robot: Robot) -> NDArray[np.int64]:
 
 def _says_left(robot: Robot, link: int) -> bool:
     return "left" in f"{robot.joint_names[link]} {robot.link_names[link]}".lower()
-
-
-def draw_robot(
-    axes: Axes, robot: Robot, q: Floats, *, alpha: float = 1.0, scale: float = 1.0
-) -> LineCollection:
-    """Draw a robot in one configuration.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where, with metres along both axes.
-    robot : Robot
-        The robot.
-    q : (nq,) float
-        Its configuration.
-    alpha, scale : float
-        Opacity, and factor of all line widths.
-    """
-    bones = skeleton(robot)
-    poses = link_poses(robot, q)
-    lines = LineCollection(
-        list(bones.segments(poses.origin, poses.angle)),
-        colors=bones.colors,
-        linewidths=bones.width * scale,
-        capstyle="round",
-        alpha=alpha,
-        zorder=3,
-    )
-    axes.add_collection(lines)
-    return lines
 
 
 def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
@@ -300,30 +278,27 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
         poses = link_poses(robot, q)
     bones = skeleton(robot)
-    low, high = extent(bones.segments(poses.origin, poses.angle))
+    segments = bones.segments(poses.origin, poses.angle)
+    low, high = extent(segments)
     width, height = high - low
     size = max(float(height), float(width) / WIDTH_SHARE, 1e-3)
     with styled():
         figure = new_figure(4.6, 5.8)
         axes = figure.add_subplot()
-        draw_robot(axes, robot, q)
+        axes.add_collection(bones.lines(segments))
         massive = np.flatnonzero(model.mass > 0.0)
         joints = [i for i in massive if model.axis[i, 0] != 0.0 and model.parent[i] >= 0]
-        axes.plot(
-            *poses.origin[joints].T, "o", color="white", mec=INK, ms=5, zorder=5, label="joint"
-        )
-        axes.plot(
-            *poses.center_of_mass[massive].T,
-            "P",
-            color=ORANGE,
-            mec="white",
-            ms=7,
-            zorder=6,
-            label="centre of mass",
-        )
         points = _contact_bottoms(robot, poses.origin, poses.angle)
-        if len(points):
-            axes.plot(*points.T, "^", color=INK, ms=5, zorder=6, label="contact point")
+        marks: dict[str, tuple[Floats, str, dict[str, Any]]] = {
+            "joint": (poses.origin[joints], "o", {"color": "white", "mec": INK, "zorder": 5}),
+            "centre of mass": (
+                poses.center_of_mass[massive], "P", {"color": ORANGE, "mec": "white", "ms": 7}
+            ),
+            "contact point": (points, "^", {"color": INK}),
+        }  # fmt: skip
+        for label, (places, marker, look) in marks.items():
+            if len(places):
+                axes.plot(*places.T, marker, label=label, **({"ms": 5, "zorder": 6} | look))
         ground = float(points[:, 1].min()) if len(points) else float(low[1])
         axes.axhspan(ground - 0.06 * size, ground, color=PALE, zorder=0)
         middle = 0.5 * float(low[0] + high[0])
@@ -366,12 +341,9 @@ def legs_apart(robot: Robot) -> Floats:
 
 def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:
     """Lowest points of the contact discs, (nc, 2)."""
-    model = robot.model
-    c, s = np.cos(angle[model.contact_link]), np.sin(angle[model.contact_link])
-    x, z = model.contact_position.T
-    center = origin[model.contact_link] + np.column_stack((c * x + s * z, c * z - s * x))
-    center[:, 1] -= model.contact_radius
-    return center
+    model, link = robot.model, robot.model.contact_link
+    center = in_world(origin[link], angle[link], model.contact_position)
+    return center - np.outer(model.contact_radius, [0.0, 1.0])
 
 
 def ground_outline(ground: Ground, left: float, right: float) -> Floats:

@@ -13,36 +13,22 @@ from matplotlib.figure import Figure
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
+from heelstrike.view.panels import Excerpt
 from heelstrike.view.style import save_figure, styled
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
 
-_DRAWINGS: dict[str, tuple[str, Callable[[Run, Gait | None, slice], Figure]]] = {
-    "tracking": (
-        "joint positions with the gait's reference (paper Figure 3)",
-        joint_figures.draw_tracking,
-    ),
-    "velocities": (
-        "joint velocities with the gait's reference (paper Figure 4)",
-        joint_figures.draw_velocities,
-    ),
-    "zmp": (
-        "zero moment point of the stance foot within its sole (paper Figure 5)",
-        contact_figures.draw_zero_moment_point,
-    ),
-    "friction": (
-        "tangential force of each foot within the friction cone (paper Figure 6)",
-        contact_figures.draw_friction,
-    ),
-    "forces": ("normal and tangential force on each foot", contact_figures.draw_forces),
-    "torque": ("joint torques with their limits", joint_figures.draw_torque),
-    "gaps": ("heights of the contact points above the ground", contact_figures.draw_gaps),
-    "energy": (
-        "mechanical energy, the work that changed it, and what no work explains",
-        energy_figure.draw_energy,
-    ),
-    "snapshots": ("the robot in the course of one step", snapshots.draw_snapshots),
+_DRAWINGS: dict[str, Callable[[Excerpt], Figure]] = {
+    "tracking": joint_figures.draw_tracking,
+    "velocities": joint_figures.draw_velocities,
+    "zmp": contact_figures.draw_zero_moment_point,
+    "friction": contact_figures.draw_friction,
+    "forces": contact_figures.draw_forces,
+    "torque": joint_figures.draw_torque,
+    "gaps": contact_figures.draw_gaps,
+    "energy": energy_figure.draw_energy,
+    "snapshots": snapshots.draw_snapshots,
 }
 
 FIGURES = tuple(_DRAWINGS)
@@ -89,9 +75,9 @@ def plot(
     """
     if what not in _DRAWINGS:
         raise ViewError(_unknown(what))
-    rows = _rows(run, span)
+    excerpt = Excerpt(run, _rows(run, span), gait)
     with styled():
-        figure = _DRAWINGS[what][1](run, gait, rows)
+        figure = _DRAWINGS[what](excerpt)
     if path is not None:
         save_figure(figure, path)
     return figure
@@ -119,5 +105,5 @@ def _rows(run: Run, span: tuple[float, float] | None) -> slice:
 def _unknown(what: str) -> str:
     near = difflib.get_close_matches(str(what).lower(), FIGURES, n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
-    names = "; ".join(f"{name}: {words}" for name, (words, _) in _DRAWINGS.items())
-    return f"there is no figure called {what!r}.{guess} There are {names}."
+    names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
+    return f"there is no figure called {what!r}.{guess} There are: {names}"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import run_motion
 from heelstrike.sim.run import Run
-from heelstrike.view.arrows import Arrows
+from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.drawing import extent, ground_outline, leg_labels, skeleton
 from heelstrike.view.style import (
     FORCE_COLOR,
@@ -76,26 +76,19 @@ def frames(run: Run, interval: float) -> Frames:
     time = run.time[0] + interval * np.arange(count)
     row = np.maximum(np.searchsorted(run.time, time + 1e-9, side="right") - 1, 0)
     motion = run_motion(run)
-    held = np.diff(run.time)[:, None]
-    world = np.zeros_like(run.contact_point)  # impulses on the robot up to each row
-    world[1:] = np.cumsum(run.world_force[:-1] * held[..., None], axis=0)
-    pressing = np.zeros_like(run.gap)
-    pressing[1:] = np.cumsum(run.contact_force[:-1, :, 0] * held, axis=0)
+    acting = np.concatenate((run.world_force, run.contact_force[..., :1]), axis=-1)
+    impulse = np.zeros_like(acting)  # up to each row
+    impulse[1:] = np.cumsum(acting[:-1] * np.diff(run.time)[:, None, None], axis=0)
     before = np.append(row[:1], row[:-1])
-    elapsed = (run.time[row] - run.time[before])[:, None]
-    same = elapsed[:, 0] <= 0.0  # two frames of one row, or the first frame
+    elapsed = run.time[row] - run.time[before]
+    same = elapsed <= 0.0  # two frames of one row, or the first frame
     elapsed[same] = 1.0
-    force = (world[row] - world[before]) / elapsed[..., None]
-    normal = (pressing[row] - pressing[before]) / elapsed
-    force[same] = run.world_force[row[same]]
-    normal[same] = run.contact_force[row[same], :, 0]
+    mean = (impulse[row] - impulse[before]) / elapsed[:, None, None]
+    mean[same] = acting[row[same]]
+    force, normal = mean[..., :2], mean[..., 2]
     on_ground = run.contact_point[row] - run.gap[row][..., None] * run.contact_normal[row]
-    total = normal.sum(axis=1)
-    pushes = total > 1e-6 * run.robot.weight
-    pressure = np.full((count, 2), np.nan)
-    pressure[pushes] = np.einsum(
-        "fc,fck->fk", normal[pushes] / total[pushes, None], on_ground[pushes]
-    )
+    total = normal.sum(axis=1, keepdims=True)
+    share = normal / np.where(total > 1e-6 * run.robot.weight, total, np.nan)
     return Frames(
         time=time,
         row=row,
@@ -103,7 +96,7 @@ def frames(run: Run, interval: float) -> Frames:
         center=motion.center_of_mass[row],
         point=run.contact_point[row],
         force=force,
-        pressure=pressure,
+        pressure=np.einsum("fc,fck->fk", share, on_ground),
     )
 
 
@@ -138,17 +131,19 @@ class Film:
         self._soil = Polygon(np.zeros((1, 2)), closed=True, facecolor=PALE, edgecolor=GREY, lw=1.0)
         axes.add_patch(self._soil)
         self._marks = LineCollection([], colors=GREY, linewidths=1.0)
-        self._robot = LineCollection(
-            [], colors=bones.colors, linewidths=scale * bones.width, capstyle="round"
-        )
+        self._robot = bones.lines(np.zeros((0, 2, 2)), scale)
         for collection in (self._marks, self._robot):
             axes.add_collection(collection, autolim=False)
         self._arrows = Arrows(axes, self._size, run.robot.weight, width=2.5 * scale)
+        font = 11.0 * scale
+        if run.robot.nc:
+            place = np.array([0.9 * self._x[0] + 0.1 * self._x[1], 0.45 * self._z[1]])
+            weight = run.robot.weight
+            draw_scale(axes, place, self._size, weight, width=2.5 * scale, fontsize=0.85 * font)
         (self._pressure,) = axes.plot(
             [], [], "D", color=ZERO_MOMENT_POINT_COLOR, mec="white", ms=9.0 * scale
         )
         (self._center,) = axes.plot([], [], "o", color=ORANGE, mec="white", ms=7.0 * scale)
-        font = 11.0 * scale
         self._clock = axes.text(
             0.02, 0.97, "", transform=axes.transAxes, va="top", fontsize=1.3 * font, color=INK
         )
@@ -202,9 +197,7 @@ class Film:
         center = self.frames.center[:, 0]
         reach = min(round(FOLLOWS_WITHIN / interval), len(center) - 1)
         # Straight continuation at both ends, so that the camera neither lags nor stops early.
-        before = center[0] - (center[1 : reach + 1] - center[0])[::-1]
-        after = center[-1] - (center[-reach - 1 : -1] - center[-1])[::-1]
-        padded = np.concatenate((before, center, after))
+        padded = np.pad(center, reach, mode="reflect", reflect_type="odd")
         window = np.hanning(2 * reach + 3)[1:-1]
         x = np.convolve(padded, window / window.sum(), mode="valid")
         return np.column_stack((x, np.asarray(self._ground.height(x))))
@@ -231,26 +224,24 @@ class Film:
         height = np.asarray(self._ground.height(marks)) - camera[1]
         top = np.column_stack((marks - camera[0], height))
         self._marks.set_segments(list(np.stack((top, top - np.outer(tall, [0.0, 1.0])), axis=1)))
+        for label in self._metres:
+            label.set_text("")
         whole = np.flatnonzero(marks == np.round(marks))
-        for i, label in enumerate(self._metres):
-            if i < len(whole):
-                label.set_text(f"{marks[whole[i]]:.0f} m".replace("-", "−"))
-                label.set_position(top[whole[i]] - [0.0, 0.035 * self._size])
-            else:
-                label.set_text("")
+        for label, mark in zip(self._metres, whole, strict=False):
+            label.set_text(f"{marks[mark]:.0f} m".replace("-", "−"))
+            label.set_position(top[mark] - [0.0, 0.035 * self._size])
 
     def _legend(self, figure: Figure, run: Run, font: float) -> None:
-        def line(color: str, label: str) -> Line2D:
-            return Line2D([], [], color=color, lw=4.0, solid_capstyle="round", label=label)
-
-        def dot(marker: str, color: str, label: str) -> Line2D:
-            return Line2D([], [], marker=marker, color=color, mec="white", ls="", ms=8, label=label)
-
-        handles = [line(color, label) for color, label in leg_labels(run.robot)]
+        lines, dots = leg_labels(run.robot), [("o", ORANGE, "centre of mass")]
         if run.robot.nc:
-            handles += [
-                line(FORCE_COLOR, "contact force"),
-                dot("D", ZERO_MOMENT_POINT_COLOR, "zero moment point"),
-            ]
-        handles.append(dot("o", ORANGE, "centre of mass"))
+            lines.append((FORCE_COLOR, "contact force"))
+            dots.insert(0, ("D", ZERO_MOMENT_POINT_COLOR, "zero moment point"))
+        handles = [
+            Line2D([], [], color=color, lw=4.0, solid_capstyle="round", label=label)
+            for color, label in lines
+        ]
+        handles += [
+            Line2D([], [], marker=marker, color=color, mec="white", ls="", ms=8, label=label)
+            for marker, color, label in dots
+        ]
         figure.legend(handles=handles, loc="upper right", fontsize=0.85 * font, labelspacing=0.35)

@@ -2,142 +2,84 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any, Literal
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from heelstrike.analysis.tracking import reference_motion
 from heelstrike.errors import ViewError
-from heelstrike.robot.robot import Robot
-from heelstrike.sim.run import Run
 from heelstrike.view.drawing import legs
-from heelstrike.view.impacts import NOTE, scale_without_impacts
-from heelstrike.view.style import (
-    BOUND,
-    FOOT_COLORS,
-    GREY,
-    INK,
-    figure_title,
-    legend_above,
-    new_figure,
-    time_axis,
-)
-
-if TYPE_CHECKING:
-    from heelstrike.gait.gait import Gait
-
-Floats = NDArray[np.float64]
+from heelstrike.view.panels import Curve, Excerpt, Panel, draw_panels
+from heelstrike.view.style import INK, foot_color, in_words
 
 REFERENCE: dict[str, Any] = {"color": INK, "linestyle": (0, (4, 3)), "linewidth": 1.0}
 
 
-def draw_tracking(run: Run, gait: Gait | None, rows: slice) -> Figure:
-    """Joint positions and their references."""
-    joints = run.robot.model.actuator_joint
-    reference = None if gait is None else reference_motion(run, gait).position
-    figure, panels = _panels(run.robot)
-    figure_title(figure, run.robot, "joint positions")
-    _draw_joints(run, panels, run.position[:, joints], reference, rows, ("rad", "m"))
-    return figure
+def _draw_motion(excerpt: Excerpt, what: Literal["position", "velocity"]) -> Figure:
+    """Joint positions or velocities, and their references."""
+    run = excerpt.run
+    values = getattr(run, what)[:, run.robot.model.actuator_joint]
+    units = ("rad", "m") if what == "position" else ("rad/s", "m/s")
+    gait = excerpt.gait
+    reference = None if gait is None else getattr(reference_motion(run, gait), what)
 
-
-def draw_velocities(run: Run, gait: Gait | None, rows: slice) -> Figure:
-    """Joint velocities and their references."""
-    joints = run.robot.model.actuator_joint
-    reference = None if gait is None else reference_motion(run, gait).velocity
-    figure, panels = _panels(run.robot)
-    figure_title(figure, run.robot, "joint velocities")
-    _draw_joints(run, panels, run.velocity[:, joints], reference, rows, ("rad/s", "m/s"))
-    return figure
-
-
-def draw_torque(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa: ARG001
-    """Joint torques, held from row to row, and their limits."""
-    model = run.robot.model
-    figure, panels = _panels(run.robot)
-    cut = False
-    for i, axes in enumerate(panels):
-        torque = run.torque[:, i]
-        axes.plot(run.time[rows], torque[rows], color=_color(run.robot, i), drawstyle="steps-post")
-        unit = "N m" if _turns(run.robot, i) else "N"
-        axes.set_ylabel(unit)
-        cut |= scale_without_impacts(axes, run, [torque], rows)
-        limits = [
-            float(bound[i])
-            for bound in (model.torque_lower, model.torque_upper)
-            if np.isfinite(bound[i])
-        ]
-        low, high = axes.get_ylim()
-        for limit in limits:
-            axes.axhline(limit, **BOUND)
-        if limits:
-            text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
-            axes.set_title(f"limits {text} {unit}", loc="right", fontsize=8.5, color=GREY)
-        axes.set_ylim(low, high)
-    _finish(run, panels, rows)
-    figure_title(figure, run.robot, "joint torques", note=NOTE if cut else "")
-    return figure
-
-
-def _panels(robot: Robot) -> tuple[Figure, list[Axes]]:
-    """One panel a joint, a column a leg where the legs have the same joints."""
-    count = robot.nu
-    if not count:
-        raise ViewError(f"robot {robot.name!r} has no actuators: there are no joints to show")
-    leg = legs(robot)[robot.model.actuator_joint]
-    columns = min(2, count)
-    order = list(range(count))
-    each = [np.flatnonzero(leg == foot).tolist() for foot in sorted(set(leg.tolist()))]
-    if len(each) == 2 and len(each[0]) == len(each[1]) and -1 not in leg:
-        order = [i for pair in zip(*each, strict=True) for i in pair]
-    height = -(-count // columns)
-    figure = new_figure(9.0, 1.2 + 1.9 * height)
-    grid = figure.subplots(height, columns, sharex=True, squeeze=False).ravel()
-    for spare in grid[count:]:
-        spare.set_visible(False)
-    panels: list[Axes] = [grid[order.index(i)] for i in range(count)]
-    for i, axes in enumerate(panels):
-        axes.set_title(robot.actuator_names[i].replace("_", " "), loc="left")
-    return figure, panels
-
-
-def _draw_joints(
-    run: Run,
-    panels: list[Axes],
-    measured: Floats,
-    reference: Floats | None,
-    rows: slice,
-    units: tuple[str, str],
-) -> None:
-    for i, axes in enumerate(panels):
-        axes.plot(
-            run.time[rows],
-            measured[rows, i],
-            color=_color(run.robot, i),
-            linewidth=2.2,
-            alpha=0.85,
-            label="measured",
-        )
+    def panel(joint: int, color: str, turns: bool) -> Panel:
+        look = {"color": color, "linewidth": 2.2, "alpha": 0.85}
+        curves = [Curve(values[:, joint], "simulated", look)]
         if reference is not None:
-            axes.plot(run.time[rows], reference[rows, i], label="reference", **REFERENCE)
-        axes.set_ylabel(units[0] if _turns(run.robot, i) else units[1])
-    _finish(run, panels, rows)
+            curves.append(Curve(reference[:, joint], "reference", REFERENCE))
+        return Panel(units[not turns], curves, in_words(run.robot.actuator_names[joint]))
+
+    title = f"joint {'positions' if what == 'position' else 'velocities'}"
+    return _draw_joints(excerpt, title, panel)
 
 
-def _finish(run: Run, panels: list[Axes], rows: slice) -> None:
-    for axes in panels:
-        place = axes.get_subplotspec()
-        time_axis(axes, run.time[rows], labelled=place is None or place.is_last_row())
-    legend_above(panels[0], right=True)
+def draw_tracking(excerpt: Excerpt) -> Figure:
+    """Joint positions with the gait's reference (paper Figure 3)."""
+    return _draw_motion(excerpt, "position")
 
 
-def _turns(robot: Robot, actuator: int) -> bool:
-    return bool(robot.model.axis[robot.model.actuator_joint[actuator], 0] != 0.0)
+def draw_velocities(excerpt: Excerpt) -> Figure:
+    """Joint velocities with the gait's reference (paper Figure 4)."""
+    return _draw_motion(excerpt, "velocity")
 
 
-def _color(robot: Robot, actuator: int) -> str:
-    foot = int(legs(robot)[robot.model.actuator_joint[actuator]])
-    return INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)]
+def draw_torque(excerpt: Excerpt) -> Figure:
+    """Joint torques with their limits, held from row to row."""
+    run, model = excerpt.run, excerpt.run.robot.model
+
+    def panel(joint: int, color: str, turns: bool) -> Panel:
+        unit = "N m" if turns else "N"
+        ends = np.array([model.torque_lower[joint], model.torque_upper[joint]])
+        limits = ends[np.isfinite(ends)].tolist()
+        text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
+        return Panel(
+            unit,
+            [Curve(run.torque[:, joint], look={"color": color, "drawstyle": "steps-post"})],
+            in_words(run.robot.actuator_names[joint]),
+            remark=f"limits {text} {unit}" if limits else "",
+            bounds={"": limits},
+            impacts=False,
+        )
+
+    return _draw_joints(excerpt, "joint torques", panel)
+
+
+def _draw_joints(excerpt: Excerpt, title: str, panel: Callable[[int, str, bool], Panel]) -> Figure:
+    """One panel a joint, a column a leg where the legs have the same joints."""
+    robot = excerpt.run.robot
+    joints = robot.model.actuator_joint
+    if not robot.nu:
+        raise ViewError(f"robot {robot.name!r} has no actuators: there are no joints to show")
+    leg = legs(robot)[joints]
+    order = np.arange(robot.nu)
+    each = [np.flatnonzero(leg == foot) for foot in np.unique(leg)]
+    if len(each) == 2 and len(each[0]) == len(each[1]) and -1 not in leg:
+        order = np.column_stack(each).ravel()
+    turns = robot.model.axis[joints, 0] != 0.0
+    panels = [panel(int(i), foot_color(int(leg[i])), bool(turns[i])) for i in order]
+    columns = min(2, robot.nu)
+    height = 1.2 + 1.9 * -(-robot.nu // columns)
+    return draw_panels(excerpt, title, panels, height=height, columns=columns, legends=False)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from itertools import pairwise
 
 import numpy as np
-from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -13,24 +12,21 @@ from numpy.typing import NDArray
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.support import walking_steps
 from heelstrike.sim.run import Run
-from heelstrike.view.arrows import Arrows
+from heelstrike.view.arrows import Arrows, draw_scale
 from heelstrike.view.drawing import extent, ground_outline, leg_labels, skeleton
-from heelstrike.view.impacts import impact_rows
+from heelstrike.view.panels import Excerpt, impact_rows
 from heelstrike.view.style import FORCE_COLOR, PALE, figure_title, new_figure
-
-if TYPE_CHECKING:
-    from heelstrike.gait.gait import Gait
 
 POSES = 7
 
 
-def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa: ARG001
-    """The robot at equal times of its middle step, side by side, with the forces on it."""
+def draw_snapshots(excerpt: Excerpt) -> Figure:
+    """The robot at equal times of one step, side by side, with the forces on it."""
+    run = excerpt.run
     motion = run_motion(run)
     bones = skeleton(run.robot)
-    start, end = _middle_step(run, rows)
-    times = np.linspace(start, end, POSES)
-    at = _usual_rows(run, times)
+    start, end = _middle_step(run, excerpt.rows)
+    at = _usual_rows(run, np.linspace(start, end, POSES))
     segments = bones.segments(motion.link_origin[at], motion.link_angle[at])
     center = motion.center_of_mass[at, 0]
     height = float(run.ground.height(center[POSES // 2]))
@@ -40,22 +36,12 @@ def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa:
     spacing = max(float(high[0] - low[0]), 0.3 * size) + 0.12 * size
     figure = new_figure(9.0, 3.6)
     axes = figure.add_subplot()
-    arrows = []
+    shift = np.column_stack((spacing * np.arange(POSES), np.zeros(POSES))) - origin
     for i, row in enumerate(at):
-        shift = np.array([i * spacing, 0.0]) - origin[i]
-        axes.add_collection(
-            LineCollection(
-                list(segments[i] + shift),
-                colors=bones.colors,
-                linewidths=0.55 * bones.width,
-                capstyle="round",
-                zorder=3,
-            )
-        )
-        arrows.append((run.contact_point[row] + shift, run.world_force[row]))
+        axes.add_collection(bones.lines(segments[i] + shift[i], 0.55))
         surface = ground_outline(run.ground, center[i] - 0.5 * spacing, center[i] + 0.5 * spacing)
         below = surface - [0.0, 0.02 * size]
-        axes.fill(*(np.concatenate((surface, below[::-1])) + shift).T, color=PALE, zorder=0)
+        axes.fill(*(np.concatenate((surface, below[::-1])) + shift[i]).T, color=PALE, zorder=0)
         axes.annotate(
             f"{run.time[row]:.2f} s",
             (i * spacing, float(run.ground.height(center[i])) - height),
@@ -64,11 +50,16 @@ def draw_snapshots(run: Run, gait: Gait | None, rows: slice) -> Figure:  # noqa:
             ha="center",
             va="top",
         )
+    left = -0.5 * spacing
     if run.robot.nc:
-        foot, force = (np.concatenate(parts) for parts in zip(*arrows, strict=True))
-        Arrows(axes, size, run.robot.weight, width=1.6).show(foot, force)
+        foot = (run.contact_point[at] + shift[:, None]).reshape(-1, 2)
+        arrows = Arrows(axes, size, run.robot.weight, width=1.6)
+        arrows.show(foot, run.world_force[at].reshape(-1, 2))
+        left -= 0.25 * size
+        place = np.array([left + 0.12 * size, 0.0])
+        draw_scale(axes, place, size, run.robot.weight, width=1.6, fontsize=10.0)
     axes.set(
-        xlim=(-0.5 * spacing, (POSES - 0.5) * spacing),
+        xlim=(left, (POSES - 0.5) * spacing),
         ylim=(float(low[1]) - 0.14 * size, float(high[1]) + 0.05 * size),
         aspect="equal",
     )
@@ -88,15 +79,18 @@ def _usual_rows(run: Run, times: NDArray[np.float64]) -> NDArray[np.int64]:
     if not len(usual):
         usual = np.arange(len(run.time))
     place = np.searchsorted(run.time[usual], times - 1e-9)
-    place[-1] = np.searchsorted(run.time[usual], times[-1] + 1e-9) - 1
-    return np.asarray(usual[np.clip(place, 0, len(usual) - 1)])
+    last = np.searchsorted(run.time[usual], times[-1] + 1e-9) - 1
+    return np.asarray(usual[np.clip(place, 0, max(last, 0))])
 
 
 def _middle_step(run: Run, rows: slice) -> tuple[float, float]:
-    """Start and end of the step in the middle of the rows; all of them if there is none."""
+    """Start and end of the middle one of the steps that are no mere stumble.
+
+    The steps are what touchdowns divide the rows into: all of them if there are none.
+    """
     first, last = float(run.time[rows.start]), float(run.time[rows.stop - 1])
-    touchdowns = [s.touchdown for s in walking_steps(run) if first <= s.touchdown <= last]
-    if len(touchdowns) < 2:
-        return first, last
-    middle = (len(touchdowns) - 1) // 2
-    return touchdowns[middle], touchdowns[middle + 1]
+    inside = [s.touchdown for s in walking_steps(run) if first < s.touchdown < last]
+    steps = list(pairwise((first, *inside, last)))
+    longest = max(end - start for start, end in steps)
+    lasting = [(start, end) for start, end in steps if end - start >= 0.5 * longest]
+    return lasting[len(lasting) // 2]

@@ -82,9 +82,19 @@ def styled() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float, height: float, *, constrained: bool = True) -> Figure:
+def foot_color(foot: int) -> str:
+    """Colour of a foot and its leg, dark for what belongs to none (-1)."""
+    return INK if foot < 0 else FOOT_COLORS[foot % len(FOOT_COLORS)]
+
+
+def in_words(name: str) -> str:
+    """Name of a joint, foot or contact point as people write it."""
+    return name.replace("_", " ")
+
+
+def new_figure(width: float, height: float) -> Figure:
     """Make a figure (inches) that belongs to no window and to no global list."""
-    figure = Figure(figsize=(width, height), layout="constrained" if constrained else None)
+    figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -99,18 +109,24 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
         as it was.
     """
     target = Path(path)
-    try:
-        check_target(target)
-    except WriteError as error:
-        raise ViewError(str(error)) from error
     kind = target.suffix.lstrip(".").lower()
-    if kind not in figure.canvas.get_supported_filetypes():
-        raise ViewError(f"cannot write {target}: the name of a picture ends in .png, .pdf or .svg")
-    picture = io.BytesIO()
-    with styled():
-        figure.savefig(picture, format=kind)
-    try:
+    with view_errors():
+        check_target(target)
+        if kind not in figure.canvas.get_supported_filetypes():
+            raise ViewError(
+                f"cannot write {target}: the name of a picture ends in .png, .pdf or .svg"
+            )
+        picture = io.BytesIO()
+        with styled():
+            figure.savefig(picture, format=kind)
         return write_whole(target, picture.getbuffer())
+
+
+@contextlib.contextmanager
+def view_errors() -> Iterator[None]:
+    """Let what keeps a file from being written be an error of the view."""
+    try:
+        yield
     except WriteError as error:
         raise ViewError(str(error)) from error
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from heelstrike import dynamics
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
-from heelstrike.dynamics import contact_positions
 from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import checked
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
-ROOT = 3  # coordinates of a floating trunk: x, z, pitch
-HEIGHT = 1  # index of z
+TRUNK = (0, 1, 2)  # coordinates of a floating trunk: x, z, pitch
 LEVEL = (
     1e-4  # m; contact points of a foot that are no higher than this above its lowest are its sole
 )
@@ -27,18 +26,14 @@ MOST_TILT = 0.6  # rad, m; of all joints together, beyond which a foot is not ma
 def placed(robot: Robot, state: State, ground: Ground) -> State:
     """Move a robot up or down until it touches the ground; see :meth:`Robot.placed`."""
     state = checked(robot, state)
-    if not robot.floating or robot.nc == 0:
-        raise RobotError(
-            f"robot {robot.name!r} cannot be put on the ground, for it "
-            + ("has no contact points." if robot.floating else "does not float as x, z, pitch.")
-        )
-    centers = contact_positions(robot, state.q)
+    lift = _lift(robot)
+    centers = dynamics.contact_positions(robot, state.q)
     touching = [
         touching_height(ground, float(x), float(radius))
         for (x, _), radius in zip(centers, robot.model.contact_radius, strict=True)
     ]
     q = state.q.copy()
-    q[HEIGHT] += float(np.max(touching - centers[:, 1]))
+    q[lift] += robot.model.axis[lift, 2] * float(np.max(touching - centers[:, 1]))
     return State(q, state.v)
 
 
@@ -46,20 +41,49 @@ def standing(robot: Robot, ground: Ground) -> State:
     """Stand a robot on the ground with its soles on it; see :meth:`Robot.standing`."""
     start = placed(robot, robot.reference_state(), ground)
     sole = _soles(robot)
-    free = np.array([HEIGHT, *range(ROOT, robot.nq)])
+    lift = _lift(robot)
+    held = {*_above(robot, lift), *(TRUNK if robot.floating else ())} - {lift}
+    free = np.array([joint for joint in range(robot.nq) if joint not in held])
+    low, high = np.minimum(robot.model.lower, start.q), np.maximum(robot.model.upper, start.q)
+    # Where little mass moves, as at ankles, much may change.
+    ease = 1.0 / np.sqrt(np.diag(dynamics.mass_matrix(robot, start.q)))
     q = start.q.copy()
     for _ in range(MOST_ITERATIONS if sole else 0):
         at = contact_kinematics(robot, q, start.v, ground)
         gap = at.gap[sole]
         if np.abs(gap).max() < CLOSE:
             break
-        # The smallest change that closes the gaps, were the ground straight around each point.
-        change = np.linalg.lstsq(at.jacobian[sole, 0][:, free], -gap, rcond=1e-9)[0]
-        q[free] += np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
-        if np.abs(q[ROOT:] - start.q[ROOT:]).max(initial=0.0) > MOST_TILT:
+        # The least change that closes the gaps, were the ground straight around each point.
+        rows = at.jacobian[sole, 0][:, free] * ease[free]
+        change = ease[free] * np.linalg.lstsq(rows, -gap, rcond=1e-9)[0]
+        wanted = q[free] + np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
+        q[free] = np.clip(wanted, low[free], high[free])
+        free = free[q[free] == wanted]  # a joint that comes to its stop stays there
+        if np.any(np.abs(np.delete(q - start.q, lift)) > MOST_TILT):
             return start
-    low, high = np.minimum(robot.model.lower, start.q), np.maximum(robot.model.upper, start.q)
-    return placed(robot, State(np.clip(q, low, high), start.v), ground)
+    return placed(robot, State(q, start.v), ground)
+
+
+def _lift(robot: Robot) -> int:
+    """Coordinate that moves the whole robot straight up or down."""
+    model = robot.model
+    for joint in range(robot.nv):
+        slides = not np.any(model.axis[_above(robot, joint), 0])
+        carried = [joint in _above(robot, link) for link in set(model.contact_link.tolist())]
+        if slides and model.axis[joint, 1] == 0.0 and carried and all(carried):
+            return joint
+    raise RobotError(
+        f"robot {robot.name!r} cannot be put on the ground, for it "
+        + ("has no joint that lifts all of it." if robot.nc else "has no contact points.")
+    )
+
+
+def _above(robot: Robot, link: int) -> list[int]:
+    """Links from one up to the world, itself first."""
+    found = [link]
+    while (parent := int(robot.model.parent[found[-1]])) >= 0:
+        found.append(parent)
+    return found
 
 
 def touching_height(ground: Ground, x: float, radius: float) -> float:
@@ -81,7 +105,7 @@ def touching_height(ground: Ground, x: float, radius: float) -> float:
 
 def _soles(robot: Robot) -> list[int]:
     """First and last of the contact points on which each foot stands in the reference."""
-    bottoms: Floats = contact_positions(robot, robot.model.reference)[:, 1]
+    bottoms: Floats = dynamics.contact_positions(robot, robot.model.reference)[:, 1]
     bottoms = bottoms - robot.model.contact_radius
     ends: list[int] = []
     for foot in robot.feet:

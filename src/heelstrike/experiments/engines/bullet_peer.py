@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 from typing import Any
 
 import numpy as np
 import pybullet
+from pybullet_utils.bullet_client import BulletClient  # type: ignore[import-not-found,unused-ignore]
 
 from heelstrike.experiments.engines.links import Link, links
-from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.peer import Engine, Floats, Peer
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.robot import State
 
 RADIUS = 1e-4
 """Least radius of a contact point, in m: Bullet's own margins are larger than nothing."""
@@ -36,63 +35,47 @@ class BulletPeer(Peer):
 
     def __init__(self, scenario: Scenario, step: float) -> None:
         super().__init__(scenario, step)
-        self._client = pybullet.connect(pybullet.DIRECT)
+        self._engine = BulletClient(pybullet.DIRECT)
         self._body = self._build()
         robot = scenario.robot
         self._driven = [int(joint) for joint in robot.model.actuator_joint]
         self._one_call = scenario.feedback is None and not np.any(robot.model.damping)
         self._substeps = 0
-        self._step = 0
         # What changes of the commands is added in every step to what its controllers do.
         varying = len(self.commands) > 1
         self._torques = (self.commands - self.commands[0]).tolist() if varying else []
 
-    def __del__(self) -> None:
-        """Let go of the engine's world."""
-        with contextlib.suppress(Exception):
-            pybullet.disconnect(self._client)
-
     def _build(self) -> int:
-        client, robot = self._client, self.scenario.robot
-        model = robot.model
-        pybullet.setGravity(model.gravity[0], 0.0, model.gravity[1], physicsClientId=client)
-        pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=self.step,
-            numSubSteps=0,
-            numSolverIterations=ITERATIONS,
-            physicsClientId=client,
+        engine, robot = self._engine, self.scenario.robot
+        gravity = robot.model.gravity
+        engine.setGravity(gravity[0], 0.0, gravity[1])
+        engine.setPhysicsEngineParameter(
+            fixedTimeStep=self.step, numSubSteps=0, numSolverIterations=ITERATIONS
         )
-        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-        ground = pybullet.createMultiBody(0.0, plane, physicsClientId=client)
+        ground = engine.createMultiBody(0.0, engine.createCollisionShape(pybullet.GEOM_PLANE))
         chain = links(robot, least_radius=RADIUS)
-        count = len(chain)
-        none, straight = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
-        body = pybullet.createMultiBody(
+        straight = [[0.0, 0.0, 0.0, 1.0]] * len(chain)
+        kinds = (pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE)
+        body = engine.createMultiBody(
             baseMass=0.0,
             linkMasses=[link.mass for link in chain],
             linkCollisionShapeIndices=[self._shape(link.points) for link in chain],
-            linkVisualShapeIndices=[-1] * count,
+            linkVisualShapeIndices=[-1] * len(chain),
             linkPositions=[link.place for link in chain],
-            linkOrientations=[straight] * count,
+            linkOrientations=straight,
             linkInertialFramePositions=[link.center for link in chain],
-            linkInertialFrameOrientations=[straight] * count,
+            linkInertialFrameOrientations=straight,
             linkParentIndices=[link.parent + 1 for link in chain],
-            linkJointTypes=[
-                pybullet.JOINT_REVOLUTE if link.hinge else pybullet.JOINT_PRISMATIC
-                for link in chain
-            ],
+            linkJointTypes=[kinds[link.hinge] for link in chain],
             linkJointAxis=[link.axis for link in chain],
-            basePosition=none,
-            physicsClientId=client,
+            basePosition=[0.0, 0.0, 0.0],
         )
         # The friction of two bodies is the product of theirs.
-        pybullet.changeDynamics(
-            ground, -1, lateralFriction=1.0, restitution=0.0, physicsClientId=client
-        )
+        engine.changeDynamics(ground, -1, lateralFriction=1.0, restitution=0.0)
         for i, link in enumerate(chain):
             self._set_dynamics(body, i, link)
             for other in range(i):  # points meet the ground only
-                pybullet.setCollisionFilterPair(body, body, i, other, 0, physicsClientId=client)
+                engine.setCollisionFilterPair(body, body, i, other, 0)
         return int(body)
 
     def _set_dynamics(self, body: int, i: int, link: Link) -> None:
@@ -100,8 +83,7 @@ class BulletPeer(Peer):
         limits = {}
         if np.isfinite(link.lower) and np.isfinite(link.upper):
             limits = {"jointLowerLimit": link.lower, "jointUpperLimit": link.upper}
-        client = self._client
-        pybullet.changeDynamics(
+        self._engine.changeDynamics(
             body,
             i,
             localInertiaDiagonal=[link.inertia] * 3,
@@ -113,34 +95,25 @@ class BulletPeer(Peer):
             angularDamping=0.0,
             jointDamping=link.damping,
             **limits,
-            physicsClientId=client,
         )
         # In one call with others, this takes their effect from them.
-        pybullet.changeDynamics(body, i, maxJointVelocity=NO_LIMIT, physicsClientId=client)
-        pybullet.setJointMotorControl2(
-            body, i, pybullet.VELOCITY_CONTROL, force=0.0, physicsClientId=client
-        )
+        self._engine.changeDynamics(body, i, maxJointVelocity=NO_LIMIT)
+        self._engine.setJointMotorControl2(body, i, pybullet.VELOCITY_CONTROL, force=0.0)
 
     def _shape(self, points: Any) -> int:
         if not points:
             return -1
-        return int(
-            pybullet.createCollisionShapeArray(
-                shapeTypes=[pybullet.GEOM_SPHERE] * len(points),
-                radii=[radius for _, radius in points],
-                collisionFramePositions=[center for center, _ in points],
-                physicsClientId=self._client,
-            )
+        shape = self._engine.createCollisionShapeArray(
+            shapeTypes=[pybullet.GEOM_SPHERE] * len(points),
+            radii=[radius for _, radius in points],
+            collisionFramePositions=[center for center, _ in points],
         )
+        return int(shape)
 
-    def restart(self) -> None:
-        """Go back to `start`, at time 0."""
-        q = self.start.q - self.scenario.robot.model.reference
+    def place(self, q: Floats, v: Floats) -> None:
+        """Put the robot somewhere, at time 0."""
         for i in range(len(q)):
-            pybullet.resetJointState(
-                self._body, i, q[i], self.start.v[i], physicsClientId=self._client
-            )
-        self._step = 0
+            self._engine.resetJointState(self._body, i, q[i], v[i])
         if self.scenario.feedback is not None:
             self._set_law()
 
@@ -154,7 +127,7 @@ class BulletPeer(Peer):
         limit = np.full(len(driven), NO_LIMIT)
         if len(self.commands) == 1:  # otherwise it is not all of the torque
             limit = np.minimum(model.torque_upper, NO_LIMIT)
-        pybullet.setJointMotorControlArray(
+        self._engine.setJointMotorControlArray(
             self._body,
             driven,
             pybullet.PD_CONTROL,
@@ -163,51 +136,39 @@ class BulletPeer(Peer):
             positionGains=feedback.parameters.kp,
             velocityGains=feedback.parameters.kd,
             forces=limit,
-            physicsClientId=self._client,
         )
 
-    def advance(self, steps: int) -> None:
+    def simulate(self, steps: int) -> None:
         """Simulate some steps: in one call, or each with its own."""
-        client = self._client
+        step, control = self._engine.stepSimulation, self._engine.setJointMotorControlArray
         if self._one_call:
             self._ask_for(0 if steps == 1 else steps)
-            pybullet.stepSimulation(physicsClientId=client)
+            step()
         elif not self._torques:
             for _ in range(steps):
-                pybullet.stepSimulation(physicsClientId=client)
+                step()
         else:
-            for torques in self._torques[self._step : self._step + steps]:
-                pybullet.setJointMotorControlArray(
-                    self._body,
-                    self._driven,
-                    pybullet.TORQUE_CONTROL,
-                    forces=torques,
-                    physicsClientId=client,
-                )
-                pybullet.stepSimulation(physicsClientId=client)
-        self._step += steps
+            for torques in self._torques[self.done : self.done + steps]:
+                control(self._body, self._driven, pybullet.TORQUE_CONTROL, forces=torques)
+                step()
 
     def _ask_for(self, substeps: int) -> None:
         if substeps != self._substeps:
-            pybullet.setPhysicsEngineParameter(
-                fixedTimeStep=self.step * max(substeps, 1),
-                numSubSteps=substeps,
-                physicsClientId=self._client,
+            self._engine.setPhysicsEngineParameter(
+                fixedTimeStep=self.step * max(substeps, 1), numSubSteps=substeps
             )
             self._substeps = substeps
 
-    def state(self) -> State:
+    def coordinates(self) -> tuple[Floats, Floats]:
         """Where it is now."""
-        robot = self.scenario.robot
-        joints = pybullet.getJointStates(self._body, range(robot.nv), physicsClientId=self._client)
-        q = np.array([joint[0] for joint in joints]) + robot.model.reference
-        return State(q, np.array([joint[1] for joint in joints]))
+        joints = self._engine.getJointStates(self._body, range(self.scenario.robot.nv))
+        q, v, *_ = zip(*joints, strict=True)
+        return np.array(q), np.array(v)
 
-    def touching(self) -> Touching:
-        """How it touched the ground in the last step."""
-        contacts = pybullet.getContactPoints(bodyA=self._body, physicsClientId=self._client)
-        depth = max((-contact[8] for contact in contacts), default=0.0)
-        return Touching(len(contacts), sum(contact[9] for contact in contacts), depth)
+    def contacts(self) -> list[tuple[float, float]]:
+        """Force and depth of each contact in the last step."""
+        found = self._engine.getContactPoints(bodyA=self._body)
+        return [(contact[9], -contact[8]) for contact in found]
 
 
 ENGINE = Engine(

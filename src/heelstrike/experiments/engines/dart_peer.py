@@ -8,9 +8,8 @@ import dartpy
 import numpy as np
 
 from heelstrike.experiments.engines.links import links, space
-from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.peer import Engine, Floats, Peer
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.robot import State
 
 RADIUS = 1e-4
 """Least radius of a contact point, in m: its collision detectors want spheres of some size."""
@@ -39,40 +38,33 @@ class DartPeer(Peer):
         model = scenario.robot.model
         self._forces = np.zeros((len(self.commands), scenario.robot.nv))
         self._forces[:, model.actuator_joint] = self.commands
-        self._step = 0
 
-    def restart(self) -> None:
-        """Go back to `start`, at time 0."""
+    def place(self, q: Floats, v: Floats) -> None:
+        """Put the robot somewhere, at time 0."""
         self._world.reset()
-        self._robot.setPositions(self.start.q - self.scenario.robot.model.reference)
-        self._robot.setVelocities(self.start.v)
+        self._robot.setPositions(q)
+        self._robot.setVelocities(v)
         self._robot.setCommands(self._forces[0])
-        self._step = 0
 
-    def advance(self, steps: int) -> None:
+    def simulate(self, steps: int) -> None:
         """Simulate some steps, each with a call from Python: it has no loop of its own."""
-        step = self._world.step
+        step, command = self._world.step, self._robot.setCommands
         if len(self._forces) == 1:
             for _ in range(steps):
                 step(False)  # and keep the commands
-        else:
-            command = self._robot.setCommands
-            for forces in self._forces[self._step : self._step + steps]:
-                command(forces)
-                step(False)
-        self._step += steps
+            return
+        for forces in self._forces[self.done : self.done + steps]:
+            command(forces)
+            step(False)
 
-    def state(self) -> State:
+    def coordinates(self) -> tuple[Floats, Floats]:
         """Where it is now."""
-        position = self._robot.getPositions() + self.scenario.robot.model.reference
-        return State(position, np.array(self._robot.getVelocities()))
+        return self._robot.getPositions(), self._robot.getVelocities()
 
-    def touching(self) -> Touching:
-        """How it touched the ground in the last step."""
-        contacts = self._world.getLastCollisionResult().getContacts()
-        force = sum(abs(float(contact.force[2])) for contact in contacts)
-        depth = max((float(contact.penetrationDepth) for contact in contacts), default=0.0)
-        return Touching(len(contacts), force, depth)
+    def contacts(self) -> list[tuple[float, float]]:
+        """Force and depth of each contact in the last step."""
+        found = self._world.getLastCollisionResult().getContacts()
+        return [(abs(float(each.force[2])), float(each.penetrationDepth)) for each in found]
 
 
 def _world(scenario: Scenario, step: float, detector: str) -> tuple[Any, Any]:
@@ -109,14 +101,11 @@ def _skeleton(scenario: Scenario) -> Any:
     bodies: list[Any] = []
     for link in links(robot, least_radius=RADIUS):
         parent = bodies[link.parent] if link.parent >= 0 else None
-        if link.hinge:
-            hinge = dynamics.RevoluteJointProperties()
-            hinge.mAxis = link.axis
-            joint, body = skeleton.createRevoluteJointAndBodyNodePair(parent, hinge)
-        else:
-            slide = dynamics.PrismaticJointProperties()
-            slide.mAxis = link.axis
-            joint, body = skeleton.createPrismaticJointAndBodyNodePair(parent, slide)
+        kind = "Revolute" if link.hinge else "Prismatic"
+        properties = getattr(dynamics, f"{kind}JointProperties")()
+        properties.mAxis = link.axis
+        joined = getattr(skeleton, f"create{kind}JointAndBodyNodePair")
+        joint, body = joined(parent, properties)
         place = dartpy.math.Isometry3()
         place.set_translation(link.place)
         joint.setTransformFromParentBodyNode(place)

@@ -13,9 +13,8 @@ from pydrake.multibody import tree
 from pydrake.systems import analysis, framework, primitives
 
 from heelstrike.experiments.engines.links import links
-from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.peer import Engine, Floats, Peer
 from heelstrike.experiments.engines.scenario import Scenario
-from heelstrike.robot import State
 
 FASTEST = "tamsi" if hasattr(plants.DiscreteContactApproximation, "kTamsi") else "lagged"
 """Drake calls TAMSI deprecated; it is several times as fast as what is to take its place."""
@@ -74,43 +73,34 @@ class DrakePeer(Peer):
         logging.getLogger("drake").setLevel(logging.ERROR)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of the deprecated approximation
-            self._simulator, self._plant = _simulator(scenario, config, material)
-        self._context: Any = None
-        self._step = 0
+            self._simulator, self._plant = _simulator(scenario, self.commands, config, material)
+        self._context = self._plant.GetMyMutableContextFromRoot(
+            self._simulator.get_mutable_context()
+        )
 
-    def restart(self) -> None:
-        """Go back to `start`, at time 0."""
-        root = self._simulator.get_mutable_context()
-        root.SetTime(0.0)
-        self._context = self._plant.GetMyMutableContextFromRoot(root)
-        reference = self.scenario.robot.model.reference
-        self._plant.SetPositions(self._context, self.start.q - reference)
-        self._plant.SetVelocities(self._context, self.start.v)
+    def place(self, q: Floats, v: Floats) -> None:
+        """Put the robot somewhere, at time 0."""
+        self._simulator.get_mutable_context().SetTime(0.0)
+        self._plant.SetPositions(self._context, q)
+        self._plant.SetVelocities(self._context, v)
         self._simulator.Initialize()
-        self._step = 0
 
-    def advance(self, steps: int) -> None:
+    def simulate(self, steps: int) -> None:
         """Simulate some steps in one call."""
-        self._step += steps
-        self._simulator.AdvanceTo(self._step * self.step)
+        self._simulator.AdvanceTo((self.done + steps) * self.step)
 
-    def state(self) -> State:
+    def coordinates(self) -> tuple[Floats, Floats]:
         """Where it is now."""
-        position = self._plant.GetPositions(self._context)
-        velocity = self._plant.GetVelocities(self._context)
-        return State(position + self.scenario.robot.model.reference, np.array(velocity))
+        return self._plant.GetPositions(self._context), self._plant.GetVelocities(self._context)
 
-    def touching(self) -> Touching:
-        """How it touches the ground now."""
+    def contacts(self) -> list[tuple[float, float]]:
+        """Force and depth of each contact now."""
         found = self._plant.get_contact_results_output_port().Eval(self._context)
-        number = found.num_point_pair_contacts()
-        contacts = [found.point_pair_contact_info(i) for i in range(number)]
-        force = sum(abs(float(contact.contact_force()[2])) for contact in contacts)
-        depth = max((float(contact.point_pair().depth) for contact in contacts), default=0.0)
-        return Touching(number, force, depth)
+        each = map(found.point_pair_contact_info, range(found.num_point_pair_contacts()))
+        return [(abs(float(one.contact_force()[2])), float(one.point_pair().depth)) for one in each]
 
 
-def _simulator(scenario: Scenario, config: Any, material: Any) -> tuple[Any, Any]:
+def _simulator(scenario: Scenario, commands: Floats, config: Any, material: Any) -> tuple[Any, Any]:
     model = scenario.robot.model
     builder = framework.DiagramBuilder()
     plant, scene = plants.AddMultibodyPlant(config, builder)
@@ -126,7 +116,7 @@ def _simulator(scenario: Scenario, config: Any, material: Any) -> tuple[Any, Any
     )
     scene.collision_filter_manager().Apply(geometry.CollisionFilterDeclaration().ExcludeWithin(own))
     if scenario.robot.nu:
-        source = builder.AddSystem(_commands(scenario))
+        source = builder.AddSystem(_commands(scenario, commands))
         port = plant.get_actuation_input_port(tree.default_model_instance())
         builder.Connect(source.get_output_port(), port)
     return analysis.Simulator(builder.Build()), plant
@@ -179,21 +169,16 @@ def _add_robot(plant: Any, scenario: Scenario, material: Any) -> list[Any]:
     return bodies
 
 
-def _commands(scenario: Scenario) -> Any:
+def _commands(scenario: Scenario, commands: Floats) -> Any:
     """Source of the commands of the actuators, as polynomials of time."""
     feedback = scenario.feedback
-    if feedback is None:
-        return primitives.ConstantVectorSource(np.zeros(scenario.robot.nu))
-    if len(feedback.parameters.begins) == 1 and feedback.parameters.coefficients.shape[2] == 1:
-        return primitives.ConstantVectorSource(feedback.command([0.0])[0])
+    if feedback is None or len(commands) == 1:  # they never change
+        return primitives.ConstantVectorSource(commands[0])
+    law = feedback.parameters
     pieces = [
-        np.array([[polynomial.Polynomial(row)] for row in piece])
-        for piece in feedback.parameters.coefficients
+        np.array([[polynomial.Polynomial(row)] for row in piece]) for piece in law.coefficients
     ]
-    breaks = [
-        *feedback.parameters.begins,
-        max(2.0 * scenario.duration, 2.0 * feedback.parameters.begins[-1]),
-    ]
+    breaks = [*law.begins, 2.0 * max(scenario.duration, law.begins[-1])]
     return primitives.TrajectorySource(trajectories.PiecewisePolynomial(pieces, breaks))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from heelstrike.experiments.engines.peer import Engine, Peer, Touching
+from heelstrike.experiments.engines.peer import Engine, Peer
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
 
@@ -65,86 +66,69 @@ class MuJoCoPeer(Peer):
                 geom.solimp = 0.9999, 0.9999, 1e-3, 0.5, 2.0
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
-        self._step = 0
-        self._make_room(self.steps)
+        self.zero = np.zeros(self.model.nq)
+        self._states, self._none = self._room(1, self.steps)
 
-    def _make_room(self, steps: int) -> None:
-        """Make room for the states of so many steps, which `rollout` returns."""
-        self._states = np.zeros((1, steps, mujoco.mj_stateSize(self.model, KIND)))
-        self._none = np.zeros((1, steps, self.model.nsensordata))
+    def _room(self, runs: int, steps: int) -> tuple[Floats, Floats]:
+        """Room for the states and the (no) measurements of runs, which `rollout` returns."""
+        size = mujoco.mj_stateSize(self.model, KIND)
+        return np.zeros((runs, steps, size)), np.zeros((runs, steps, self.model.nsensordata))
 
-    def _packed(self, state: State) -> Floats:
-        mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:] = state.q
-        self.data.qvel[:] = state.v
-        packed = np.zeros((1, mujoco.mj_stateSize(self.model, KIND)))
+    def _packed(self) -> Floats:
+        packed = np.zeros((1, self._states.shape[2]))
         mujoco.mj_getState(self.model, self.data, packed[0], KIND)
         return packed
 
-    def restart(self) -> None:
-        """Go back to `start`, at time 0."""
+    def place(self, q: Floats, v: Floats) -> None:
+        """Put the robot somewhere, at time 0."""
         mujoco.mj_resetData(self.model, self.data)
-        self.data.qpos[:] = self.start.q
-        self.data.qvel[:] = self.start.v
-        self._step = 0
+        self.data.qpos[:] = q
+        self.data.qvel[:] = v
 
-    def advance(self, steps: int) -> None:
+    def simulate(self, steps: int) -> None:
         """Simulate some steps: several in one `rollout`."""
         if steps == 1:
-            self.data.ctrl[:] = self.command(self._step)
+            self.data.ctrl[:] = self.commands[min(self.done, len(self.commands) - 1)]
             mujoco.mj_step(self.model, self.data)
-        else:
-            now = np.zeros((1, self._states.shape[2]))
-            mujoco.mj_getState(self.model, self.data, now[0], KIND)
-            varying = len(self.commands) > 1
-            control = self.commands[self._step : self._step + steps] if varying else self.commands
-            if steps > self._states.shape[1]:
-                self._make_room(steps)
-            states = self._states[:, :steps]
-            rollout.rollout(
-                self.model,
-                self.data,
-                now,
-                control[None],
-                nstep=steps,
-                state=states,
-                sensordata=self._none[:, :steps],
-            )
-            mujoco.mj_setState(self.model, self.data, states[0, -1], KIND)
-        self._step += steps
+            return
+        varying = len(self.commands) > 1
+        control = self.commands[self.done : self.done + steps] if varying else self.commands
+        if steps > self._states.shape[1]:
+            self._states, self._none = self._room(1, steps)
+        states, none = self._states[:, :steps], self._none[:, :steps]
+        now = self._packed()
+        rollout.rollout(
+            self.model, self.data, now, control[None], nstep=steps, state=states, sensordata=none
+        )
+        mujoco.mj_setState(self.model, self.data, states[0, -1], KIND)
 
-    def state(self) -> State:
+    def coordinates(self) -> tuple[Floats, Floats]:
         """Where it is now."""
-        return State(self.data.qpos.copy(), self.data.qvel.copy())
+        return self.data.qpos, self.data.qvel
 
-    def touching(self) -> Touching:
-        """How it touched the ground in the last step."""
-        force, total = np.zeros(6), 0.0
+    def contacts(self) -> list[tuple[float, float]]:
+        """Force and depth of each contact in the last step."""
+        force = np.zeros((self.data.ncon, 6))
         for i in range(self.data.ncon):
-            mujoco.mj_contactForce(self.model, self.data, i, force)
-            total += force[0]
-        depth = max((-contact.dist for contact in self.data.contact), default=0.0)
-        return Touching(self.data.ncon, total, depth)
+            mujoco.mj_contactForce(self.model, self.data, i, force[i])
+        return [(f[0], -contact.dist) for f, contact in zip(force, self.data.contact, strict=True)]
 
     def batch_work(self, starts: Sequence[State], threads: int) -> Callable[[], float]:
         """Return what simulates from several states on threads and returns the seconds it took."""
-        states = np.concatenate([self._packed(start) for start in starts])
+        packed = []
+        for start in starts:
+            self.place(start.q, start.v)
+            packed.append(self._packed())
         data = [mujoco.MjData(self.model) for _ in range(threads)]
-        out = np.zeros((len(starts), self.steps, states.shape[1]))
-        none = np.zeros((len(starts), self.steps, self.model.nsensordata))
+        out, none = self._room(len(starts), self.steps)
+        run = partial(
+            rollout.rollout, self.model, data, np.concatenate(packed), self.commands[None],
+            nstep=self.steps, state=out, sensordata=none, persistent_pool=True,
+        )  # fmt: skip
 
         def work() -> float:
             begin = perf_counter()
-            rollout.rollout(
-                self.model,
-                data,
-                states,
-                self.commands[None],
-                nstep=self.steps,
-                state=out,
-                sensordata=none,
-                persistent_pool=True,
-            )
+            run()
             return perf_counter() - begin
 
         return work

@@ -67,6 +67,12 @@ class Peer(ABC):
         Steps in the duration of the scenario.
     start : State
         Where runs start; `settle` moves it.
+    commands : (steps or 1, nu) float
+        Commands c of the law of control in each step; one row if they never change.
+    zero : (nq,) float
+        Our position where the engine's coordinates are zero: the reference, unless it has ours.
+    done : int
+        Steps since the start.
     """
 
     settling: ClassVar[float] = 0.0
@@ -81,14 +87,22 @@ class Peer(ABC):
         self.steps = round(scenario.duration / step)
         self.start = scenario.state
         self.commands = _commands(scenario, step, self.steps)
+        self.zero = scenario.robot.model.reference
+        self.done = 0
 
     @abstractmethod
-    def restart(self) -> None:
-        """Go back to `start`, at time 0."""
+    def place(self, q: Floats, v: Floats) -> None:
+        """Put the robot somewhere, at time 0.
+
+        Parameters
+        ----------
+        q, v : (nq,) float, (nv,) float
+            Position in the engine's coordinates, and velocity.
+        """
 
     @abstractmethod
-    def advance(self, steps: int) -> None:
-        """Simulate some steps in as few calls as the engine allows.
+    def simulate(self, steps: int) -> None:
+        """Simulate some steps after those that are `done`, in as few calls as the engine allows.
 
         Parameters
         ----------
@@ -97,28 +111,39 @@ class Peer(ABC):
         """
 
     @abstractmethod
-    def state(self) -> State:
-        """Where it is now."""
+    def coordinates(self) -> tuple[Any, Any]:
+        """Position in the engine's coordinates, and velocity, now."""
 
     @abstractmethod
-    def touching(self) -> Touching:
-        """How it touches the ground now."""
+    def contacts(self) -> list[tuple[float, float]]:
+        """Normal force (N) and depth (m) of each contact that its solver is given."""
 
-    def command(self, step: int) -> Floats:
-        """Command of each actuator in a step, (nu,).
+    def restart(self) -> None:
+        """Go back to `start`, at time 0."""
+        self.done = 0
+        self.place(self.start.q - self.zero, self.start.v)
+
+    def advance(self, steps: int) -> None:
+        """Simulate some steps.
 
         Parameters
         ----------
-        step : int
-            Number of the step, from 0.
-
-        Returns
-        -------
-        (nu,) float
-            Command c of the law of control.
+        steps : int
+            How many.
         """
-        row: Floats = self.commands[min(step, len(self.commands) - 1)]
-        return row
+        self.simulate(steps)
+        self.done += steps
+
+    def state(self) -> State:
+        """Where it is now."""
+        q, v = self.coordinates()
+        return State(np.asarray(q) + self.zero, v)
+
+    def touching(self) -> Touching:
+        """How it touches the ground now."""
+        contacts = self.contacts()
+        depth = max((depth for _, depth in contacts), default=0.0)
+        return Touching(len(contacts), sum(force for force, _ in contacts), depth)
 
     def settle(self, seconds: float) -> None:
         """Let it sink in first: start from where it is after a while.
@@ -130,7 +155,7 @@ class Peer(ABC):
         """
         self.restart()
         self.advance(round(seconds / self.step))
-        self.start = State(self.state().q, self.state().v)
+        self.start = self.state()
 
     def run(self, steps: int | None = None) -> float:
         """Simulate from the start, to the end or some steps; return the seconds it took.

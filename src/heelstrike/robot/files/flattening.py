@@ -27,6 +27,7 @@ Floats = NDArray[np.float64]
 
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 KINDS = ("free", "ball", "slide", "hinge")
+LONGEST_TRAIN = 20  # joints each of which follows the one before
 MANY = 12  # joints that are named in a remark
 SHOWN = 4  # how many culprits a message lists before it counts the rest
 LATERAL = (1e-2, 5e-2)
@@ -160,7 +161,7 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
     ]
     followers = list(_followers(model))
     why = dict.fromkeys(spatial, "leaves the plane")
-    for _ in followers:
+    for _ in followers[:LONGEST_TRAIN]:
         for follower, leader, _ in followers:
             if keeps[follower] and (leader < 0 or not keeps[leader]):
                 keeps[follower] = False
@@ -255,7 +256,7 @@ def _positions(model: Any, options: Options, label: str) -> Floats:
             )
         q[model.jnt_qposadr[joint]] = value
     followers = list(_followers(model))
-    for _ in followers:  # one may follow another
+    for _ in followers[:LONGEST_TRAIN]:
         for joint, leader, factors in followers:
             if _name(model, joint) not in pose:
                 place = model.jnt_qposadr[joint]

@@ -134,7 +134,7 @@ class TimeStepping(Method):
         try:
             object.__setattr__(self, "scheme", Scheme(self.scheme))
         except ValueError:
-            names = ", ".join(str(scheme) for scheme in Scheme)
+            names = ", ".join(f"Scheme.{scheme.name}" for scheme in Scheme)
             raise SimulationError(
                 f"unknown scheme {self.scheme!r}; choose one of {names}"
             ) from None

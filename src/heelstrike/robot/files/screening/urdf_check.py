@@ -105,7 +105,7 @@ def check_urdf(root: Element, label: str) -> None:
     _check(root, "the robot", label, strange)
     massive = {
         link.get("name", "") for link in root.iterfind("link") if link.find("inertial") is not None
-    }
+    } - {"world"}
     for joint in root.iterfind("joint"):
         parent = joint.find("parent")
         # The joints of a floating base, on links without mass, have no limits.
