@@ -17,7 +17,7 @@ from heelstrike.robot.assembly import UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions, Options
-from heelstrike.robot.files.saving import body_links
+from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label

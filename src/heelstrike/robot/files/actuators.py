@@ -142,7 +142,7 @@ def _tell_of_drives(
             for name, drive in zip(joints, drives, strict=True)
             if drive.commands and EFFORT not in drive.commands
         ],
-        "are driven by several transmissions, which are taken as one motor with the inertia of all": [
+        "are driven by several transmissions: one motor is made of them, with the inertia of all": [
             name for name, drive in zip(joints, drives, strict=True) if drive.motors > 1
         ],
         "have a motor and no effort limit: its torque is unlimited": [
@@ -214,7 +214,7 @@ def _law(file: MujocoFile, actuator: int) -> str:
     _, stiffness, damping = (float(number) for number in model.actuator_biasprm[actuator, :3])
     filtered = model.actuator_dyntype[actuator] != NO_ACTIVATION
     if model.actuator_gaintype[actuator] == FIXED_GAIN and stiffness == -gain != 0.0:
-        law = f"position servo (kp {gain:g}, kv {-damping:g})"
+        law = f"position servo (kp {gain:g}, kv {0.0 - damping:g})"
     elif model.actuator_gaintype[actuator] == FIXED_GAIN and damping == -gain != 0.0:
         law = f"velocity servo (kv {gain:g})"
     elif (

@@ -104,8 +104,7 @@ def _expand(file: str, arguments: dict[str, str], packages: list[str]) -> str:
     ament.packages = inner  # type: ignore[attr-defined]
     sys.modules |= {"ament_index_python": ament, "ament_index_python.packages": inner}
 
-    import xacro
-
+    xacro = importlib.import_module("xacro")
     try:
         document = xacro.process_file(file, mappings=arguments)
     except xacro.XacroException as error:

@@ -57,7 +57,7 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
         mesh.set("file", str(resolved(path)))
     refuse_large_meshes(size, label)
     if missing:
-        _leave_out(root, missing, label)
+        _leave_out(root, missing)
     # One more compiler element: MuJoCo reads them all, the last one last.
     SubElement(root, "compiler", {"strippath": "false"})
     return True
@@ -78,7 +78,7 @@ def is_mesh(file: Path) -> bool:
     return len(header) == 84 and 0 < faces <= MOST_FACES and size >= 84 + 50 * faces
 
 
-def _leave_out(root: Element, missing: dict[str, str], label: str) -> None:
+def _leave_out(root: Element, missing: dict[str, str]) -> None:
     """Leave out geoms whose meshes are not there, on bodies that state their inertia themselves.
 
     Raises

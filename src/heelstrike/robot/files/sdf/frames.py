@@ -44,6 +44,11 @@ class Frames:
             name = each
         return self.found[name]
 
+    def of_joint(self, joint: Element) -> Floats:
+        """Pose of the frame of a joint in the model."""
+        name = joint.get("name", "")
+        return self.pose(name if self.tag(name) == "joint" else key_of(joint), joint)
+
     def link(self, name: str, asking: Element) -> str:
         """Link that a frame is fixed to."""
         seen: set[str] = set()
@@ -62,6 +67,11 @@ class Frames:
         return self.given[name][0].tag if name in self.given else ""
 
 
+def key_of(joint: Element) -> str:
+    """Name of the frame of a joint that is called as a link is: no element can have it."""
+    return f"joint\0{joint.get('name', '')}"
+
+
 def frames_of(model: Element, joints: list[Element], label: str) -> Frames:
     """Return the frames of links, joints and ``<frame>`` of a model.
 
@@ -73,6 +83,8 @@ def frames_of(model: Element, joints: list[Element], label: str) -> Frames:
     frames = Frames(label, {}, {MODEL: np.eye(4), WORLD: np.eye(4)})
     for element in (*model.iterfind("link"), *joints, *model.iterfind("frame")):
         name = element.get("name", "")
+        if element.tag == "joint" and frames.tag(name) == "link":
+            name = key_of(element)  # older files call them alike
         if not name or name in frames.given:
             what = f"two elements are called {name[:60]!r}" if name else "it has no name"
             raise error(element, label, f"<{element.tag}>: {what}. Rename it.")

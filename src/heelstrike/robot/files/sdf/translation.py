@@ -55,6 +55,7 @@ class _Model:
     actuators: Node
     assets: Node
     told: dict[str, list[str]] = field(default_factory=dict)
+    shapes: set[str] = field(default_factory=set)
     mesh_size: int = 0
 
     def tell(self, what: str, name: str) -> None:
@@ -98,10 +99,10 @@ def as_mjcf(sdf: Node, directory: Path, packages: Sequence[Path], label: str) ->
         if child.tag in ("joint", "drake:joint")
     ]
     frames = frames_of(element, joints, label)
-    placed = transform(element.find("pose"), label)
+    placed: Floats = transform(element.find("pose"), label)
     if element.get("placement_frame"):
-        placed = placed @ np.linalg.inv(frames.pose(element.get("placement_frame", ""), element))
-    frames.found[WORLD] = np.linalg.inv(placed)
+        placed = placed @ _inverse(frames.pose(element.get("placement_frame", ""), element))
+    frames.found[WORLD] = _inverse(placed)
     root = Node("mujoco", {"model": element.get("name", "") or "robot"})
     root.line = getattr(sdf, "line", 0)
     _put(root, sdf, "compiler", angle="radian", autolimits="true", strippath="false")
@@ -215,10 +216,10 @@ def _write_tree(model: _Model, element: Element, joints: list[Element], world: N
 def _below(model: _Model, link: str, joint: Element | None, parent: str) -> Floats:
     """Pose of a link in the link (or world) that it hangs on."""
     pose, asking = model.frames.pose, model.frames.given[link][0]
-    above = np.linalg.inv(pose(parent, asking))
+    above = _inverse(pose(parent, asking))
     if joint is not None and joint.get("type") == PLANAR:
         # Drake's joints begin where the two frames that they connect are one.
-        child = np.linalg.inv(pose(word(joint, "child"), joint)) @ pose(link, asking)
+        child = _inverse(pose(word(joint, "child"), joint)) @ pose(link, asking)
         return above @ pose(word(joint, "parent"), joint) @ child
     return above @ pose(link, asking)
 
@@ -285,6 +286,10 @@ def _write_shape(model: _Model, collision: Element, body: Node, link: str) -> No
         friction = collision.find("surface/friction/ode/mu")
         if friction is not None:
             made["friction"] = _text(numbers(friction, 1, label))
+        name = collision.get("name", "")
+        if name and name not in model.shapes:
+            model.shapes.add(name)
+            made["name"] = name
         made |= _placed(_shape_pose(model, collision, link))
         _put(body, shape, "geom", **made)  # type: ignore[arg-type]
 
@@ -296,7 +301,7 @@ def _shape_pose(model: _Model, collision: Element, link: str) -> Floats:
     if base:
         frames = model.frames
         there = frames.pose(base, collision)
-        place = np.linalg.inv(frames.pose(link, collision)) @ there @ place
+        place = _inverse(frames.pose(link, collision)) @ there @ place
     return place
 
 
@@ -331,8 +336,8 @@ def _mesh(model: _Model, shape: Element, link: str) -> dict[str, str]:
 
 def _write_joint(model: _Model, joint: Element, link: str, body: Node, sense: float) -> None:
     kind, name = joint.get("type", ""), joint.get("name", "")
-    here = np.linalg.inv(model.frames.pose(link, joint))
-    place = here @ model.frames.pose(name, joint)
+    here = _inverse(model.frames.pose(link, joint))
+    place: Floats = here @ model.frames.of_joint(joint)
     if kind in HINGES or kind in SLIDES:
         _write_axis(model, joint, joint.find("axis"), name, body, here, place, sense)
     elif kind in TWO_HINGES:
@@ -395,7 +400,7 @@ def _write_axis(
     motor = {"name": name, "joint": name}
     if 0.0 < effort < NO_LIMIT:
         motor["ctrlrange"] = _text([-effort, effort])
-    else:
+    elif effort < 0.0:
         model.tell("joints without <effort>, which are driven without limit", name)
     _put(model.actuators, joint, "motor", **motor)
 
@@ -413,6 +418,14 @@ def _direction(model: _Model, axis: Element, here: Floats, place: Floats) -> Flo
         place = here @ model.frames.pose(MODEL, axis)
     direction: Floats = place[:3, :3] @ given
     return direction / np.linalg.norm(direction)
+
+
+def _inverse(place: Floats) -> Floats:
+    """Return the pose that undoes another."""
+    result = np.eye(4)
+    result[:3, :3] = place[:3, :3].T
+    result[:3, 3] = -place[:3, :3].T @ place[:3, 3]
+    return result
 
 
 def _placed(place: Floats) -> dict[str, str]:
