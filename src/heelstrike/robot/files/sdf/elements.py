@@ -45,6 +45,11 @@ KNOWN = {
     "limit": "lower upper effort velocity | stiffness dissipation",
     "dynamics": "damping friction spring_reference spring_stiffness",
     "frame": "pose",
+    "surface": "friction contact | bounce soft_contact",
+    "friction": "ode | torsional bullet",
+    "contact": "collide_bitmask | collide_without_contact collide_without_contact_bitmask "
+    "category_bitmask poissons_ratio elastic_modulus ode bullet",
+    "ode": "mu | mu2 fdir1 slip1 slip2",
 }
 
 ONE = {"pose", "inertial", "mass", "inertia", "geometry", "parent", "child", "axis", "axis2"} | {
@@ -77,7 +82,7 @@ def check(element: Element, label: str) -> Iterator[str]:
         if child.tag in seen and child.tag in ONE:
             raise error(child, label, f"<{tag}> has two <{child.tag}>. Keep one.")
         seen.add(child.tag)
-        if tag in KNOWN and ":" not in child.tag and child.tag not in known:
+        if ":" not in child.tag and child.tag not in known:
             near = difflib.get_close_matches(child.tag[:LONGEST_GUESS], sorted(known), n=1)
             guess = f" (did you mean <{near[0]}>?)" if near else ""
             yield f"<{child.tag[:60]}> in <{tag}>, line {getattr(child, 'line', 0)}{guess}"

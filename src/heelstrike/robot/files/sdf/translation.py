@@ -285,7 +285,10 @@ def _write_shape(model: _Model, collision: Element, body: Node, link: str) -> No
     if made:
         friction = collision.find("surface/friction/ode/mu")
         if friction is not None:
-            made["friction"] = _text(numbers(friction, 1, label))
+            (value,) = numbers(friction, 1, label)
+            if value < 0.0:
+                raise error(friction, label, f"<mu> is {value:g}; it must not be negative.")
+            made["friction"] = _text([value])
         name = collision.get("name", "")
         if name and name not in model.shapes:
             model.shapes.add(name)
