@@ -328,6 +328,7 @@ def _description(robot: Robot) -> str:
         f"{robot.nc} contact points",
         "base: " + ("floats (x, z, pitch)" if robot.floating else "does not float as x, z, pitch"),
         f"left and right: {'alike' if robot.mirror is not None else 'not alike, or not named'}",
+        f"drives: {_drives(robot)}",
         "",
         *_table(robot),
         "",
@@ -345,6 +346,14 @@ def _description(robot: Robot) -> str:
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
+
+
+def _drives(robot: Robot) -> str:
+    """What moves the joints, in a line."""
+    sprung = [robot.joint_names[joint] for joint in np.flatnonzero(robot.model.stiffness)]
+    told = f"motors at {robot.nu} joints" if robot.nu else "no motors"
+    told += f"; springs at {', '.join(sprung)}" if sprung else ""
+    return told + ("" if robot.nc else "; no contact points, so it can swing or fly but not stand")
 
 
 def _of_locked(robot: Robot) -> list[str]:

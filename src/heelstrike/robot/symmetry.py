@@ -308,18 +308,23 @@ def _signs(model: Model, joint: Integers) -> Floats:
 
 
 def _contact_pairs(model: Model, joint: Integers) -> Integers:
-    """Counterpart of every contact point: those of two links are matched as near as they can be."""
-    from scipy.optimize import linear_sum_assignment
-
+    """Counterpart of every contact point: of two links, the nearest points first."""
     result = np.arange(len(model.contact_link))
     for link, other in enumerate(joint):
-        if link >= other:
-            continue
         here, there = (np.flatnonzero(model.contact_link == one) for one in (link, other))
+        if link >= other or not len(here) or not len(there):
+            continue
         apart = model.contact_position[here][:, None] - model.contact_position[there]
         change = np.abs(model.contact_radius[here][:, None] - model.contact_radius[there])
-        one, twin = linear_sum_assignment(np.hypot(apart[..., 0], apart[..., 1]) + change)
-        result[here[one]], result[there[twin]] = there[twin], here[one]
+        distance = np.hypot(apart[..., 0], apart[..., 1]) + change
+        missing = min(distance.shape)
+        for place in np.argsort(distance, axis=None, kind="stable"):
+            one, twin = here[place // len(there)], there[place % len(there)]
+            if result[one] == one and result[twin] == twin:
+                result[one], result[twin] = twin, one
+                missing -= 1
+            if not missing:
+                break
     return result
 
 

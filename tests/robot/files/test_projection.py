@@ -375,7 +375,7 @@ def test_side_offsets_that_symmetry_cancels_are_none() -> None:
 
 def test_a_small_asymmetry_is_said_and_a_large_one_refused() -> None:
     with pytest.warns(RobotWarning, match=r"projection is rough, because its centre of mass is"):
-        read_mjcf(humanoid().replace('pos="0.02 0 0.3"', 'pos="0.02 0.02 0.3"'), projected=True)
+        read_mjcf(humanoid().replace('pos="0.02 0 0.3"', 'pos="0.02 0.009 0.3"'), projected=True)
     with pytest.raises(RobotError, match=r"its centre of mass is .* to the side of its middle"):
         read_mjcf(humanoid().replace('pos="0.02 0 0.3"', 'pos="0.02 0.09 0.3"'), projected=True)
 
