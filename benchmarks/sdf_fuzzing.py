@@ -32,7 +32,7 @@ from corpus.peers import ROOT, Drake, Refused, peer_of
 
 from heelstrike.errors import RobotError
 from heelstrike.robot import Robot, builtin_robots, load_robot
-from heelstrike.robot.files.xacro import expanded
+from heelstrike.robot.files.ros.xacro import expanded
 
 LONGEST = 2.0
 TOLERANCE = 1e-9

@@ -123,7 +123,7 @@ def difference(robot: Robot, peer: Peer) -> float:
 def _text(path: Path, options: dict[str, Any]) -> str:
     if "xacro" not in options:
         return path.read_text(encoding="utf-8", errors="replace")
-    from heelstrike.robot.files.xacro import expanded  # the same macros, by the package xacro
+    from heelstrike.robot.files.ros.xacro import expanded  # the same macros, by the package xacro
 
     given = options["xacro"]
     return expanded(path, given if isinstance(given, dict) else {}, (), str(path))

@@ -19,7 +19,7 @@ from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
-from heelstrike.robot.library import builtin_robots, load_robot
+from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
 from heelstrike.robot.robot import Foot, Robot
@@ -165,7 +165,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
             if path is not None:
                 findings += _of_inertias(path, how)
     said = dict.fromkeys(str(one.message) for one in caught if one.category is RobotWarning)
-    told_below = ("left and right differ", UNLIKELY)
+    told_below = ("left and right differ", UNLIKELY, NO_MOTORS, NO_CONTACTS)
     findings += [
         Finding(FindingKind.FILE, words)
         for words in said

@@ -119,8 +119,8 @@ class Model(Bundle):
         Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
         infinite where there is none.
     stall_torque : (nv,) float
-        Torque of the motor (N m; N of a slide) at rest and full voltage, seen at the joint; infinite
-        if unknown.
+        Torque of the motor (N m; N of a slide) at rest and full voltage, seen at the joint;
+        infinite if unknown.
     no_load_speed : (nv,) float
         Speed of the joint (rad/s, m/s) at which that torque is zero, falling along a straight line;
         infinite if unknown.

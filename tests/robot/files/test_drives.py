@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from heelstrike.errors import RobotError
-from heelstrike.robot import Robot, RobotWarning, read_mjcf
+from heelstrike.robot import (
+    Robot,
+    RobotBuilder,
+    RobotWarning,
+    inspect_robot,
+    load_robot,
+    read_mjcf,
+)
+from heelstrike.sim import EventDriven, simulate
 
 
 def link(name: str) -> str:
@@ -130,3 +139,35 @@ def test_two_transmissions_of_one_joint_are_one_motor() -> None:
 def test_what_cannot_be_meant_is_refused(gear: str, words: str) -> None:
     with pytest.raises(RobotError, match=words):
         quiet(leg(gear))
+
+
+def test_what_drives_a_robot_is_said_at_load_and_by_inspect(tmp_path: Path) -> None:
+    """A passive leg with a spring at its toe, which touches nothing."""
+    toe = """<mujoco><compiler angle="radian"/><worldbody><body name="foot">
+      <joint name="ankle" axis="0 1 0"/><geom size="0.1" contype="0" conaffinity="0"/>
+      <body name="toe" pos="0.1 0 0"><joint name="toe" axis="0 1 0" stiffness="3"/>
+      <geom size="0.05" contype="0" conaffinity="0"/></body></body></worldbody></mujoco>"""
+    path = tmp_path / "foot.xml"
+    path.write_text(toe, encoding="utf-8")
+    with pytest.warns(RobotWarning) as caught:
+        load_robot(path)
+    said = [str(one.message) for one in caught]
+    assert any("no joint has a motor" in words for words in said)
+    assert any("it has no contact points" in words for words in said)
+    text = inspect_robot(path).text()
+    assert "drives: no motors; springs at toe; no contact points" in text
+
+
+def test_a_toe_on_a_spring_swings_as_its_closed_form() -> None:
+    """A wheel about its centre on a spring: q = a cos(√(k/J) t), the energy stays."""
+    build = RobotBuilder("wheel")
+    build.hinge("toe", None, mass=1, inertia=0.02, stiffness=3.0)
+    robot = build.build()
+    run = simulate(
+        robot,
+        state=robot.state({"toe": 0.3}),
+        duration=1.0,
+        method=EventDriven(rtol=1e-10, atol=1e-12),
+    )
+    expected = 0.3 * np.cos(np.sqrt(3.0 / 0.02) * run.time)
+    np.testing.assert_allclose(run.q[:, 0], expected, rtol=0, atol=1e-7)

@@ -10,7 +10,7 @@ import pytest
 
 from heelstrike.errors import RobotError
 from heelstrike.robot import Robot, RobotWarning, load_robot
-from heelstrike.robot.files import xacro
+from heelstrike.robot.files.ros import xacro
 
 HEAD = '<robot name="leg" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 MACRO = """<xacro:macro name="limb" params="name mass">

@@ -18,6 +18,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.flattening import Coordinate, flatten
 from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
 from heelstrike.robot.files.options import Options
+from heelstrike.robot.files.ros.xacro import expanded
 from heelstrike.robot.files.screening.screening import Screened, screen
 from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
 from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
@@ -30,7 +31,6 @@ from heelstrike.robot.files.urdf import (
     missing_moments,
     urdf_text,
 )
-from heelstrike.robot.files.xacro import expanded
 from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.robot import LockedJoint
 from heelstrike.robot.warning import warn

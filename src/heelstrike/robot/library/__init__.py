@@ -14,6 +14,10 @@ from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
 
+NO_MOTORS = "no joint has a motor"
+NO_CONTACTS = "it has no contact points"
+"""What is said of a robot from a file that cannot be driven, or cannot stand."""
+
 _HERE = Path(__file__).parent
 _FILE_TYPES = (".xml", ".mjcf", ".urdf", ".sdf", ".world", ".xacro")
 
@@ -89,14 +93,11 @@ def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions])
 def _tell_of_what_is_missing(robot: Robot) -> None:
     """Warn of a robot from elsewhere that cannot be driven, or cannot stand."""
     if not robot.nu:
-        warn(
-            f"{robot.source}: no joint has a motor: gravity, springs and pushes alone move this "
-            "robot."
-        )
+        warn(f"{robot.source}: {NO_MOTORS}: gravity, springs and pushes alone move this robot.")
     if not robot.nc:
         warn(
-            f"{robot.source}: it has no contact points: it can swing or fly, but not stand. Give "
-            "its feet boxes, or spheres at heel and toe, that collide."
+            f"{robot.source}: {NO_CONTACTS}: it can swing or fly, but not stand. Give its feet "
+            "boxes, or spheres at heel and toe, that collide."
         )
 
 

@@ -89,7 +89,7 @@ def expanded(path: Path, arguments: Mapping[str, str], packages: Sequence[Path],
 
 def _expand(file: str, arguments: dict[str, str], packages: list[str]) -> str:
     """Expand a file in this process, with packages found as heelstrike finds them."""
-    find = runpy.run_path(str(Path(__file__).with_name("packages.py")))["find_package"]
+    find = runpy.run_path(str(Path(__file__).parents[1] / "packages.py"))["find_package"]
 
     def share_directory(name: str) -> str:
         folder = find(name, Path(file).parent, [Path(each) for each in packages])
