@@ -309,7 +309,7 @@ def test_the_estimate_is_exact_for_cubics() -> None:
         ({"kd": np.nan}, "kd"),
         ({"kp": [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]}, "kp"),
         ({"kd": [1.0, 1.0, np.nan, 1.0, 1.0, 1.0]}, "kd"),
-        ({"kp": [1.0, 2.0]}, "kp must be one number or 6"),
+        ({"kp": [1.0, 2.0]}, "kp must be one finite number or 6"),
     ],
 )
 def test_gains_are_checked(options: dict[str, object], words: str) -> None:

@@ -12,12 +12,14 @@ Kernels written into the class are its methods, in compiled code as in Python.
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 from llvmlite import ir
@@ -42,7 +44,7 @@ _BYTES = 8
 _EXTENT = re.compile(r"(?:(\d+)\s*)?([A-Za-z]\w*)?(?:\s*\+\s*(\d+))?")
 
 # Names of no members: where a bundle keeps what is its own, and an argument of `allocate`.
-_TAKEN = ("_cells", "_extents", "_table", "dtype")
+_TAKEN = ("_cells", "_extents", "_block", "_places", "_table", "dtype")
 
 _Some = TypeVar("_Some", bound="Bundle")
 
@@ -69,7 +71,7 @@ class Member:
     shape: tuple[str | int, ...] = ()
     address: bool = False
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[Any]:
         """Of its numbers: 64 bits."""
         return np.dtype(np.float64 if self.kind is float else np.int64)
@@ -207,13 +209,20 @@ class Bundle:
             setattr(cls, name, _cell_property(place, cls.declared[name]))
 
     def __init__(self, **members: Any) -> None:
+        for name, member in self.declared.items():
+            if name not in members and member.role != "cell":
+                raise TypeError(f"{type(self).__name__} is made with {name}, which is missing")
         own = self.__dict__
         own["_cells"] = np.zeros(self._cell_count, dtype=np.int64)
-        extents = own["_extents"] = {}
+        own["_extents"] = {}
+        self._take(members)
+
+    def _take(self, members: dict[str, Any]) -> None:
+        """Make members one's own, each of the shape that it is declared with."""
+        own = self.__dict__
+        extents = own["_extents"]
         for name, member in self.declared.items():
             if name not in members:
-                if member.role != "cell":
-                    raise TypeError(f"{type(self).__name__} is made with {name}, which is missing")
                 continue
             value = members.pop(name)
             if member.role == "cell":
@@ -258,27 +267,32 @@ class Bundle:
             If an extent is missing, or something is given that is neither a member nor a whole
             number. Extents that no array has are ignored: those of a robot fit every bundle.
         """
-        extents = {
-            name: value
-            for name, value in given.items()
-            if name not in cls.declared or cls.declared[name] == Member("number", int)
-        }
+        kind: Any = cls
         members = {name: value for name, value in given.items() if name in cls.declared}
+        extents = {name: value for name, value in given.items() if name not in members}
+        extents |= {name: members[name] for name in _whole_numbers(kind) if name in members}
         for name, value in extents.items():
             if not isinstance(value, int | np.integer):
                 raise TypeError(f"{cls.__name__} has no {name}, and an extent is a whole number")
-        for name, member in cls.declared.items():
-            if name in members or member.role == "cell":
-                continue
-            if member.role == "part":
-                members[name] = member.kind.allocate(dtype=dtype, **extents)  # type: ignore[attr-defined]
-            elif member.role == "number":
-                members[name] = member.kind()
-            else:
-                size = tuple(_extent(each, extents) for each in member.shape)
-                floats = dtype if dtype is not None and member.kind is float else member.dtype
-                members[name] = np.zeros(size, dtype=floats)
-        return cls(**members)
+        plan = _plan(kind, frozenset(members), tuple(extents.items()))
+        block = np.zeros(plan.size, dtype=np.int64)
+        bundle = cls.__new__(cls)
+        own = bundle.__dict__
+        own["_cells"] = np.ndarray(cls._cell_count, np.int64, block, plan.cells)
+        own["_extents"] = plan.extents.copy()
+        for name, shape, numbers, place in plan.arrays:
+            own[name] = np.ndarray(shape, numbers, block, place)
+        if dtype is None:
+            own["_block"], own["_places"] = block, plan.places
+        else:
+            floats = (each for each in plan.arrays if each[2].kind == "f")
+            own |= {name: np.zeros(shape, dtype) for name, shape, _, _ in floats}
+        for name, number in plan.numbers:
+            own[name] = number
+        for name, part in plan.parts:
+            own[name] = part.allocate(dtype=dtype, **extents)
+        bundle._take(members)
+        return bundle
 
     @classmethod
     def compiled_type(cls) -> Any:
@@ -305,32 +319,44 @@ class Bundle:
 
     def _new_table(self) -> np.ndarray[Any, np.dtype[np.int64]]:
         words: list[int] = []
-        cells = int(self.__dict__["_cells"].ctypes.data)
+        own = self.__dict__
+        block, places, begin = own.get("_block"), own.get("_places", {}), 0
+        if block is None:
+            cells = _address(own["_cells"])
+        else:
+            own["address"] = begin = _address(block)
+            cells = begin + places["_cells"]
         for name, member in self.declared.items():
             if member.role == "cell":
                 words.append(cells)
                 cells += _BYTES
                 continue
-            value = getattr(self, name)
-            if member.role == "array":
+            value = own[name]
+            if name in places:
+                words += [begin + places[name], *value.shape]
+            elif member.role == "array":
                 if not (value.flags.c_contiguous and value.dtype == member.dtype):
                     raise TypeError(
                         f"{type(self).__name__}.{name} is a C-contiguous array of "
                         f"{member.dtype}, not of {value.dtype}"
                     )
-                words += [value.__array_interface__["data"][0], *value.shape]
+                words += [_address(value), *value.shape]
             elif member.role == "part":
                 words.append(value.address)
             elif member.kind is float:
                 words.append(int(np.float64(value).view(np.int64)))
             else:
                 words.append(value)
-        return np.array(words, dtype=np.int64)
+        if block is None:
+            return np.array(words, dtype=np.int64)
+        table: np.ndarray[Any, np.dtype[np.int64]] = block[: len(words)]
+        table[:] = words
+        return table
 
     @cached_property
     def address(self) -> int:
         """Where its table is."""
-        return int(self.table.ctypes.data)
+        return _address(self.table)
 
     def __reduce__(self) -> Any:
         """Members only: a copy has a table of its own."""
@@ -449,24 +475,37 @@ class Bundle:
         """Return a class of the same members whose numbers are cells, and so can be set."""
         return _settable(cls)  # type: ignore[arg-type]
 
-    def contents(self) -> dict[str, np.ndarray[Any, Any]]:
-        """Copy what is its own in its storage, by name: read-only arrays are shared with others."""
-        return {name: value.copy() for name, value in self.storage() if value.flags.writeable}
+    def contents(self, prefix: str = "") -> dict[str, np.ndarray[Any, Any]]:
+        """Copy what is its own in its storage, by name: read-only arrays are shared with others.
 
-    def fill(self, contents: Mapping[str, np.ndarray[Any, Any]]) -> None:
+        Parameters
+        ----------
+        prefix : str
+            What the names begin with.
+
+        Returns
+        -------
+        dict
+            Copies by name.
+        """
+        return {name: each.copy() for name, each in self.storage(prefix) if each.flags.writeable}
+
+    def fill(self, contents: Mapping[str, np.ndarray[Any, Any]], prefix: str = "") -> None:
         """Put contents of a bundle of the same kind and shapes in the place of its own.
 
         Parameters
         ----------
         contents : mapping of str to array
             What :meth:`contents` of that one returned.
+        prefix : str
+            What the names begin with.
 
         Raises
         ------
         ValueError
             If something is missing, or of another shape or kind; nothing has changed then.
         """
-        storage = {name: mine for name, mine in self.storage() if mine.flags.writeable}
+        storage = {name: mine for name, mine in self.storage(prefix) if mine.flags.writeable}
         for name, mine in storage.items():
             its = contents.get(name)
             if its is None or its.shape != mine.shape or its.dtype != mine.dtype:
@@ -487,6 +526,60 @@ class Bundle:
 
 def _made(kind: type[_Some], members: dict[str, Any]) -> _Some:
     return kind(**members)
+
+
+_NOTHING = ctypes.c_char * 0
+
+
+def _address(array: Any) -> int:
+    if array.flags.writeable:  # four times as quick
+        return ctypes.addressof(_NOTHING.from_buffer(array))
+    address: int = array.__array_interface__["data"][0]
+    return address
+
+
+class _Plan(NamedTuple):
+    """How a bundle is allocated: a block for table, cells and arrays, and where in it they lie."""
+
+    size: int
+    cells: int
+    arrays: list[tuple[str, tuple[int, ...], np.dtype[Any], int]]
+    places: dict[str, int]
+    numbers: list[tuple[str, Any]]
+    parts: list[tuple[str, Any]]
+    extents: dict[str, int]
+
+
+@lru_cache
+def _whole_numbers(cls: Any) -> list[str]:
+    return [
+        name for name, each in cls.declared.items() if each.role == "number" and each.kind is int
+    ]
+
+
+@lru_cache(1024)
+def _plan(cls: Any, given: frozenset[str], sizes: tuple[tuple[str, int], ...]) -> _Plan:
+    """Plan the members of a bundle that are not given, for extents by name."""
+    known = dict(sizes)
+    members = [(name, each) for name, each in cls.declared.items() if name not in given]
+    table = sum(1 + len(member.shape) for member in cls.declared.values())
+    extents: dict[str, int] = {}
+    size, arrays = table + cls._cell_count, []
+    for name, member in members:
+        if member.role == "array":
+            shape = tuple(_extent(each, known) for each in member.shape)
+            _check_shape(f"{cls.__name__}.{name}", member, shape, extents)
+            arrays.append((name, shape, member.dtype, _BYTES * size))
+            size += math.prod(shape)
+    return _Plan(
+        size + 1,  # arrays of nothing lie before its end, too
+        _BYTES * table,
+        arrays,
+        {name: place for name, _, _, place in arrays} | {"_cells": _BYTES * table},
+        [(name, member.kind()) for name, member in members if member.role == "number"],
+        [(name, member.kind) for name, member in members if member.role == "part"],
+        extents,
+    )
 
 
 @lru_cache

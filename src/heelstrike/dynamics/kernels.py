@@ -161,22 +161,30 @@ def passive_force(model: Model, q: Floats, v: Floats, force: Floats) -> None:
 
 
 @kernel
-def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
-    """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
+def composite_inertias(model: Model, work: Workspace) -> None:
+    """Inertias of the subtrees of all links, each as one rigid body, about the pivot."""
     for i in range(model.nl):
         for k in range(4):
             work.composite[i, k] = work.inertia[i, k]
+    for i in range(model.nl - 1, 0, -1):
+        parent = model.parent[i]
+        if parent >= 0:
+            for k in range(4):
+                work.composite[parent, k] += work.composite[i, k]
+
+
+@kernel
+def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
+    """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
+    composite_inertias(model, work)
+    for i in range(model.nv):
         for j in range(model.nv):
             matrix[i, j] = 0.0
     for i in range(model.nl - 1, -1, -1):
         motion = spatial(work.motion, i)
         p = momentum_of(work.composite, i, motion)
         matrix[i, i] = power(motion, p) + model.armature[i]
-        parent = model.parent[i]
-        if parent >= 0:
-            for k in range(4):
-                work.composite[parent, k] += work.composite[i, k]
-        j = parent
+        j = model.parent[i]
         while j >= 0:
             entry = power(spatial(work.motion, j), p)
             matrix[i, j] = entry
@@ -382,18 +390,12 @@ def momentum_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
     Jacobian of the centre of mass.
     """
     mass, hx, hz = first_moments(model, work)
-    for i in range(model.nl):
-        for k in range(4):
-            work.composite[i, k] = work.inertia[i, k]
+    composite_inertias(model, work)
     for i in range(model.nl - 1, -1, -1):
         moment, px, pz = momentum_of(work.composite, i, spatial(work.motion, i))
         matrix[0, i] = px
         matrix[1, i] = pz
         matrix[2, i] = moment - (hz * px - hx * pz) / mass
-        parent = model.parent[i]
-        if parent >= 0:
-            for k in range(4):
-                work.composite[parent, k] += work.composite[i, k]
 
 
 @kernel

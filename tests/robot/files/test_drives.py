@@ -170,4 +170,4 @@ def test_a_toe_on_a_spring_swings_as_its_closed_form() -> None:
         method=EventDriven(rtol=1e-10, atol=1e-12),
     )
     expected = 0.3 * np.cos(np.sqrt(3.0 / 0.02) * run.time)
-    np.testing.assert_allclose(run.q[:, 0], expected, rtol=0, atol=1e-7)
+    np.testing.assert_allclose(run.position[:, 0], expected, rtol=0, atol=1e-7)

@@ -540,3 +540,61 @@ def test_planar_moments_of_every_built_in_robot(name: str, tmp_path: Path) -> No
         flat = re.sub(r'(ixx|izz)="[^"]*"', r'\1="0"', path.read_text("utf-8"))
         robot = read_mjcf(flat)
     np.testing.assert_allclose(robot.model.inertia, saved.model.inertia, rtol=1e-13, atol=1e-17)
+
+
+# Dialects
+
+
+def test_a_free_trunk_on_a_base_that_weighs_nothing(tmp_path: Path) -> None:
+    free = (
+        '<link name="base"/><joint name="free" type="floating"><parent link="base"/>'
+        '<child link="trunk"/><origin xyz="0 0 1"/><axis xyz="0 0 0"/></joint>'
+    )
+    with pytest.raises(RobotError, match="'free' of body 'trunk' is a free joint"):
+        read_mjcf(walker(free))
+    robot = read_mjcf(walker(free), floating=True)
+    assert_judged(robot, walker())
+    np.testing.assert_array_equal(robot.model.reference[:3], [0.0, 1.0, 0.0])
+
+
+def test_joints_of_drake_and_dojo() -> None:
+    plain = walker(
+        '<link name="world"/><joint name="root" type="planar"><parent link="world"/>'
+        '<child link="trunk"/><axis xyz="0 1 0"/></joint>'
+    )
+    drake = changed(plain, ('<joint name="root"', '<drake:joint name="root"'), times=1)
+    drake = changed(drake, ("</joint>", "</drake:joint>"), times=1)
+    for text in (drake, changed(plain, ("planar", "planaraxis"))):
+        robot = read_mjcf(text)
+        assert robot.floating
+        assert_judged(robot, walker())
+
+
+def test_a_ball_of_dojo_keeps_its_pitch_when_projected() -> None:
+    old = 'name="left_knee" type="revolute"'
+    text = changed(walker(), (old, old.replace("revolute", "ball")))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = read_mjcf(text, projected=True)
+    assert [one.name for one in robot.locked] == ["left_knee"]
+    assert_judged(robot, walker())
+
+
+def test_shapes_that_nobody_knows_are_left_out() -> None:
+    capsule = '<drake:capsule radius="0.02" length="0.1"/>'
+    robot = read_mjcf(changed(walker(), ('<sphere radius="0.02"/>', capsule)))
+    assert robot.nc == 4
+    for shape in ("", '<drake:ellipsoid a="1" b="1" c="1"/>'):
+        with pytest.warns(RobotWarning, match="left_shank, right_shank have collision shapes that"):
+            assert read_mjcf(changed(walker(), ('<sphere radius="0.02"/>', shape))).nc == 0
+
+
+def test_an_ornament_whose_mesh_is_not_there_weighs_nothing() -> None:
+    camera = (
+        '<link name="camera"><collision><geometry><mesh filename="package://no/camera.obj"/>'
+        '</geometry></collision></link><joint name="mount" type="fixed"><parent link="trunk"/>'
+        '<child link="camera"/></joint></robot>'
+    )
+    with pytest.warns(RobotWarning, match="collision meshes of camera are not where"):
+        robot = read_mjcf(changed(walker(), ("</robot>", camera)))
+    assert_judged(robot, walker())

@@ -59,6 +59,7 @@ from heelstrike.sim.record.recording import (
     STICK,
     TOUCHDOWN,
     limit_torque,
+    log_event,
     note_event,
     note_row_when_due,
 )
@@ -338,11 +339,11 @@ def note_events(
         if touched >= 0.0 or left >= 0.0:
             memory.slipping[contact] = 0
         if left >= 0.0 and left < touched:
-            note_event(record, left, LIFTOFF, contact, memory)
+            note_event(record, left, LIFTOFF, contact, work.step, memory)
         if touched >= 0.0:
-            note_event(record, touched, TOUCHDOWN, contact, memory)
+            note_event(record, touched, TOUCHDOWN, contact, work.step, memory)
         if left >= 0.0 and left >= touched:
-            note_event(record, left, LIFTOFF, contact, memory)
+            note_event(record, left, LIFTOFF, contact, work.step, memory)
         if left >= 0.0 or work.force[contact, 0] <= 0.0:
             continue
         sliding = slips(
@@ -354,20 +355,15 @@ def note_events(
         )
         if sliding and memory.slipping[contact] == 0:
             memory.slipping[contact] = 1
-            note_event(record, time, SLIP, contact, memory)
+            note_event(record, time, SLIP, contact, work.step, memory)
         elif not sliding and memory.slipping[contact] == 1:
             memory.slipping[contact] = 0
-            note_event(record, time, STICK, contact, memory)
+            note_event(record, time, STICK, contact, work.step, memory)
     for joint in range(model.parent.shape[0]):
         pressed = memory.stop_torque[joint] != 0.0
         if pressed and memory.stopped[joint] == 0:
-            place = record.events
-            record.event_time[place] = time
-            record.event_kind[place] = JOINT_STOP
-            record.event_contact[place] = joint
-            record.event_impulse[place, 0] = abs(memory.stop_torque[joint])
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
+            impulse = abs(memory.stop_torque[joint]) * work.step
+            log_event(record, time, JOINT_STOP, joint, impulse, 0.0)
         memory.stopped[joint] = 1 if pressed else 0
 
 
@@ -380,9 +376,9 @@ def note_forces(
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
     for contact in range(force.shape[0]):
-        record.force[row, contact, 0] = force[contact, 0]
-        record.force[row, contact, 1] = force[contact, 1]
-        record.slip[row, contact] = memory.slip[contact]
+        record.contact_force[row, contact, 0] = force[contact, 0]
+        record.contact_force[row, contact, 1] = force[contact, 1]
+        record.slip_velocity[row, contact] = memory.slip[contact]
     record.residual[row, 1] = memory.answer.residual[1]
 
 
@@ -462,11 +458,7 @@ def move(
     if code != DONE:
         return code
     step = work.step
-    first = record.events
     note_events(model, record, clock.time + step, memory, work)
-    for place in range(first, record.events):
-        record.event_impulse[place, 0] *= step
-        record.event_impulse[place, 1] *= step
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
         note_forces(

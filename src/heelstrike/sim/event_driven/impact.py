@@ -19,10 +19,11 @@ from heelstrike.sim.event_driven.dynamics import (
     gather_closed,
 )
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_driven.modes import log_event, note_residual
+from heelstrike.sim.event_driven.modes import note_residual
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import log_event
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 IMPACT = int(EventKind.IMPACT)

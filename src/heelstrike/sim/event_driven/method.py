@@ -43,7 +43,6 @@ from heelstrike.sim.event_driven.modes import (
     JOINT_STOP,
     adopt_modes,
     form_groups,
-    log_event,
     note_residual,
     report_modes,
 )
@@ -53,6 +52,7 @@ from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import log_event, note_row
 from heelstrike.sim.record.size import check_room, check_steps
 from heelstrike.sim.setting import Setting
 
@@ -236,34 +236,18 @@ class EventDriven(Method):
 
 
 @kernel
-def copy_row(
-    row: int,
-    time: float,
-    state: Floats,
-    torque: Floats,
-    contacts: Contacts,
-    residual: Floats,
-    record: Record,
-) -> None:
-    """Copy everything but the contact forces to a row of the record."""
-    nv = record.q.shape[1]
-    record.time[row] = time
+def note_state(record: Record, row: int, state: Floats) -> None:
+    """Write a state to a row, where no force acts as yet."""
+    nv = record.velocity.shape[1]
     for i in range(nv):
-        record.q[row, i] = state[i]
-        record.v[row, i] = state[nv + i]
+        record.position[row, i] = state[i]
+        record.velocity[row, i] = state[nv + i]
         record.stop_torque[row, i] = 0.0
         record.friction_torque[row, i] = 0.0
-    for i in range(torque.shape[0]):
-        record.torque[row, i] = torque[i]
-    for i in range(contacts.gap.shape[0]):
-        for k in range(2):
-            record.point[row, i, k] = contacts.position[i, k]
-            record.normal[row, i, k] = contacts.normal[i, k]
-            record.force[row, i, k] = 0.0
-        record.gap[row, i] = contacts.gap[i]
-        record.slip[row, i] = 0.0
-    for k in range(3):
-        record.residual[row, k] = residual[k]
+    for contact in range(record.gap.shape[1]):
+        record.contact_force[row, contact, 0] = 0.0
+        record.contact_force[row, contact, 1] = 0.0
+        record.slip_velocity[row, contact] = 0.0
 
 
 @kernel
@@ -294,7 +278,8 @@ def write_row(
         solve_candidates(count, memory, phase.slide, True, phase.order)
         note_residual(memory.answer.residual, memory.tally)
     row = record.rows
-    copy_row(row, time, phase.trial, memory.torque, contacts, memory.answer.residual, record)
+    note_row(record, time, memory)
+    note_state(record, row, phase.trial)
     points = contacts.gap.shape[0]
     first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     dry_force(
@@ -315,13 +300,12 @@ def write_row(
                 phase.stop_side[stop] * memory.answer.impulse[2 * place]
             )
             continue
-        record.force[row, contact, 0] = memory.answer.impulse[2 * place]
-        record.force[row, contact, 1] = memory.answer.impulse[2 * place + 1]
-        _, record.slip[row, contact] = contact_velocity(
+        record.contact_force[row, contact, 0] = memory.answer.impulse[2 * place]
+        record.contact_force[row, contact, 1] = memory.answer.impulse[2 * place + 1]
+        _, record.slip_velocity[row, contact] = contact_velocity(
             model.contact_link[contact], contacts.position[contact], contacts.normal[contact],
             memory.tree,
         )  # fmt: skip
-    record.rows = row + 1
     phase.last_row = time
     period = phase.output_period * phase.row_every
     if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:

@@ -10,6 +10,7 @@ from heelstrike.sim.event_driven.dynamics import tangential_place
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import log_event
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 LIFTOFF = int(EventKind.LIFTOFF)
@@ -22,20 +23,6 @@ JOINT_STICK = int(EventKind.JOINT_STICK)
 
 # Two normals are one when the sine of the angle between them is below this.
 PARALLEL = 1e-9
-
-
-@kernel
-def log_event(
-    record: Record, time: float, kind: int, contact: int, normal: float, tangent: float
-) -> None:
-    """Append an event with its impulse."""
-    place = record.events
-    record.event_time[place] = time
-    record.event_kind[place] = kind
-    record.event_contact[place] = contact
-    record.event_impulse[place, 0] = normal
-    record.event_impulse[place, 1] = tangent
-    record.events = place + 1
 
 
 @kernel
