@@ -33,6 +33,10 @@ from heelstrike.robot import Robot, load_robot
 
 TOLERANCE = 1e-10
 STATES = 3
+BY_ROUNDING = 1e-9
+"""Differences below it are those of axes that leave the plane by less than 1e-6 rad, which counts
+as rounding."""
+
 TURNED = "are turned into it"
 FORWARD_Y = "so that its y is forward"
 
@@ -90,7 +94,8 @@ def outcome(robot: Published, clones: Path, scratch: Path) -> Outcome:
         result.engine, result.difference = peer.name, difference(loaded, peer)
     except (Refused, ElementTree.ParseError) as refused:
         result.said = " ".join(str(refused).split())[:160]
-    if _any(remarks, TURNED) or np.isnan(result.difference):
+    turned = _any(remarks, TURNED) or TOLERANCE < result.difference < BY_ROUNDING
+    if turned or np.isnan(result.difference):
         saved = loaded.save(scratch / "saved.xml")
         if not np.isnan(result.difference):
             result.said = f"turned into the plane; as the file has it {result.difference:.1g}"

@@ -58,6 +58,9 @@ def _mechanics(text: str) -> str:
     for child in list(root):
         if child.tag not in ("link", "joint"):
             root.remove(child)
+    for inertia in root.iter("inertia"):  # urdfdom drops a link of which one product is ""
+        for name, value in inertia.attrib.items():
+            inertia.set(name, value or "0")
     for joint in root.iter("joint"):
         if joint.get("type") in ("revolute", "prismatic"):  # urdfdom wants limits, which do nothing
             for limit in joint.findall("limit"):

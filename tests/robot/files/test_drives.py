@@ -171,3 +171,19 @@ def test_a_toe_on_a_spring_swings_as_its_closed_form() -> None:
     )
     expected = 0.3 * np.cos(np.sqrt(3.0 / 0.02) * run.time)
     np.testing.assert_allclose(run.position[:, 0], expected, rtol=0, atol=1e-7)
+
+
+def test_the_line_of_a_motor_is_a_number_of_the_robot(tmp_path: Path) -> None:
+    """MJCF holds it; URDF and SDF name it as lost."""
+    build = RobotBuilder("motor")
+    motor = {"stall_torque": 90.0, "no_load_speed": 12.0, "winding_resistance": 0.4}
+    build.hinge("hip", None, mass=1, inertia=0.1, torque=60, **motor)  # type: ignore[arg-type]
+    robot = build.build()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RobotWarning)
+        back = load_robot(robot.save(tmp_path / "r.xml"))
+    for name, value in motor.items():
+        assert getattr(back.model, name).tolist() == [value]
+    for ending in ("urdf", "sdf"):
+        with pytest.warns(RobotWarning, match="Left out: stall torque of hip; no load speed of hi"):
+            robot.save(tmp_path / f"r.{ending}")

@@ -25,6 +25,9 @@ from heelstrike.robot.files.saving.text import (
 from heelstrike.robot.model import PROPERTIES
 from heelstrike.robot.robot import Robot
 
+LOST = ("stall_torque", "no_load_speed", "winding_resistance")
+"""Numbers that SDF has not."""
+
 VERSION = "1.7"
 DRAKE = "xmlns:drake"
 """Prefix of the one number that SDF has no word for: the inertia of a motor."""
@@ -37,7 +40,7 @@ def sdf(robot: Robot) -> Element:
     floating base hangs on the world by its three joints, with massless links between them.
     """
     model = robot.model
-    warn_of_loss(robot, "an SDF file", tuple(PROPERTIES))
+    warn_of_loss(robot, "an SDF file", tuple(name for name in PROPERTIES if name not in LOST))
     root = Element("sdf", {"version": VERSION, DRAKE: "drake.mit.edu"})
     holder = root
     if tuple(model.gravity) != STANDARD_GRAVITY:  # which is the world's
