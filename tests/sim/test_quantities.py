@@ -24,7 +24,7 @@ ROOT = PACKAGE.parents[1]
 
 DECLARATION = """
     link_angle: Floats = recorded(
-        "nl", of="tree.angle", unit="rad", label="angles of links", later=True
+        "nl", of="equations.tree.angle", unit="rad", label="angles of links", later=True
     )
 """
 

@@ -16,6 +16,8 @@ from heelstrike.sim.compliant.contact_law import (
     KelvinVoigt,
     RegularisedFriction,
 )
+from heelstrike.sim.compliant.law import FrictionLaw as FrictionLaw
+from heelstrike.sim.compliant.law import NormalLaw as NormalLaw
 from heelstrike.sim.contacts.geometry import contact_rows as contact_rows
 from heelstrike.sim.contacts.geometry import contact_velocity as contact_velocity
 from heelstrike.sim.contacts.geometry import evaluate_equations as evaluate_equations
@@ -28,6 +30,7 @@ from heelstrike.sim.frame import DIVERGED as DIVERGED
 from heelstrike.sim.frame import DONE as DONE
 from heelstrike.sim.frame import SOLVER_FAILED as SOLVER_FAILED
 from heelstrike.sim.frame import Kernels
+from heelstrike.sim.frame import Scene as Scene
 from heelstrike.sim.memory import Memory as Memory
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push

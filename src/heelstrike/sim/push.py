@@ -195,7 +195,7 @@ def pushes_of_numbers(numbers: Mapping[str, Floats]) -> tuple[Push, ...]:
 
 
 @kernel
-def share_over_step(pushes: Pushes, time: float, step: float) -> bool:
+def share_over_step(time: float, step: float, pushes: Pushes) -> bool:
     """Find how much of each push acts in the step from `time` on; return whether any does."""
     any_acts = False
     for i in range(pushes.link.shape[0]):
@@ -206,7 +206,7 @@ def share_over_step(pushes: Pushes, time: float, step: float) -> bool:
 
 
 @kernel
-def switch_at(pushes: Pushes, time: float) -> tuple[bool, float]:
+def switch_at(time: float, pushes: Pushes) -> tuple[bool, float]:
     """Let the pushes act that do so from `time` on.
 
     Returns whether anything changed, and when it next will.

@@ -226,10 +226,13 @@ class Run:
         "nu", of="torque", unit="N m", label="joint torques within their limits"
     )
     stop_torque: Floats = recorded(
-        "nv", of="stop_torque", unit="N m or N", label="force of the joint stops on the robot"
+        "nv",
+        of="reaction.stop_torque",
+        unit="N m or N",
+        label="force of the joint stops on the robot",
     )
     friction_torque: Floats = recorded(
-        "nv", of="friction_torque", unit="N m or N", later=True,
+        "nv", of="reaction.friction_torque", unit="N m or N", later=True,
         label="dry friction of the joints on the robot",
     )  # fmt: skip
     contact_point: Floats = recorded(
@@ -247,11 +250,11 @@ class Run:
         label="force on the robot at the contact points, mean over the step that follows",
     )  # fmt: skip
     slip_velocity: Floats = recorded(
-        "nc", of="slip", unit="m/s",
+        "nc", of="reaction.slip", unit="m/s",
         label="tangential velocity of the contact points at the end of the step",
     )  # fmt: skip
     residual: Floats = recorded(
-        "conditions", of="answer.residual", unit="1",
+        "conditions", of="assembly.answer.residual", unit="1",
         label="relative residuals of the contact problem",
     )  # fmt: skip
     events: tuple[Event, ...]
@@ -407,7 +410,7 @@ COUNTS = ("steps", "saturations", *SOLVED)
 
 def counted(memory: Memory) -> dict[str, Any]:
     """Return counts and worst values of a simulation."""
-    tally, solver = memory.tally, memory.solver.tally
+    tally, solver = memory.tally, memory.assembly.solver.tally
     return {name: getattr(solver if name in SOLVED else tally, name) for name in COUNTS + WORST}
 
 

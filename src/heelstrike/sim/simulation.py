@@ -397,7 +397,7 @@ class Simulation:
             try:
                 outcome = Outcome(
                     self._loop(
-                        self._kernel, self._control, self.robot.model, self._ground.model(),
+                        self._kernel, self.robot.model, self._ground.model(), self._control,
                         self._memory, self._work, self._records[-1], self._clock,
                     )
                 )  # fmt: skip
@@ -479,7 +479,7 @@ class Simulation:
         if outcome is Outcome.SOLVER_FAILED:
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
@@ -525,7 +525,7 @@ class Simulation:
             in_python = setting.checked or not law.function.compiles
             python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
         compiled = Law(no_torque) if law is None or python is not None else law
-        ready = ReadyLaw(robot, compiled, memory.tree, memory.contacts)
+        ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts)
         self._kernel = compiled.function.finish()
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready

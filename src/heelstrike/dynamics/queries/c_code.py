@@ -60,12 +60,12 @@ def _solve(
     """Acceleration a under a generalised force: a = A(q)^-1 (force - H(q, v))."""
     forward_kinematics(model, q, tree)
     link_velocities(model, v, tree)
-    forward_dynamics(model, square, factor, force, tree, acceleration)
+    forward_dynamics(model, force, tree, square, factor, acceleration)
 
 
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
     """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
-    tree = Workspace.allocate(**model.extents)
+    tree = Workspace.allocate(model.extents)
     square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
     arrays: dict[str, Any] = {
         "model": model, "tree": tree,

@@ -43,7 +43,7 @@ class Evaluation:
     def work(self) -> Workspace:
         """Kinematics and velocities of the state, for the kernels that follow."""
         dtype = object if self.symbolic else None
-        made = Workspace.allocate(dtype=dtype, **self.model.extents)
+        made = Workspace.allocate(self.model.extents, dtype=dtype)
         self.run(kernels.forward_kinematics, self.model, self.q, made)
         self.run(kernels.link_velocities, self.model, self.v, made)
         return made

@@ -7,6 +7,8 @@ shorten them while a foot stands; they end where a contact point meets the groun
 where the force really changes fast, after an impact.
 """
 
+# ruff: noqa: ARG001 - the kernels of all methods have the same arguments
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -15,21 +17,13 @@ from typing import Any
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.compliant.contact_law import (
-    NUMBERS,
-    BristleFriction,
-    FrictionLaw,
-    HuntCrossley,
-    KelvinVoigt,
-    NormalLaw,
-    RegularisedFriction,
-    slips,
-)
+from heelstrike.sim.compliant.contact_law import BristleFriction, HuntCrossley, KelvinVoigt
 from heelstrike.sim.compliant.dynamics import (
     ACCEPTED,
     GAINS_LAST,
@@ -43,10 +37,11 @@ from heelstrike.sim.compliant.dynamics import (
     evaluate,
     find_gains,
 )
+from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels
+from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
@@ -79,11 +74,11 @@ class Compliant(Method):
 
     Parameters
     ----------
-    law : HuntCrossley or KelvinVoigt
+    law : HuntCrossley, KelvinVoigt or another NormalLaw
         Normal force from penetration and its rate, for each contact point.
-    friction : RegularisedFriction or BristleFriction
+    friction : RegularisedFriction, BristleFriction or another FrictionLaw
         Tangential force; its coefficient μ is the ground's. Only a bristle holds a foot in place.
-    stop : HuntCrossley or KelvinVoigt
+    stop : HuntCrossley, KelvinVoigt or another NormalLaw
         Torque of a joint beyond the end of its range, from the angle and its rate (with N m and
         rad in the place of N and m for a hinge).
     step : float
@@ -128,11 +123,12 @@ class Compliant(Method):
     def __post_init__(self) -> None:
         for name in ("law", "stop"):
             law = getattr(self, name)
-            if not isinstance(law, HuntCrossley | KelvinVoigt):
+            if not isinstance(law, NormalLaw):
                 raise SimulationError(
-                    f"{name} must be HuntCrossley(...) or KelvinVoigt(...), got {law!r}"
+                    f"{name} must be HuntCrossley(...), KelvinVoigt(...) or another normal law, "
+                    f"got {law!r}"
                 )
-        if not isinstance(self.friction, RegularisedFriction | BristleFriction):
+        if not isinstance(self.friction, FrictionLaw):
             raise SimulationError(
                 f"friction must be RegularisedFriction(...) or BristleFriction(...), got "
                 f"{self.friction!r}; the coefficient μ belongs to the ground"
@@ -159,17 +155,13 @@ class Compliant(Method):
 
     def new_work(self, robot: Robot) -> CompliantWorkspace:
         """Allocate its scratch, with the numbers of the laws."""
-        numbers, stop_numbers = np.zeros(NUMBERS), np.zeros(NUMBERS)
-        self.law.write(numbers)
-        self.friction.write(numbers)
-        self.stop.write(stop_numbers)
+        numbers = {name: getattr(self, name).parameters() for name in ("law", "friction", "stop")}
+        code = {name: getattr(self, name).code(each) for name, each in numbers.items()}
         laws = Laws(
-            normal=self.law.kind,
-            friction=self.friction.kind,
-            numbers=numbers,
-            stop=self.stop.kind,
-            stop_numbers=stop_numbers,
-        )
+            normal=numbers["law"], normal_code=code["law"],
+            friction=numbers["friction"], friction_code=code["friction"],
+            stop=numbers["stop"], stop_code=code["stop"], joint_speed=self.friction.joint_speed,
+        )  # fmt: skip
         return compliant_workspace(robot, laws, self.step, self.rtol, self.atol)
 
     def room(self, robot: Robot) -> tuple[int, int]:
@@ -187,34 +179,39 @@ class Compliant(Method):
 
 @kernel
 def account(model: Model, since: float, h: float, memory: Memory, work: CompliantWorkspace) -> None:
-    """Add a step of length h, begun at time `since`, to impulses, extremes and crossings.
+    """Add a step of length h, begun at time `since`, to impulses, extremes, crossings and counts.
 
     The impulse is the trapezium of the forces of the law. As a sum of forces inside the friction
     cone with positive weights it lies in the cone itself.
     """
+    now, base = work.now, work.base
     for joint in range(model.parent.shape[0]):
-        work.stop_impulse[joint] += 0.5 * h * (work.base_stop_force[joint] + work.stop_force[joint])
-        work.dry_impulse[joint] += 0.5 * h * (work.base_dry_force[joint] + work.dry_force[joint])
+        work.stop_impulse[joint] += 0.5 * h * (base.stop_force[joint] + now.stop_force[joint])
+        work.dry_impulse[joint] += 0.5 * h * (base.dry_force[joint] + now.dry_force[joint])
     for contact in range(model.contact_link.shape[0]):
-        for k in range(2):
-            work.impulse[contact, k] += (
-                0.5 * h * (work.base_force[contact, k] + work.force[contact, k])
-            )
+        normal = base.normal.force[contact] + now.normal.force[contact]
+        tangent = base.friction.force[contact] + now.friction.force[contact]
+        work.impulse[contact, 0] += 0.5 * h * normal
+        work.impulse[contact, 1] += 0.5 * h * tangent
         gap = memory.contacts.gap[contact]
-        before = work.base_gap[contact]
+        before = work.base.normal.gap[contact]
         memory.tally.penetration = max(memory.tally.penetration, -gap)
-        if memory.closed[contact] == 0 and gap < 0.0:
-            memory.closed[contact] = 1
+        if memory.reported.closed[contact] == 0 and gap < 0.0:
+            memory.reported.closed[contact] = 1
             share = before / (before - gap) if before > 0.0 else 0.0
             work.touched[contact] = since + share * h
-        elif memory.closed[contact] == 1 and gap > LIFTOFF_GAP:
-            memory.closed[contact] = 0
+        elif memory.reported.closed[contact] == 1 and gap > LIFTOFF_GAP:
+            memory.reported.closed[contact] = 0
             share = before / (before - gap) if before < 0.0 else 0.0
             work.left[contact] = since + share * h
+    residual = memory.assembly.answer.residual
+    residual[1] = max(residual[1], cone_residual(memory.surface.friction, work))
+    memory.tally.steps += 1
+    work.age += 1
 
 
 @kernel
-def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace) -> float:
+def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspace) -> float:
     """Part of the step after which the first contact point that fell into the ground met it.
 
     One, if none began the step above the ground and ended it deeper than `depth`. The stages of a
@@ -222,21 +219,21 @@ def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace
     """
     first = 1.0
     for contact in range(model.contact_link.shape[0]):
-        gap = memory.contacts.gap[contact]
-        before = work.base_gap[contact]
+        gap = gap_now[contact]
+        before = work.base.normal.gap[contact]
         if before > depth and gap < -depth:
             first = min(first, before / (before - gap))
     return first
 
 
 @kernel
-def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> float:
+def cone_residual(friction: Floats, work: CompliantWorkspace) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
-    for contact in range(model.contact_link.shape[0]):
+    for contact in range(work.touched.shape[0]):
         normal = work.force[contact, 0]
         tangent = abs(work.force[contact, 1])
-        excess = max(-normal, tangent - memory.friction[contact] * normal)
+        excess = max(-normal, tangent - friction[contact] * normal)
         if excess > 0.0:
             worst = max(worst, excess / (abs(normal) + tangent))
     return worst
@@ -247,19 +244,8 @@ def sample(
     controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
     memory: Memory, work: CompliantWorkspace,
 ) -> int:  # fmt: skip
-    """Integrate from one sample to the next; return DONE or what was in the way.
-
-    ``memory.contacts.force`` receives the mean contact forces.
-    """
-    for contact in range(model.contact_link.shape[0]):
-        work.impulse[contact, 0] = 0.0
-        work.impulse[contact, 1] = 0.0
-        work.touched[contact] = -1.0
-        work.left[contact] = -1.0
-    for joint in range(model.parent.shape[0]):
-        work.stop_impulse[joint] = 0.0
-        work.dry_impulse[joint] = 0.0
-    memory.answer.residual[1] = cone_residual(model, memory, work)
+    """Integrate from one sample to the next; return DONE or what was in the way."""
+    begin_sample(memory, work)
     span = work.step
     elapsed = 0.0
     h = work.proposed
@@ -275,8 +261,7 @@ def sample(
             controller, control, model, ground, start + elapsed, taken, memory, work
         )
         shortest = taken <= SHORTEST
-        finite = error < np.inf
-        if not (error <= 1.0 or (shortest and finite)):
+        if not (error <= 1.0 or (shortest and error < np.inf)):
             if control.continuous == 1 and (work.age > 0 or shortest):
                 find_gains(controller, control, start + elapsed, model, memory, work)
             if shortest:
@@ -284,14 +269,11 @@ def sample(
                     memory.q[i] = work.base_q[i]
                     memory.v[i] = work.base_v[i]
                 return DIVERGED if limit_torque(model, memory) else BAD_CONTROLLER
-            factor = SHRINK
-            if finite:
-                factor = max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
-            h = max(taken * factor, SHORTEST)
+            h = max(taken * rescaled(error, SHRINK), SHORTEST)
             rejected = True
             continue
-        observe(model, ground, memory)
-        met = landing(model, work.atol, memory, work)
+        observe(model, ground, memory.q, memory.v, memory)
+        met = landing(model, work.atol, memory.contacts.gap, work)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
@@ -299,77 +281,91 @@ def sample(
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
-        memory.answer.residual[1] = max(
-            memory.answer.residual[1], cone_residual(model, memory, work)
-        )
-        memory.tally.steps += 1
-        work.age += 1
         begin_step(model, memory, work)
         elapsed = span if final else elapsed + taken
-        factor = GROW
-        if error > 0.0 and not shortest:
-            factor = min(GROW, SAFETY * error ** (-1.0 / ORDER))
+        factor = GROW if shortest else min(GROW, rescaled(error, GROW))
         if rejected and not shortest:
             factor = min(factor, 1.0)
             rejected = False
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
     work.proposed = min(h, span)
-    for contact in range(model.contact_link.shape[0]):
-        for k in range(2):
-            memory.contacts.force[contact, k] = work.impulse[contact, k] / span
-    for joint in range(model.parent.shape[0]):
-        memory.stop_torque[joint] = work.stop_impulse[joint] / span
-        memory.friction_torque[joint] = work.dry_impulse[joint] / span
-    memory.tally.cone = max(memory.tally.cone, memory.answer.residual[1])
+    finish_sample(memory, work)
     return DONE
 
 
 @kernel
+def rescaled(error: float, limit: float) -> float:
+    """How much longer a step of this error may be, or `limit` if that cannot be told."""
+    if not 0.0 < error < np.inf:
+        return limit
+    return max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
+
+
+@kernel
+def begin_sample(memory: Memory, work: CompliantWorkspace) -> None:
+    """Forget the impulses and crossings of the sample before."""
+    for contact in range(work.touched.shape[0]):
+        work.impulse[contact, 0] = 0.0
+        work.impulse[contact, 1] = 0.0
+        work.touched[contact] = -1.0
+        work.left[contact] = -1.0
+    for joint in range(work.stop_impulse.shape[0]):
+        work.stop_impulse[joint] = 0.0
+        work.dry_impulse[joint] = 0.0
+    memory.assembly.answer.residual[1] = cone_residual(memory.surface.friction, work)
+
+
+@kernel
+def finish_sample(memory: Memory, work: CompliantWorkspace) -> None:
+    """Put the mean forces since the sample before into the memory."""
+    span = work.step
+    for contact in range(work.touched.shape[0]):
+        for k in range(2):
+            memory.contacts.force[contact, k] = work.impulse[contact, k] / span
+    for joint in range(work.stop_impulse.shape[0]):
+        memory.reaction.stop_torque[joint] = work.stop_impulse[joint] / span
+        memory.reaction.friction_torque[joint] = work.dry_impulse[joint] / span
+    memory.tally.cone = max(memory.tally.cone, memory.assembly.answer.residual[1])
+
+
+@kernel
 def note_events(
-    model: Model, record: Record, time: float, memory: Memory, work: CompliantWorkspace
+    model: Model, time: float, work: CompliantWorkspace, memory: Memory, record: Record
 ) -> None:
     """Note what happened since the last sample; `time` is now.
 
     Touchdown and lift-off are timed where the gap passes zero, stick and slip to the sample.
     """
+    force = memory.contacts.force
     for contact in range(model.contact_link.shape[0]):
         touched = work.touched[contact]
         left = work.left[contact]
         if touched >= 0.0 or left >= 0.0:
-            memory.slipping[contact] = 0
+            memory.reported.slipping[contact] = 0
         if left >= 0.0 and left < touched:
-            note_event(record, left, LIFTOFF, contact, work.step, memory)
+            note_event(left, LIFTOFF, contact, work.step, force, record)
         if touched >= 0.0:
-            note_event(record, touched, TOUCHDOWN, contact, work.step, memory)
+            note_event(touched, TOUCHDOWN, contact, work.step, force, record)
         if left >= 0.0 and left >= touched:
-            note_event(record, left, LIFTOFF, contact, work.step, memory)
+            note_event(left, LIFTOFF, contact, work.step, force, record)
         if left >= 0.0 or work.force[contact, 0] <= 0.0:
             continue
-        sliding = slips(
-            work.laws.friction,
-            work.laws.numbers,
-            memory.friction[contact] * work.force[contact, 0],
-            memory.slip[contact],
-            work.bristle[contact],
-        )
-        if sliding and memory.slipping[contact] == 0:
-            memory.slipping[contact] = 1
-            note_event(record, time, SLIP, contact, work.step, memory)
-        elif not sliding and memory.slipping[contact] == 1:
-            memory.slipping[contact] = 0
-            note_event(record, time, STICK, contact, work.step, memory)
+        if work.now.friction.slides[contact] != memory.reported.slipping[contact]:
+            memory.reported.slipping[contact] = work.now.friction.slides[contact]
+            kind = SLIP if work.now.friction.slides[contact] == 1 else STICK
+            note_event(time, kind, contact, work.step, force, record)
     for joint in range(model.parent.shape[0]):
-        pressed = memory.stop_torque[joint] != 0.0
-        if pressed and memory.stopped[joint] == 0:
-            impulse = abs(memory.stop_torque[joint]) * work.step
-            log_event(record, time, JOINT_STOP, joint, impulse, 0.0)
-        memory.stopped[joint] = 1 if pressed else 0
+        pressed = memory.reaction.stop_torque[joint] != 0.0
+        if pressed and memory.reported.stopped[joint] == 0:
+            impulse = abs(memory.reaction.stop_torque[joint]) * work.step
+            log_event(time, JOINT_STOP, joint, impulse, 0.0, record)
+        memory.reported.stopped[joint] = 1 if pressed else 0
 
 
 @kernel
 def note_forces(
-    record: Record, row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory
+    row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory, record: Record
 ) -> None:
     """Write the forces of contacts and joints, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
@@ -378,22 +374,18 @@ def note_forces(
     for contact in range(force.shape[0]):
         record.contact_force[row, contact, 0] = force[contact, 0]
         record.contact_force[row, contact, 1] = force[contact, 1]
-        record.slip_velocity[row, contact] = memory.slip[contact]
-    record.residual[row, 1] = memory.answer.residual[1]
+        record.slip_velocity[row, contact] = memory.reaction.slip[contact]
+    record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
 @kernel
 def begin(
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,  # noqa: ARG001
-    record: Record,  # noqa: ARG001
+    model: Model, ground: GroundModel, memory: Memory, work: CompliantWorkspace, record: Record
 ) -> int:
     """Points in the ground, or on it, are closed when the simulation begins."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
     for contact in range(model.contact_link.shape[0]):
-        memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
+        memory.reported.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
     return DONE
 
 
@@ -402,73 +394,56 @@ def prepare(
     model: Model,
     ground: GroundModel,
     memory: Memory,
-    work: CompliantWorkspace,  # noqa: ARG001
+    work: CompliantWorkspace,
 ) -> None:
     """Kinematics and contact points of the state now."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
 
 
 @kernel
 def decide(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,  # noqa: ARG001
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> int:
+) -> int:  # fmt: skip
     """Forces and rates at this sample, under the torques that the frame asked for."""
-    share_over_step(memory.pushes, clock.time, work.step)
-    evaluate(controller, control, model, ground, HELD, clock.time, memory, work)
+    share_over_step(clock.time, work.step, memory.pushes)
+    evaluate(scene.controller, control, scene.model, scene.ground, HELD, clock.time, memory, work)
     return DONE
 
 
 @kernel
 def report(
-    controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> None:
+) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
-    work.row = note_row_when_due(record, memory, clock)
+    work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
-        note_forces(record, work.row, work.force, work.stop_force, work.dry_force, memory)
+        now = work.now
+        note_forces(work.row, work.force, now.stop_force, now.dry_force, memory, record)
 
 
 @kernel
 def move(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> int:
+) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
-    code = sample(controller, control, model, ground, clock.time, memory, work)
+    model = scene.model
+    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
     if code != DONE:
         return code
     step = work.step
-    note_events(model, record, clock.time + step, memory, work)
+    note_events(model, clock.time + step, work, memory, record)
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
+        reaction = memory.reaction
         note_forces(
-            record, work.row, memory.contacts.force, memory.stop_torque, memory.friction_torque,
-            memory,
+            work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
+            memory, record,
         )  # fmt: skip
     if control.continuous == 1:
-        for contact in range(model.contact_link.shape[0]):
-            memory.contacts.force[contact, 0] = work.force[contact, 0]
-            memory.contacts.force[contact, 1] = work.force[contact, 1]
+        copy_words(work.force, memory.contacts.force)
     clock.time = clock.start + (clock.index + 1) * step
     return DONE
 

@@ -104,13 +104,13 @@ class ReadyLaw:
         self.memory, kept, between_kept = in_one_block(memory)
         self._spare, spare, _ = in_one_block(memory)
         shown: dict[str, Any] = {
-            "state": ControlState.allocate(**extents),
-            "contacts": Contacts.allocate(**extents),
+            "state": ControlState.allocate(extents),
+            "contacts": Contacts.allocate(extents),
             "robot": controlled_robot(robot),
         }
         self._shown: dict[str, Bundle] = {}
         if law.function.is_ours and tree is not None and contacts is not None:
-            shown["state"] = ControlState.allocate(kinematics=tree, **extents)
+            shown["state"] = ControlState.allocate(extents, kinematics=tree)
             shown["contacts"] = contacts
         else:
             shown = self._shown = {name: guarded_bundle(each) for name, each in shown.items()}

@@ -13,7 +13,8 @@ import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compiler.bundle import Bundle, bundle_at
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle_type import bundle_at
 from heelstrike.compiler.compilation import CompileError, is_ours, kernel, within_bounds
 from heelstrike.compiler.separate_kernel import SeparateKernel
 from heelstrike.errors import ControllerError
@@ -261,7 +262,7 @@ class Law:
         damping: ArrayLike | None = None,
     ) -> None:
         self.memory = dict(memory or {})
-        strange = self.memory.keys() - function.memory.declared - function.memory.extent_names()
+        strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
@@ -314,7 +315,7 @@ class Law:
         extents = extents_of(robot)
         try:
             self.parameters.check(extents)
-            memory = self.function.memory.settable().allocate(**extents | self.memory)
+            memory = self.function.memory.settable().allocate(extents, **self.memory)
             memory.check(extents)
         except TypeError as error:
             raise ControllerError(

@@ -152,7 +152,7 @@ class ControlledRobot(Bundle):
         """Jacobian (2, nv) of a contact point: along the ground's normal, then its tangent."""
         link, normal = self.model.contact_link[contact], contacts.normal[contact]
         write_point_rows(
-            self.model, state.kinematics, link, contacts.position[contact], normal, jacobian, 0
+            self.model, state.kinematics, link, contacts.position[contact], normal, 0, jacobian
         )
 
     @kernel
@@ -194,11 +194,9 @@ def extents_of(robot: Robot) -> dict[str, int]:
 
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that a controller has of a robot."""
-    extents = extents_of(robot)
     driven = set(robot.model.actuator_joint.tolist())
     view = ControlledRobot.allocate(
-        model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven),
-        **extents,
+        extents_of(robot), model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven)
     )  # fmt: skip
     view.contact_foot[:] = -1
     for index, foot in enumerate(robot.feet):

@@ -66,12 +66,12 @@ def point_columns(
 ) -> None:
     """Jacobian (x, z, rotation) of a point of a link, one row a coordinate."""
     for j in range(model.nv):
-        write(columns, j, (0.0, 0.0, 0.0))
+        write(j, (0.0, 0.0, 0.0), columns)
     place = place_of(work, position)
     j = link
     while j >= 0:
         x, z = velocity_at(work.motion, j, place)
-        write(columns, j, (x, z, work.motion[j, 0]))
+        write(j, (x, z, work.motion[j, 0]), columns)
         j = model.parent[j]
 
 

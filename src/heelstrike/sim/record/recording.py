@@ -7,11 +7,12 @@ from typing import Any
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.run import QUANTITIES
 
@@ -49,7 +50,7 @@ def limit_torque(model: Model, memory: Memory) -> bool:
 
 
 @kernel
-def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memory) -> None:
+def try_torque(model: Model, q: Floats, v: Floats, tally: Tally, torque: Floats) -> None:
     """Clip torques that a controller was asked for within a step, at a state that may be no good.
 
     Keeps in mind which of them was not finite when it was last asked at a state that was.
@@ -65,7 +66,7 @@ def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memor
     for i in range(v.shape[0]):
         if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
             return
-    memory.tally.bad_trial = bad
+    tally.bad_trial = bad
 
 
 @dissolved_kernel
@@ -74,14 +75,20 @@ def note_extremes(model: Model, memory: Memory) -> None:
     tally = memory.tally
     for contact in range(model.contact_link.shape[0]):
         tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
-    tally.complementarity = max(tally.complementarity, memory.answer.residual[0])
-    tally.cone = max(tally.cone, memory.answer.residual[1])
-    tally.non_penetration = max(tally.non_penetration, memory.answer.residual[2])
+    note_residual(memory.assembly.answer.residual, tally)
+
+
+@kernel
+def note_residual(residual: Floats, tally: Tally) -> None:
+    """Keep the worst residuals of the run."""
+    tally.complementarity = max(tally.complementarity, residual[0])
+    tally.cone = max(tally.cone, residual[1])
+    tally.non_penetration = max(tally.non_penetration, residual[2])
 
 
 @kernel
 def log_event(
-    record: Record, time: float, kind: int, place: int, normal: float, tangent: float
+    time: float, kind: int, place: int, normal: float, tangent: float, record: Record
 ) -> None:
     """Append an event of a contact point or joint, with its impulse."""
     event = record.events
@@ -95,15 +102,14 @@ def log_event(
 
 @kernel
 def note_event(
-    record: Record, time: float, kind: int, contact: int, step: float, memory: Memory
+    time: float, kind: int, contact: int, step: float, force: Floats, record: Record
 ) -> None:
     """Append an event of a contact point; its impulse is that of the step it happened in."""
-    force = memory.contacts.force
-    log_event(record, time, kind, contact, force[contact, 0] * step, force[contact, 1] * step)
+    log_event(time, kind, contact, force[contact, 0] * step, force[contact, 1] * step, record)
 
 
 @dissolved_kernel
-def note_events(model: Model, record: Record, time: float, step: float, memory: Memory) -> None:
+def note_events(model: Model, time: float, step: float, memory: Memory, record: Record) -> None:
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
     An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
@@ -111,75 +117,71 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
     rest at a stop do not reach it. Joints with dry friction come to rest, or begin to move.
     """
     for contact in range(model.contact_link.shape[0]):
-        note_events_of_contact(model, record, time, step, contact, memory)
+        note_events_of_contact(model, time, step, contact, memory, record)
     for joint in range(model.parent.shape[0]):
-        if memory.stop_torque[joint] != 0.0 or memory.stopped[joint] != 0:
-            note_stop(model, record, time, step, joint, memory)
+        if memory.reaction.stop_torque[joint] != 0.0 or memory.reported.stopped[joint] != 0:
+            note_stop(model, time, step, joint, memory, record)
     for dry in range(memory.dry_joint.shape[0]):
         joint = memory.dry_joint[dry]
         rests = abs(memory.next_v[joint]) <= SLIP_SPEED
-        if memory.resting[dry] == -1:
-            memory.resting[dry] = 1 if abs(memory.v[joint]) <= SLIP_SPEED else 0
-        if rests != (memory.resting[dry] == 1):
-            log_event(record, time + step, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0)
-            memory.resting[dry] = 1 if rests else 0
+        if memory.reported.resting[dry] == -1:
+            memory.reported.resting[dry] = 1 if abs(memory.v[joint]) <= SLIP_SPEED else 0
+        if rests != (memory.reported.resting[dry] == 1):
+            log_event(time + step, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
+            memory.reported.resting[dry] = 1 if rests else 0
 
 
 @dissolved_kernel
 def note_events_of_contact(
-    model: Model, record: Record, time: float, step: float, contact: int, memory: Memory
+    model: Model, time: float, step: float, contact: int, memory: Memory, record: Record
 ) -> None:
     """Find what happened to a contact point in this step."""
-    pushed = memory.contacts.force[contact, 0] > 0.0
-    gap = memory.contacts.gap[contact]
-    if memory.closed[contact] == 0 and pushed:
-        memory.closed[contact] = 1
-        memory.slipping[contact] = 0
+    force, gap = memory.contacts.force, memory.contacts.gap[contact]
+    closed, slipping = memory.reported.closed, memory.reported.slipping
+    pushed = force[contact, 0] > 0.0
+    if closed[contact] == 0 and pushed:
+        closed[contact] = 1
+        slipping[contact] = 0
         stood = memory.tally.steps == 0 and gap <= LIFTOFF_GAP
         if stood:
-            normal, _ = contact_velocity(
-                model.contact_link[contact],
-                memory.contacts.position[contact],
-                memory.contacts.normal[contact],
-                memory.tree,
-            )
+            normal, _ = contact_velocity(model, memory.equations.tree, memory.contacts, contact)
             stood = normal >= -STANDING_SPEED
         if not stood:
-            note_event(record, time + step, TOUCHDOWN, contact, step, memory)
-    elif memory.closed[contact] == 1 and not pushed and gap > LIFTOFF_GAP:
-        memory.closed[contact] = 0
-        memory.slipping[contact] = 0
-        note_event(record, time, LIFTOFF, contact, step, memory)
-    if memory.closed[contact] == 1 and pushed:
-        slips = abs(memory.slip[contact]) > SLIP_SPEED
-        if slips != (memory.slipping[contact] == 1):
-            memory.slipping[contact] = 1 if slips else 0
-            note_event(record, time + step, SLIP if slips else STICK, contact, step, memory)
+            note_event(time + step, TOUCHDOWN, contact, step, force, record)
+    elif closed[contact] == 1 and not pushed and gap > LIFTOFF_GAP:
+        closed[contact] = 0
+        slipping[contact] = 0
+        note_event(time, LIFTOFF, contact, step, force, record)
+    if closed[contact] == 1 and pushed:
+        slips = abs(memory.reaction.slip[contact]) > SLIP_SPEED
+        if slips != (slipping[contact] == 1):
+            slipping[contact] = 1 if slips else 0
+            note_event(time + step, SLIP if slips else STICK, contact, step, force, record)
 
 
 @kernel
 def note_stop(
-    model: Model, record: Record, time: float, step: float, joint: int, memory: Memory
+    model: Model, time: float, step: float, joint: int, memory: Memory, record: Record
 ) -> None:
     """Find whether a joint reached a stop in this step, or left it."""
-    pushed = memory.stop_torque[joint] != 0.0
+    pushed = memory.reaction.stop_torque[joint] != 0.0
     way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
     stood = (
         memory.tally.steps == 0 and way <= LIFTOFF_GAP and abs(memory.v[joint]) <= STANDING_SPEED
     )
-    if pushed and memory.stopped[joint] == 0 and not stood:
-        impulse = abs(memory.stop_torque[joint]) * step
-        log_event(record, time + step, JOINT_STOP, joint, impulse, 0.0)
+    if pushed and memory.reported.stopped[joint] == 0 and not stood:
+        impulse = abs(memory.reaction.stop_torque[joint]) * step
+        log_event(time + step, JOINT_STOP, joint, impulse, 0.0, record)
     if pushed:
-        memory.stopped[joint] = 1
+        memory.reported.stopped[joint] = 1
     elif way > LIFTOFF_GAP:
-        memory.stopped[joint] = 0
+        memory.reported.stopped[joint] = 0
 
 
-def _row_writer() -> Callable[[Record, float, Memory], None]:
+def _row_writer() -> Callable[[float, Memory, Record], None]:
     """Make the kernel that writes rows, a loop for each recorded quantity."""
     lines = [
-        "def note_row(record, time, memory):",
+        "def note_row(time, memory, record):",
         " row = record.rows",
         " record.time[row] = time",
     ]
@@ -201,18 +203,17 @@ note_row = _row_writer()
 
 
 @kernel
-def note_row_when_due(record: Record, memory: Memory, clock: Clock) -> int:
+def note_row_when_due(memory: Memory, clock: Clock, record: Record) -> int:
     """Append a row if one is due, every so many steps and at the end; return which, or -1."""
     if clock.index % clock.record_every != 0 and clock.finishing == 0:
         return -1
-    note_row(record, clock.time, memory)
+    note_row(clock.time, memory, record)
     return int(record.rows - 1)
 
 
 @dissolved_kernel
-def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
+def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
     """Height of the centre of mass above the ground below it."""
-    tree = memory.tree
     mass = 0.0
     x = 0.0
     z = 0.0

@@ -14,27 +14,29 @@ positions first and the new velocity computed there, which is the same sequence 
 them with the new velocity at the end of each step.
 """
 
+# ruff: noqa: ARG001 - the kernels of all methods have the same arguments
+
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
-from heelstrike.dynamics.kernels import passive_force
+from heelstrike.dynamics.kernels import integrate, passive_force
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
+from heelstrike.sim.contacts.dry_friction import select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -49,19 +51,33 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
+from heelstrike.sim.time_stepping.impact import (
+    NEVER,
+    TOUCHING,
+    Impact,
+    allocate_impact,
+    begin_step,
+    call,
+    find_impact,
+    note_touching,
+    pose_impact,
+    solve_impact,
+)
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
 PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
 PAPER_SYMPLECTIC = int(Scheme.PAPER_SYMPLECTIC)
 MOREAU_JEAN = int(Scheme.MOREAU_JEAN)
 LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
+IMPACT_RESOLVED = int(Scheme.IMPACT_RESOLVED)
 
 # A contact point enters the problem when it could close within a step at this speed (m/s) or at
 # twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
@@ -84,12 +100,15 @@ class Stepping(Bundle):
         Gap up to which a contact point takes part, for schemes that decide by it (m).
     order : (solvers,) int
         Contact solvers in the order in which they are tried.
+    impact : Impact
+        What closes in a step.
     """
 
     step: float = number(float)
     scheme: int = number(int)
     activation: float = number(float)
     order: Integers = array("solvers", of=int)
+    impact: Impact = part(Impact)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +141,7 @@ class TimeStepping(Method):
     """
 
     step: float = 1e-3
-    scheme: Scheme = Scheme.GAP_LINEARISED
+    scheme: Scheme = Scheme.IMPACT_RESOLVED
     solver: str = "lemke"
     activation: float = 0.0
 
@@ -155,38 +174,42 @@ class TimeStepping(Method):
         """Contact solver tried first."""
         return self.solver
 
-    def new_work(self, robot: Robot) -> Stepping:  # noqa: ARG002
+    def new_work(self, robot: Robot) -> Stepping:
         """Return what its kernels read."""
         return Stepping(
             step=self.step,
             scheme=int(self.scheme),
             activation=self.activation,
             order=solver_order(self.solver),
+            impact=allocate_impact(robot),
         )
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
         return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names)
 
+    def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
+        """What touched other ground says nothing of this one."""
+        work.impact.touching[: robot.nc] = NEVER
+
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
-        if self.scheme is not Scheme.MOREAU_JEAN and np.any(
-            setting.ground.model().restitution > 0.0
-        ):
+        bounces = self.scheme in (Scheme.MOREAU_JEAN, Scheme.IMPACT_RESOLVED)
+        if not bounces and np.any(setting.ground.model().restitution > 0.0):
             raise SimulationError(
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
-                f"restitution; use Scheme.MOREAU_JEAN"
+                f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
             )
 
 
 @dissolved_kernel
-def begin(
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,  # noqa: ARG001
-    work: Stepping,  # noqa: ARG001
-    record: Record,  # noqa: ARG001
-) -> int:
+def is_linearised(scheme: int) -> bool:
+    """Whether a scheme bounds the gap at the end of the step."""
+    return scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
+
+
+@dissolved_kernel
+def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
     """Begin: there is nothing to prepare."""
     return DONE
 
@@ -194,121 +217,117 @@ def begin(
 @dissolved_kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
+    equations = memory.equations
     if work.scheme == LINEARLY_IMPLICIT:
-        for i in range(memory.added.shape[0]):
-            memory.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
-    evaluate_equations(model, memory.q, memory.v, memory)
-    locate_contacts(model, ground, memory)
+        for i in range(model.nv):
+            equations.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
+    evaluate_equations(model, memory.q, memory.v, equations)
+    locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
 
 
 @dissolved_kernel
-def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
+def free_velocity(model: Model, work: Stepping, time: float, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
     The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
     order that adds h D + h² K to the mass matrix, as if it were armature, and −h K v to the force.
     """
-    nv = model.parent.shape[0]
-    passive_force(model, memory.q, memory.v, memory.force)
-    for i in range(model.actuator_joint.shape[0]):
-        memory.force[model.actuator_joint[i]] += memory.torque[i]
-    if scheme == LINEARLY_IMPLICIT:
-        for i in range(nv):
-            memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
-        if memory.programs[SOLVE] != 0:
-            weigh(model, memory)  # the program has not heard of it
-    for i in range(nv):
-        memory.rate[i] = step * (memory.force[i] - memory.bias[i])
-    solve_mass_matrix(model, memory, memory.rate)
-    for i in range(nv):
-        memory.next_v[i] = memory.v[i] + memory.rate[i]
+    step, equations, v, next_v = work.step, memory.equations, memory.v, memory.next_v
+    force, rate = equations.force, equations.rate
+    passive_force(model, memory.q, v, force)
+    for i in range(model.nu):
+        force[model.actuator_joint[i]] += memory.torque[i]
+    if work.scheme == LINEARLY_IMPLICIT:
+        for i in range(model.nv):
+            force[i] -= step * memory.stiffness[i] * v[i]
+        if equations.programs[SOLVE] != 0:
+            weigh(model, equations)  # the program has not heard of it
+    for i in range(model.nv):
+        rate[i] = step * (force[i] - equations.bias[i])
+    solve_mass_matrix(model, equations, rate)
+    for i in range(model.nv):
+        next_v[i] = v[i] + rate[i]
+    if share_over_step(time, step, memory.pushes):
+        for i in range(model.nv):
+            rate[i] = 0.0
+        add_pushes(model, equations.tree, memory.pushes, rate)
+        solve_mass_matrix(model, equations, rate)
+        for i in range(model.nv):
+            next_v[i] += step * rate[i]
 
 
 @dissolved_kernel
-def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
-    """Add to the free velocity what pushes do in this step."""
-    if not share_over_step(memory.pushes, time, step):
-        return
-    nv = model.parent.shape[0]
-    for i in range(nv):
-        memory.rate[i] = 0.0
-    add_pushes(model, memory.tree, memory.pushes, memory.rate)
-    solve_mass_matrix(model, memory, memory.rate)
-    for i in range(nv):
-        memory.next_v[i] += step * memory.rate[i]
-
-
-@dissolved_kernel
-def select_candidates(
-    model: Model, step: float, scheme: int, activation: float, memory: Memory
-) -> int:
-    """List the contact points that could act in this step, with their free terms."""
-    contacts = memory.contacts
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
-    farthest = FAR_STEPS * CLOSING_SPEED * step
-    if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
-        farthest = activation
-    count = 0
-    usual = memory.programs[VELOCITIES] != 0
-    for contact in range(model.contact_link.shape[0]):
-        if contacts.gap[contact] <= farthest:
-            memory.candidate[count] = contact
-            usual = usual and memory.usual_place[contact] >= 0
-            count += 1
-    if count == 0:
-        return 0
-    near = count
-    velocity = memory.point_velocity
-    if usual:
-        play(
-            memory.programs[VELOCITIES],
-            (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.next_v, velocity,
-            ),
-        )  # fmt: skip
+def find_velocities(
+    model: Model, contacts: Contacts, v: Floats, straight: bool, tree: Workspace, usual: UsualPoints
+) -> None:
+    """Velocities of the usual points by their program, or of all by the loops."""
+    velocity = usual.point_velocity
+    if straight:
+        play(usual.programs[VELOCITIES], (model, usual.usual_points, contacts, v, tree, velocity))
     else:
-        point_velocities(
-            model, memory.every_point, memory.tree, contacts.position, contacts.normal,
-            memory.next_v, velocity,
-        )  # fmt: skip
+        point_velocities(model, usual.every_point, contacts, v, tree, velocity)
+
+
+@kernel
+def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) -> bool:
+    """Whether there is a program for the contact points among the candidates, the first `near`."""
+    straight = usual.programs[program] != 0
+    for place in range(near):
+        straight = straight and usual.usual_place[candidate[place]] >= 0
+    return straight
+
+
+@dissolved_kernel
+def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
+    """List the contact points that could act in this step, with their free terms."""
+    contacts, assembly, step = memory.contacts, memory.assembly, work.step
+    candidate, problem = assembly.candidate, assembly.problem
+    linearised, calls = is_linearised(work.scheme), work.impact.calls
+    farthest = FAR_STEPS * CLOSING_SPEED * step
+    if work.scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
+        farthest = work.activation
+    near = 0
+    for contact in range(model.nc):
+        if contacts.gap[contact] <= farthest:
+            candidate[near] = contact
+            near += 1
+    if near == 0:
+        return 0
+    straight = are_usual(candidate, near, VELOCITIES, memory.usual)
+    tree = memory.equations.tree
+    find_velocities(model, contacts, memory.next_v, straight, tree, memory.usual)
+    velocity = memory.usual.point_velocity
     count = 0
     for place in range(near):
-        contact = memory.candidate[place]
+        contact = candidate[place]
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if linearised:
-            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+            far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
+            if far and (calls == 0 or work.impact.called[contact] == 0):
                 continue
             normal += gap / step
-        elif scheme == MOREAU_JEAN:
-            before, _ = contact_velocity(
-                model.contact_link[contact],
-                contacts.position[contact],
-                contacts.normal[contact],
-                memory.tree,
-            )
-            if gap + 0.5 * step * before > activation:
+        elif work.scheme == MOREAU_JEAN:
+            before, _ = contact_velocity(model, tree, contacts, contact)
+            if gap + 0.5 * step * before > work.activation:
                 continue
-            normal += memory.restitution[contact] * before
-        memory.problem.free[2 * count] = normal
-        memory.problem.free[2 * count + 1] = velocity[contact, 1]
-        memory.problem.set[count] = CONE
-        memory.problem.friction[count] = memory.friction[contact]
-        memory.answer.mode[count] = memory.mode[contact]
-        memory.candidate[count] = contact
+            normal += memory.surface.restitution[contact] * before
+        problem.free[2 * count] = normal
+        problem.free[2 * count + 1] = velocity[contact, 1]
+        problem.set[count] = CONE
+        problem.friction[count] = memory.surface.friction[contact]
+        assembly.answer.mode[count] = memory.reaction.mode[contact]
+        candidate[count] = contact
         count += 1
     return count
 
 
 @dissolved_kernel
-def select_stops(
-    model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
-) -> int:
+def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
-    points = model.contact_link.shape[0]
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
-    for joint in range(model.parent.shape[0]):
+    assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
+    linearised, calls = is_linearised(work.scheme), work.impact.calls
+    for joint in range(model.nv):
         for end in range(2):
             sign = 1.0 - 2.0 * end
             limit = model.upper[joint] if end == 1 else model.lower[joint]
@@ -316,263 +335,338 @@ def select_stops(
             normal = sign * memory.next_v[joint]
             before = sign * memory.v[joint]
             if linearised:
-                if not gap < step * max(CLOSING_RATE, -2.0 * normal):
+                far = not gap < step * max(CLOSING_RATE, -2.0 * normal)
+                place = model.nc + 2 * joint + end
+                if far and (calls == 0 or work.impact.called[place] == 0):
                     continue
                 normal += gap / step
-            elif scheme == MOREAU_JEAN:
-                if not gap + 0.5 * step * before <= activation:
+            elif work.scheme == MOREAU_JEAN:
+                if not gap + 0.5 * step * before <= work.activation:
                     continue
-            elif not gap <= activation:
+            elif not gap <= work.activation:
                 continue
-            memory.problem.free[2 * count] = normal
-            memory.problem.free[2 * count + 1] = 0.0
-            memory.problem.set[count] = HALF_LINE
-            memory.problem.friction[count] = 0.0
-            memory.answer.mode[count] = memory.stop_mode[joint, end]
-            memory.candidate[count] = points + 2 * joint + end
+            problem.free[2 * count] = normal
+            problem.free[2 * count + 1] = 0.0
+            problem.set[count] = HALF_LINE
+            problem.friction[count] = 0.0
+            assembly.answer.mode[count] = memory.reaction.stop_mode[joint, end]
+            assembly.candidate[count] = model.nc + 2 * joint + end
             count += 1
     return count
 
 
 @kernel
-def write_rows(model: Model, memory: Memory, count: int) -> None:
-    """Write the Jacobian rows of contact points and stops; those of dry joints are written.
+def write_rows(
+    model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
+) -> None:
+    """Write the Jacobian rows of the first `count` candidates, contact points and stops.
 
     A stop has a normal row ±1 at its joint and a tangent row of zeros.
     """
-    points = model.contact_link.shape[0]
-    for place in range(count - memory.dry_joint.shape[0]):
-        candidate = memory.candidate[place]
-        if candidate < points:
-            contact_rows(model, memory, candidate, place)
-            continue
-        stop = candidate - points
-        write_unit_row(memory, stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2))
-
-
-@dissolved_kernel
-def are_usual(memory: Memory, near: int) -> bool:
-    """Whether there are programs for the contact points among the candidates, the first `near`."""
-    usual = memory.programs[DELASSUS] != 0
-    for place in range(near):
-        usual = usual and memory.usual_place[memory.candidate[place]] >= 0
-    return usual
+    for place in range(count):
+        stop = assembly.candidate[place] - model.nc
+        if stop < 0:
+            contact_rows(model, tree, contacts, assembly.candidate[place], place, assembly)
+        else:
+            write_unit_row(stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2), assembly)
 
 
 @kernel
-def joint_row(model: Model, memory: Memory, place: int) -> tuple[int, int, float]:
+def joint_row(
+    model: Model, dry_joint: Integers, candidate: Integers, place: int
+) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
-    stop = memory.candidate[place] - model.contact_link.shape[0]
-    dry = stop - 2 * model.parent.shape[0]
+    stop = candidate[place] - model.nc
+    dry = stop - 2 * model.nv
     if dry >= 0:
-        return 2 * place + 1, memory.dry_joint[dry], 1.0
+        return 2 * place + 1, dry_joint[dry], 1.0
     return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
 
 
 @dissolved_kernel
-def gather_delassus(model: Model, memory: Memory, near: int, count: int) -> None:
+def gather_delassus(
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int,
+    equations: Equations, usual: UsualPoints, assembly: Assembly,
+) -> None:  # fmt: skip
     """Delassus matrix of all usual points; that of the candidates too, if these are others."""
-    contacts = memory.contacts
+    candidate, usual_place = assembly.candidate, usual.usual_place
     if near > 0:
         play(
-            memory.programs[DELASSUS],
+            usual.programs[DELASSUS],
             (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.factor, memory.point_rows, memory.usual_problem.delassus,
+                model, usual.usual_points, equations.tree, contacts, equations.factor,
+                usual.point_rows, usual.usual_problem.delassus,
             ),
         )  # fmt: skip
-    if near == count == memory.usual_points.shape[0]:
+    if near == count == usual.usual_points.shape[0]:
         return
     for place in range(near):
-        row = 2 * memory.usual_place[memory.candidate[place]]
+        row = 2 * usual_place[candidate[place]]
         for other in range(near):
-            column = 2 * memory.usual_place[memory.candidate[other]]
+            column = 2 * usual_place[candidate[other]]
             for i in range(2):
                 for j in range(2):
-                    entry = memory.usual_problem.delassus[row + i, column + j]
-                    memory.problem.delassus[2 * place + i, 2 * other + j] = entry
+                    entry = usual.usual_problem.delassus[row + i, column + j]
+                    assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
     for place in range(near, count):
-        add_joint(model, memory, near, place)
+        add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
 
 
 @dissolved_kernel
-def add_joint(model: Model, memory: Memory, near: int, place: int) -> None:
+def add_joint(
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, place: int,
+    equations: Equations, usual: UsualPoints, assembly: Assembly,
+) -> None:  # fmt: skip
     """Add the stop or dry joint at a place to the Delassus matrix of the candidates before.
 
     What a unit impulse along its row does to the joint velocities, A⁻¹ e, goes to that row of
-    ``memory.jacobian``.
+    ``assembly.jacobian``.
     """
-    contacts, delassus, velocity = memory.contacts, memory.problem.delassus, memory.point_velocity
-    row, joint, sign = joint_row(model, memory, place)
-    change = memory.jacobian[row]
-    for j in range(model.parent.shape[0]):
+    candidate, delassus = assembly.candidate, assembly.problem.delassus
+    row, joint, sign = joint_row(model, dry_joint, candidate, place)
+    change = assembly.jacobian[row]
+    for j in range(model.nv):
         change[j] = 0.0
     change[joint] = sign
-    solve_mass_matrix(model, memory, change)
+    solve_mass_matrix(model, equations, change)
     for other in range(2 * place + 2):
         for own in range(2 * place, 2 * place + 2):
             delassus[own, other] = 0.0
             delassus[other, own] = 0.0
     if near > 0:
-        play(
-            memory.programs[VELOCITIES],
-            (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                change, velocity,
-            ),
-        )  # fmt: skip
+        find_velocities(model, contacts, change, True, equations.tree, usual)
     for other in range(near):
         for i in range(2):
-            entry = velocity[memory.candidate[other], i]
+            entry = usual.point_velocity[candidate[other], i]
             delassus[row, 2 * other + i] = entry
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
-        column, its_joint, its_sign = joint_row(model, memory, other)
+        column, its_joint, its_sign = joint_row(model, dry_joint, candidate, other)
         entry = its_sign * change[its_joint]
         delassus[row, column] = entry
         delassus[column, row] = entry
 
 
 @dissolved_kernel
-def push_candidates(model: Model, memory: Memory, near: int, count: int) -> None:
-    """Add what the impulses of the candidates do to the velocity, after `gather_delassus`."""
-    contacts = memory.contacts
-    for contact in range(model.contact_link.shape[0]):
-        memory.point_impulse[contact, 0] = 0.0
-        memory.point_impulse[contact, 1] = 0.0
+def push_candidates(
+    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int,
+    equations: Equations, usual: UsualPoints, v: Floats,
+) -> None:  # fmt: skip
+    """Add what the impulses of the candidates do to a velocity, after `gather_delassus`."""
+    impulse = assembly.answer.impulse
+    for contact in range(model.nc):
+        for k in range(2):
+            usual.point_impulse[contact, k] = 0.0
     for place in range(near):
-        memory.point_impulse[memory.candidate[place], 0] = memory.answer.impulse[2 * place]
-        memory.point_impulse[memory.candidate[place], 1] = memory.answer.impulse[2 * place + 1]
+        for k in range(2):
+            usual.point_impulse[assembly.candidate[place], k] = impulse[2 * place + k]
     if near > 0:
         play(
-            memory.programs[PUSH],
+            usual.programs[PUSH],
             (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.factor, memory.point_impulse, memory.rate, memory.next_v,
+                model, usual.usual_points, contacts, equations.factor, usual.point_impulse,
+                equations.tree, equations.rate, v,
             ),
         )  # fmt: skip
     for place in range(near, count):
-        row, _, _ = joint_row(model, memory, place)
-        for j in range(model.parent.shape[0]):
-            memory.next_v[j] += memory.answer.impulse[row] * memory.jacobian[row, j]
+        row = 2 * place
+        if assembly.candidate[place] >= model.nc + 2 * model.nv:
+            row += 1
+        for j in range(model.nv):
+            v[j] += impulse[row] * assembly.jacobian[row, j]
+
+
+@kernel
+def push_all(
+    model: Model, near: int, count: int, straight: bool, contacts: Contacts, assembly: Assembly,
+    equations: Equations, usual: UsualPoints, v: Floats,
+) -> None:  # fmt: skip
+    """Add what the impulses of the candidates do to a velocity."""
+    if straight:
+        push_candidates(model, contacts, assembly, near, count, equations, usual, v)
+    else:
+        add_impulse(model, assembly, count, equations, v)
 
 
 @dissolved_kernel
-def solve_contacts(
-    model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
-) -> bool:
-    """Turn the free velocity into the velocity at the end of the step; return success."""
-    near = select_candidates(model, step, scheme, activation, memory)
-    count = select_stops(model, step, scheme, activation, near, memory)
-    count = select_dry_joints(model, count, memory)
-    nv = model.parent.shape[0]
-    points = model.contact_link.shape[0]
-    dry = points + 2 * nv
-    for j in range(nv):
-        memory.stop_torque[j] = 0.0
-        memory.stop_mode[j, 0] = 0
-        memory.stop_mode[j, 1] = 0
-    contacts = memory.contacts
-    for contact in range(model.contact_link.shape[0]):
-        contacts.force[contact, 0] = 0.0
-        contacts.force[contact, 1] = 0.0
-        memory.slip[contact] = 0.0
-        memory.mode[contact] = 0
-    for i in range(3):
-        memory.answer.residual[i] = 0.0
-    if count == 0:
-        return True
-    straight = are_usual(memory, near)
-    problem = memory.problem
+def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory: Memory) -> bool:
+    """Find the impulses of the candidates and add what they do to the velocity; return success."""
+    assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
+    equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
+    impact, step = work.impact, work.step
+    straight = are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
-        gather_delassus(model, memory, near, count)
-        if near == count == memory.usual_points.shape[0]:
-            problem = memory.usual_problem
+        gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        if near == count == usual.usual_points.shape[0]:
+            problem = usual.usual_problem
     else:
-        write_rows(model, memory, count)
-        assemble_delassus(model, memory, count)
-    press_dry_joints(model, step, count, memory)
+        joints = count - dry_joint.shape[0]
+        write_rows(model, equations.tree, contacts, joints, assembly)
+        assemble_delassus(model, equations, count, assembly)
     problem.count = count
-    status = solve_contact_kernel(problem, order, memory.solver, memory.answer)
-    if straight:
-        push_candidates(model, memory, near, count)
-    else:
-        add_impulse(model, memory, count, memory.next_v)
+    solved = solve_contact_kernel(problem, work.order, assembly.solver, assembly.answer) == SOLVED
+    if work.scheme == IMPACT_RESOLVED:
+        members = find_impact(model, step, memory.q, contacts.gap, problem, assembly, impact)
+        if members > 0:
+            impact.happens = 1
+            arriving = impact.arriving
+            for j in range(model.nv):
+                arriving[j] = impact.free[j]
+            push_all(model, near, count, straight, contacts, assembly, equations, usual, arriving)
+            pose_impact(
+                model, step, members, memory.q, equations, contacts, memory.surface, problem,
+                assembly, impact,
+            )  # fmt: skip
+            solved = solve_impact(work.order, members, problem, impact, assembly) and solved
+    push_all(model, near, count, straight, contacts, assembly, equations, usual, memory.next_v)
+    return solved
+
+
+@dissolved_kernel
+def may_go_through(model: Model, step: float, near: int, v: Floats, memory: Memory) -> bool:
+    """Whether the velocity that was found could take something through a stop or the ground."""
+    q, gap = memory.q, memory.contacts.gap
+    beyond = 0
+    for joint in range(model.nv):
+        after = q[joint] + step * v[joint]
+        low, high = model.lower[joint] - TOUCHING, model.upper[joint] + TOUCHING
+        beyond += (after < low) | (after > high)
+    within = 0
+    for contact in range(model.nc):
+        within += gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
+    return beyond > 0 or within > near
+
+
+@kernel
+def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Impact) -> bool:
+    """Call what would go through at the velocity that was found; return if any is new."""
+    calls = impact.calls
+    usual, contacts = memory.usual, memory.contacts
+    point_velocities(
+        model, usual.every_point, contacts, v, memory.equations.tree, usual.point_velocity
+    )
+    for contact in range(model.nc):
+        if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -TOUCHING:
+            call(contact, impact)
+    for joint in range(model.nv):
+        after = memory.q[joint] + step * v[joint]
+        if after < model.lower[joint] - TOUCHING:
+            call(model.nc + 2 * joint, impact)
+        if after > model.upper[joint] + TOUCHING:
+            call(model.nc + 2 * joint + 1, impact)
+    return impact.calls > calls
+
+
+@dissolved_kernel
+def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
+    """Turn the free velocity into the velocity at the end of the step; return success.
+
+    What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
+    a candidate, is called and the step solved again.
+    """
+    assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
+    begin_step(memory.next_v, impact)
+    again = True
+    solved = True
+    count = 0
+    while again:
+        impact.happens = 0
+        for i in range(3):
+            assembly.answer.residual[i] = 0.0
+        near = select_candidates(model, work, memory)
+        count = select_stops(model, work, near, memory)
+        count = select_dry_joints(
+            model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
+        )
+        if count > 0:
+            solved = solve_candidates(model, near, count, work, memory)
+        v = impact.arriving if impact.happens == 1 else memory.next_v
+        again = (
+            is_linearised(work.scheme)
+            and solved
+            and may_go_through(model, work.step, near, v, memory)
+            and call_missed(model, work.step, v, memory, impact)
+        )
+        if again:
+            for j in range(model.nv):
+                memory.next_v[j] = impact.free[j]
+    if work.scheme == IMPACT_RESOLVED:
+        note_touching(model, assembly.candidate, count, impact)
+    note_answer(model, work.step, count, memory)
+    return solved
+
+
+@dissolved_kernel
+def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
+    """Keep the forces, slips and modes of the candidates; all others have none."""
+    answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
+    for joint in range(model.nv):
+        reaction.stop_torque[joint] = 0.0
+        reaction.stop_mode[joint, 0] = 0
+        reaction.stop_mode[joint, 1] = 0
+    for contact in range(model.nc):
+        force[contact, 0] = 0.0
+        force[contact, 1] = 0.0
+        reaction.slip[contact] = 0.0
+        reaction.mode[contact] = 0
     for place in range(count):
-        contact = memory.candidate[place]
-        if contact >= dry:
-            impulse = memory.answer.impulse[2 * place + 1]
-            note_dry_joint(contact - dry, impulse, step, memory.answer.mode[place], memory)
-            continue
-        if contact >= points:
-            joint = (contact - points) // 2
-            sign = 1.0 - 2.0 * ((contact - points) % 2)
-            memory.stop_torque[joint] += sign * memory.answer.impulse[2 * place] / step
-            memory.stop_mode[joint, (contact - points) % 2] = memory.answer.mode[place] != 0
-            continue
-        contacts.force[contact, 0] = memory.answer.impulse[2 * place] / step
-        contacts.force[contact, 1] = memory.answer.impulse[2 * place + 1] / step
-        memory.slip[contact] = memory.answer.velocity[2 * place + 1]
-        memory.mode[contact] = memory.answer.mode[place]
-    return status == SOLVED
+        contact = memory.assembly.candidate[place]
+        stop = contact - model.nc
+        dry = stop - 2 * model.nv
+        normal, tangent = answer.impulse[2 * place], answer.impulse[2 * place + 1]
+        if dry >= 0:
+            reaction.friction_torque[memory.dry_joint[dry]] = tangent / step
+            reaction.dry_mode[dry] = answer.mode[place]
+        elif stop >= 0:
+            reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step
+            reaction.stop_mode[stop // 2, stop % 2] = answer.mode[place] != 0
+        else:
+            force[contact, 0] = normal / step
+            force[contact, 1] = tangent / step
+            reaction.slip[contact] = answer.velocity[2 * place + 1]
+            reaction.mode[contact] = answer.mode[place]
 
 
 @dissolved_kernel
 def decide(
-    controller: Any,  # noqa: ARG001 - asked by the frame
-    control: Control,  # noqa: ARG001
-    model: Model,
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
-    free_velocity(model, work.step, work.scheme, memory)
-    push_robot(model, clock.time, work.step, memory)
-    solved = solve_contacts(model, work.step, work.scheme, work.activation, work.order, memory)
+    model = scene.model
+    free_velocity(model, work, clock.time, memory)
+    solved = solve_contacts(model, work, memory)
     note_extremes(model, memory)
-    note_events(model, record, clock.time, work.step, memory)
+    note_events(model, clock.time, work.step, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 
 @dissolved_kernel
 def report(
-    controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,  # noqa: ARG001
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> None:
     """Append a row if one is due."""
-    note_row_when_due(record, memory, clock)
+    note_row_when_due(memory, clock, record)
 
 
 @dissolved_kernel
 def move(
-    controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    model: Model,
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,
-    record: Record,  # noqa: ARG001
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
     """Move on by a step."""
+    model = scene.model
+    q, v, next_v = memory.q, memory.v, memory.next_v
     memory.tally.steps += 1
-    for i in range(model.parent.shape[0]):
-        if work.scheme == PAPER_EXPLICIT:
-            memory.q[i] += work.step * memory.v[i]
-        elif work.scheme == MOREAU_JEAN:
-            memory.q[i] += 0.5 * work.step * (memory.v[i] + memory.next_v[i])
-        else:
-            memory.q[i] += work.step * memory.next_v[i]
-        memory.v[i] = memory.next_v[i]
+    if work.scheme == MOREAU_JEAN:
+        for i in range(model.nv):
+            v[i] += next_v[i]
+        integrate(model, q, v, 0.5 * work.step, q)
+    else:
+        along = v if work.scheme == PAPER_EXPLICIT else next_v
+        if work.impact.happens == 1:
+            along = work.impact.arriving
+        integrate(model, q, along, work.step, q)
+    for i in range(model.nv):
+        v[i] = next_v[i]
     clock.time = clock.start + (clock.index + 1) * work.step
     return DONE
 

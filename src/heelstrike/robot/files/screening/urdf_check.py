@@ -134,7 +134,7 @@ def check_urdf_tree(root: Element, label: str) -> None:
         above, below = (
             "" if end is None else end.get("link", "") for end in (ends["parent"], ends["child"])
         )
-        what = f"{label}: joint {joint.get('name', '')!r}"
+        what = f"{_at(label, joint)}: joint {joint.get('name', '')!r}"
         for kind, link in (("parent", above), ("child", below)):
             if link not in names:
                 raise RobotError(
