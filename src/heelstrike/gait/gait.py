@@ -16,6 +16,7 @@ from heelstrike.errors import GaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.polynomials import evaluated
+from heelstrike.robot.model import NUMBERS
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
@@ -466,7 +467,7 @@ def fingerprint(robot: Robot) -> str:
     """
     digest = hashlib.sha256()
     for field, value in robot.model.members().items():
-        if field in YOUNGER and np.all(np.asarray(value) == robot.model.declared[field].default):
+        if field in YOUNGER and np.all(np.asarray(value) == NUMBERS[field].default):
             continue
         numbers = " ".join(f"{x + 0.0:.9g}" for x in np.ravel(np.asarray(value, dtype=np.float64)))
         digest.update(f"{field} {numbers};".encode())
