@@ -51,6 +51,7 @@ def _compiled_for(signature: Any, function: Any, **options: Any) -> Any:
 
 
 import heelstrike.compiler.bundle as bundles  # noqa: E402
+from heelstrike.compiler import bundle_type, words  # noqa: E402
 
 _by_address: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
 _make_table = bundles.Bundle._new_table
@@ -62,9 +63,16 @@ def _new_table(self: Any) -> Any:
     return table
 
 
+def _copy_words(source: np.ndarray, target: np.ndarray) -> None:
+    """Copy an array into another, as far as both go."""
+    count = min(source.size, target.size)
+    target.reshape(-1)[:count] = source.reshape(-1)[:count]
+
+
 bundles.Bundle._new_table = _new_table  # type: ignore[method-assign]
-bundles.address_of = lambda bundle: bundle.address
-bundles.bundle_at = lambda _: lambda address: _by_address[int(address)]  # type: ignore
+words.copy_words = _copy_words
+bundle_type.address_of = lambda bundle: bundle.address
+bundle_type.bundle_at = lambda _: lambda address: _by_address[int(address)]
 
 compilation.compiled_for = _compiled_for
 compilation.loop_for = _compiled_for  # type: ignore[assignment]

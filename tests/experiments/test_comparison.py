@@ -103,7 +103,7 @@ def test_methods_that_cannot_are_left_out_and_say_why() -> None:
         "methods": {
             "events": hs.EventDriven(),
             "bouncing": hs.TimeStepping(scheme=Scheme.MOREAU_JEAN),
-            "plastic": hs.TimeStepping(),
+            "plastic": hs.TimeStepping(scheme=Scheme.GAP_LINEARISED),
             "soft": hs.Compliant(),
         },
         "state": walking.gait().initial_state,

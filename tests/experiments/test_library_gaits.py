@@ -104,15 +104,15 @@ def test_robots_with_soles_walk_by_time_stepping(name: str) -> None:
     """Its errors are of first order in h: a foot that lands or leaves slips for a part of a step.
 
     At 1 ms and landing speeds of up to 1.4 m/s that is 1.4 mm a step at most. The tracking error
-    need not vanish with h: where a touchdown falls into two time steps, the toe may slide under the
-    first part of the impulse (geyer7), which the impact of all points at once does not know.
+    vanishes with h, though not evenly: whether heel and toe land in one time step or in two is
+    decided by errors that are as small.
     """
     assert walked(name, hs.TimeStepping(step=1e-3)).tracking_rms_rad <= 2e-3
-    coarse, fine = (walked(name, hs.TimeStepping(step=h), FEW) for h in (1e-3, 5e-4))
+    coarse, fine = (walked(name, hs.TimeStepping(step=h), FEW) for h in (1e-3, 2e-5))
     assert coarse.tracking_rms_rad <= 2e-3
-    assert fine.tracking_rms_rad < coarse.tracking_rms_rad
+    assert fine.tracking_rms_rad <= 0.3 * coarse.tracking_rms_rad
     assert coarse.slip_max_m <= FEW * 1.4e-3
-    assert fine.slip_max_m <= 0.6 * coarse.slip_max_m + 1e-12
+    assert fine.slip_max_m <= 0.05 * coarse.slip_max_m + 1e-12
 
 
 @pytest.mark.parametrize("name", POINTS)

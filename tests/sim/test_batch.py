@@ -16,7 +16,7 @@ from heelstrike.control import ControlState
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim import Contacts, RunStatus
 from heelstrike.sim.batch import Batch
-from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.closed_sets import EventKind, Scheme
 from heelstrike.sim.method import Method
 from heelstrike.sim.setting import Setting
 
@@ -290,6 +290,9 @@ def test_progress_counts_and_a_pipe_stays_quiet(capfd: pytest.CaptureFixture[str
     assert capfd.readouterr() == ("", "")
 
 
+PLASTIC = hs.TimeStepping(scheme=Scheme.GAP_LINEARISED)
+
+
 @pytest.mark.parametrize(
     ("options", "words"),
     [
@@ -309,7 +312,7 @@ def test_progress_counts_and_a_pipe_stays_quiet(capfd: pytest.CaptureFixture[str
         ({"pushes": 3.0}, "Push"),
         ({"record_every": 0}, "record_every"),
         ({"threads": 0}, "threads"),
-        ({"ground": [hs.Ground(), hs.Ground(restitution=0.5)]}, "restitution"),
+        ({"ground": [hs.Ground(), hs.Ground(restitution=0.5)], "method": PLASTIC}, "restitution"),
         ({"robot": []}, "robot is empty"),
         ({"robot": ["bravo7"]}, "robot must be"),
         ({"method": "fast"}, "way through time"),

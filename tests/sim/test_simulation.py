@@ -81,7 +81,8 @@ def test_unknown_keywords_raise() -> None:
 
 def test_restitution_needs_a_scheme_that_knows_it() -> None:
     with pytest.raises(hs.SimulationError, match="MOREAU_JEAN"):
-        run(None, ground=hs.Ground(restitution=0.5))
+        scheme = hs.TimeStepping(scheme=Scheme.GAP_LINEARISED)
+        run(None, ground=hs.Ground(restitution=0.5), method=scheme)
 
 
 def test_a_torque_of_the_wrong_shape_ends_the_run_and_keeps_it() -> None:

@@ -35,7 +35,9 @@ def _copy_words(context: Any, source: Any, target: Any) -> Any:
         byte = ir.IntType(8).as_pointer()
         copy = builder.module.declare_intrinsic("llvm.memcpy", [byte, byte, ir.IntType(64)])
         ends = [builder.bitcast(array.data, byte) for array in reversed(found)]
-        size = builder.mul(found[0].nitems, found[0].itemsize)
+        few = builder.icmp_signed("<", found[0].nitems, found[1].nitems)
+        count = builder.select(few, found[0].nitems, found[1].nitems)
+        size = builder.mul(count, found[0].itemsize)
         builder.call(copy, [*ends, size, ir.Constant(ir.IntType(1), 0)])
         return context.get_dummy_value()
 
@@ -43,4 +45,4 @@ def _copy_words(context: Any, source: Any, target: Any) -> Any:
 
 
 copy_words: Any = intrinsic(_copy_words)
-"""``copy_words(source, target)``: copy an array into one of as many numbers."""
+"""``copy_words(source, target)``: copy an array into another, as far as both of them go."""

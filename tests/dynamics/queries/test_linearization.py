@@ -43,7 +43,7 @@ def free_acceleration(
     for place, joint in enumerate(robot.model.actuator_joint):
         force[joint] = force[joint] + torque[place]
     matrix, factor = np.zeros((n, n), dtype=dtype), np.zeros((n, n), dtype=dtype)
-    run(kernels.forward_dynamics, robot.model, matrix, factor, force, work, acceleration)
+    run(kernels.forward_dynamics, robot.model, force, work, matrix, factor, acceleration)
     return acceleration
 
 

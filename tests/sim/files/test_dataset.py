@@ -110,7 +110,7 @@ def test_labels_and_units() -> None:
     assert push == run.contact_force[np.flatnonzero(run.time == 0.3)[0], 3, 0]
     assert data.attrs["status"] == "completed"
     assert data.attrs["robot"] == "bravo7"
-    assert data.attrs["method_scheme"] == "gap_linearised"
+    assert data.attrs["method_scheme"] == "impact_resolved"
     assert data.attrs["heelstrike_version"] == hs.__version__
     assert data["event_time"].size == len(run.events)
 

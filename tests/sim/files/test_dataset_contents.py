@@ -209,7 +209,7 @@ def test_attributes(data: xarray.Dataset) -> None:
         "message": "the robot fell",
         "method": "TimeStepping",
         "method_step": 0.25,
-        "method_scheme": "gap_linearised",
+        "method_scheme": "impact_resolved",
         "method_solver": "gauss_seidel",
         "method_activation": 1e-4,
         "impulses_in_events": 0,

@@ -610,6 +610,9 @@ def meet_event(
 def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> int:
     """Find what the robot stands on when the simulation begins."""
     q, v, equations = memory.q, memory.v, memory.equations
+    # Modes that are guessed here are those of another instant: where forces or accelerations are
+    # not unique, what comes of amending them need not be what the solvers would say.
+    memory.assembly.solver.settings.amendments = 0
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]

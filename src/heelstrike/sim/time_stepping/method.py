@@ -506,7 +506,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         assemble_delassus(model, equations, count, assembly)
     problem.count = count
     solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
-    if work.scheme == IMPACT_RESOLVED:
+    if solved and work.scheme == IMPACT_RESOLVED:
         members = find_impact(model, step, memory.q, contacts.gap, problem, assembly, impact)
         if members > 0:
             impact.happens = 1
@@ -515,7 +515,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
                 arriving[j] = impact.free[j]
             push_all(model, near, count, straight, memory, arriving)
             pose_impact(model, step, members, problem, memory, impact)
-            solved = solve_impact(work.order, members, problem, impact, assembly) and solved
+            solved = solve_impact(work.order, members, problem, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
     return solved
 
