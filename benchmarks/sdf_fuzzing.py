@@ -96,6 +96,8 @@ def spoilt(text: str, draw: random.Random) -> tuple[str, str]:
     done = []
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
         parents = {child: parent for parent in root.iter() for child in parent}
+        if not parents:
+            break  # all is lost
         element = draw.choice(list(parents))
         parent = parents[element]
         kind = draw.choice(("text", "text", "text", "lost", "twice", "tag", "attribute", "moved"))

@@ -15,6 +15,7 @@ turning explains, with the file.
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import time
 import warnings
@@ -82,7 +83,9 @@ def outcome(robot: Published, clones: Path, scratch: Path) -> Outcome:
         try:
             loaded = load_robot(path, **options)
         except HeelstrikeError as error:
-            words = str(error).replace(str(path), path.name).replace(str(scratch), "")
+            words = str(error).replace(str(path), path.name)
+            for folder in (path.resolve().parent, scratch.resolve(), scratch):
+                words = words.replace(f"{folder}{os.sep}", "")
             return Outcome(robot, words, loaded=False)
     seconds = time.process_time() - start
     remarks = [str(one.message) for one in caught]

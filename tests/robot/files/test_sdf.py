@@ -149,6 +149,12 @@ def test_what_is_not_said_is_what_the_format_means() -> None:
     assert np.isinf(robot.model.torque_upper).all()
 
 
+def test_a_moment_that_is_not_said_is_one() -> None:
+    with pytest.warns(RobotWarning, match="1 kg m² about each axis: shin"):
+        robot = read_mjcf(sdf().replace("<iyy>0.03</iyy>", ""))
+    assert robot.model.inertia[1] == 1.0
+
+
 def test_a_joint_with_a_spring_and_no_effort_is_passive() -> None:
     robot = quiet(sdf().replace("<effort>0</effort>", ""))
     assert robot.actuator_names == ("knee",)

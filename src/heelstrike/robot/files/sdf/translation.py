@@ -36,6 +36,7 @@ TWO_HINGES = ("universal", "revolute2")
 PLANAR = "drake:planar"
 PLANAR_AXES = (("TX", "slide", 0), ("TY", "slide", 1), ("RZ", "hinge", 2))  # as MuJoCo's of URDF
 NO_LIMIT = 1e10  # SDF writes 1e16 where there is no limit
+WEIGHED = ("mass", "inertia/ixx", "inertia/iyy", "inertia/izz")
 SHOWN = 6  # oddities that a message lists before it counts the rest
 STRAIGHT = 1e-15
 """Entries of rotations below which they are rounding: a quarter turn of 1.5707963267948966."""
@@ -230,9 +231,10 @@ def _write_link(model: _Model, link: Element, holder: Node, place: Floats) -> No
     if not truth(link, "gravity", label, True):
         body.set("gravcomp", "1")
     inertial = link.find("inertial")
-    if inertial is None or inertial.find("mass") is None or inertial.find("inertia") is None:
+    if inertial is None or any(inertial.find(part) is None for part in WEIGHED):
         model.tell(
-            "without <inertial>, <mass> or <inertia>; SDF means 1 kg, and 1 kg m² about each axis",
+            "without <inertial>, <mass> or moments of <inertia>; SDF means 1 kg, and 1 kg m² about "
+            "each axis",
             name,
         )
     if inertial is not None and link.find("inertial").get("auto", "false") in ("true", "1"):  # type: ignore[union-attr]
