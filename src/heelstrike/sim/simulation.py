@@ -533,6 +533,7 @@ class Simulation:
         self._control.voltage = voltage
         self._name = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
+        self._decides += " (voltages)" if voltage else ""
         self._shown = read_only(memory.contacts)
         memory.stiffness[:] = robot.model.stiffness
         memory.damping[:] = robot.model.damping

@@ -16,7 +16,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.errors import ControllerError, RobotError
+from heelstrike.errors import ControllerError, RobotError, SimulationError
 from heelstrike.robot.motors import torque_range
 from heelstrike.sim import Scheme
 from heelstrike.sim.controller.motors import limit_torque, motor_damping, motor_torque
@@ -272,6 +272,16 @@ def test_a_snapshot_holds_what_is_commanded(method: str, tmp_path: Path) -> None
         one.advance(0.3)
     np.testing.assert_array_equal(whole.state.q, back.state.q)
     np.testing.assert_array_equal(whole.state.v, back.state.v)
+
+
+def test_a_snapshot_of_torques_is_none_of_voltages() -> None:
+    state = hs.State([0.0], [0.0])
+    torques, volts = (
+        hs.Simulation(shaft(), steady(0.5, commands_voltage=voltage), state=state)
+        for voltage in (False, True)
+    )
+    with pytest.raises(SimulationError, match=r"another controller: .*swing, not .*\(voltages\)"):
+        volts.restore(torques.snapshot())
 
 
 def test_voltages_need_a_motor_that_is_known() -> None:
