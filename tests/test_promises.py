@@ -21,8 +21,8 @@ import robot_cases
 
 from heelstrike.cli.main import app
 from heelstrike.cli.walk import walk
-from heelstrike.compiler.recording import Program, Recording
-from heelstrike.compiler.tape import Entry, Operation, Result
+from heelstrike.compiler.recordings.recording import Program, Recording
+from heelstrike.compiler.recordings.tape import Entry, Operation, Result
 from heelstrike.dynamics.kernels import state_equations
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import builtin_robots, load_robot

@@ -71,8 +71,8 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
             ("compiler/bundle.py", '"""Base class of bundles', '"""Class of bundles'),
             ("compiler/bundle_type.py", '"""Read a member', '"""Get a member'),
             ("compiler/private_numba.py", '"""Turn a', '# words\n    """Make of a'),
-            ("compiler/recording.py", '"""What the kernel of', '"""What a kernel of'),
-            ("compiler/tape.py", '"""Return the entries', '"""Give the entries'),
+            ("compiler/recordings/recording.py", '"""What the kernel of', '"""What a kernel of'),
+            ("compiler/recordings/tape.py", '"""Return the entries', '"""Give the entries'),
             ("compiler/straight_line.py", '"""Writes one', '"""Write one'),
         ],
         set(),
@@ -109,17 +109,20 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
         [("sim/contacts/straight_line.py", '"matrix", "rows", "force"', '"matrix", "rows"')],
         {"programs"},
     ),
-    "how arithmetic is folded": ([("compiler/tape.py", "_is(other, -1.0)", "False")], RECORDED),
+    "how arithmetic is folded": (
+        [("compiler/recordings/tape.py", "_is(other, -1.0)", "False")],
+        RECORDED,
+    ),
     "which operations are one": (
-        [("compiler/tape.py", "sort(key=_name)", "sort(key=id)")],
+        [("compiler/recordings/tape.py", "sort(key=_name)", "sort(key=id)")],
         RECORDED,
     ),
     "what is structure": (
-        [("compiler/recording.py", "| (np.abs(value) == 1.0)", "| (value == 1.0)")],
+        [("compiler/recordings/recording.py", "| (np.abs(value) == 1.0)", "| (value == 1.0)")],
         RECORDED,
     ),
     "how sines are computed": (
-        [("compiler/trigonometry.py", "1.58969099521155010221e-10", "1.6e-10")],
+        [("compiler/recordings/trigonometry.py", "1.58969099521155010221e-10", "1.6e-10")],
         RECORDED,
     ),
     "how code is optimised": (

@@ -13,12 +13,13 @@ import pytest
 from llvmlite import ir
 from robot_cases import NAMED, RANDOM, RobotCase
 
-from heelstrike.compiler import machine_code, trigonometry
+from heelstrike.compiler import machine_code
 from heelstrike.compiler.bundle import Bundle, array, cell
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.recording import Program, Recording
+from heelstrike.compiler.recordings import trigonometry
+from heelstrike.compiler.recordings.recording import Program, Recording
+from heelstrike.compiler.recordings.tape import Tape, Value
 from heelstrike.compiler.straight_line import add_function, play
-from heelstrike.compiler.tape import Tape, Value
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.sim.contacts.straight_line import (
     KERNELS,

@@ -6,7 +6,8 @@ Its doors, which other rooms import from:
   ``bundle_type``, the same in compiled code;
 - ``compilation``: ``kernel``, ``dissolved_kernel``, and how they are compiled, or left alone;
 - ``separate_kernel``: kernels compiled apart, called by their address;
-- ``recording`` and ``straight_line``: kernels without loops; ``c_text``: the same in C;
+- ``straight_line``: kernels without loops, from what ``recordings`` keep of them, in which
+  ``c_text`` writes the same in C;
 - ``plain_code``: the switch for instructions that every processor has.
 
 Nothing is imported here: ``plain_code`` comes before NumPy and Numba do.

@@ -1,7 +1,7 @@
 """Kernels of one robot as straight-line machine code.
 
 A tree of links never changes while it moves. So kernels are run once over a tape
-(:mod:`heelstrike.compiler.recording`), which leaves their arithmetic without a loop, an index or a
+(:mod:`heelstrike.compiler.recordings`), which leaves their arithmetic without a loop, an index or a
 product with zero; LLVM makes a function of that. It reads the robot's numbers from its model, so
 that robots share it that differ in numbers only.
 
@@ -19,9 +19,9 @@ from numba.extending import intrinsic
 
 from heelstrike.compiler.fingerprint import fingerprint
 from heelstrike.compiler.machine_code import addresses
-from heelstrike.compiler.recording import CONSTANT, Program, Recording
-from heelstrike.compiler.tape import Entry, Operation, Result, Symbols, Value
-from heelstrike.compiler.trigonometry import sine_and_cosine
+from heelstrike.compiler.recordings.recording import CONSTANT, Program, Recording
+from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Symbols, Value
+from heelstrike.compiler.recordings.trigonometry import sine_and_cosine
 
 _DOUBLE = ir.DoubleType()
 _WORD = ir.IntType(64)

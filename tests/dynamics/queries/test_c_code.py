@@ -15,8 +15,8 @@ import pytest
 from robot_cases import NAMED, RobotCase
 
 from heelstrike import load_robot
-from heelstrike.compiler.c_text import c_text
-from heelstrike.compiler.recording import Program, Recording
+from heelstrike.compiler.recordings.c_text import c_text
+from heelstrike.compiler.recordings.recording import Program, Recording
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import Robot

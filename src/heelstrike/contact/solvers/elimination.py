@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.recording import Program, inverse_above
+from heelstrike.compiler.recordings.recording import Program, inverse_above
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.robot.model import Floats
 

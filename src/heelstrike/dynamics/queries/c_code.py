@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.c_text import c_text
-from heelstrike.compiler.recording import Program, Recording
+from heelstrike.compiler.recordings.c_text import c_text
+from heelstrike.compiler.recordings.recording import Program, Recording
 from heelstrike.dynamics.kernels import (
     bias_force,
     forward_dynamics,

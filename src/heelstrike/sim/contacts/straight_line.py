@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.recording import Program
+from heelstrike.compiler.recordings.recording import Program
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.dynamics.kernels import solve_factorized, state_equations
 from heelstrike.dynamics.workspace import Workspace

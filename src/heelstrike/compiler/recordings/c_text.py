@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.recording import CONSTANT, Recording
-from heelstrike.compiler.tape import Entry, Operation, Result, Value
+from heelstrike.compiler.recordings.recording import CONSTANT, Recording
+from heelstrike.compiler.recordings.tape import Entry, Operation, Result, Value
 
 _WRITTEN = {
     Operation.ADD: "{} + {}",

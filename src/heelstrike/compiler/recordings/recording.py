@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler import tape
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import kernel, uncompiled
-from heelstrike.compiler.tape import Entry, Symbols, Tape, Value
+from heelstrike.compiler.recordings import tape
+from heelstrike.compiler.recordings.tape import Entry, Symbols, Tape, Value
 
 CONSTANT = "model"
 """The argument that never changes. Where its numbers are 0, 1 or -1, they are so in every robot
