@@ -321,3 +321,17 @@ def test_a_robot_s_own_speed_limits_hold(rabbit: hs.Robot, rabbit_gait: hs.Gait)
     # Not only at the Gauss points, between which and the end the gait without limits is fastest.
     assert fastest(gait) <= limit * (1.0 + 1e-6)
     assert gait.cost > rabbit_gait.cost
+
+
+def test_a_gait_keeps_to_the_lines_of_the_motors(rabbit: hs.Robot, rabbit_gait: hs.Gait) -> None:
+    """Motors too slow for the gait that knows nothing of them: -τ₀ ≤ τ + τ₀/ω₀ ω ≤ τ₀."""
+    lines = {"stall_torque": np.full(7, 12.0), "no_load_speed": np.full(7, 3.0)}
+    slow = dataclasses.replace(rabbit, model=rabbit.model.replaced(**lines))
+    times = gauss_times(rabbit_gait)
+    beyond = [needed.torque_excess.max() for _, needed in forces(slow, rabbit_gait, times)]
+    assert max(beyond) > 0.1
+    gait = hs.optimize_gait(slow, **STEP)
+    found = list(forces(slow, gait, gauss_times(gait)))
+    assert max(needed.torque_excess.max() for _, needed in found) <= 1e-6
+    assert 0.0 <= gait.margins.torque <= 0.1
+    assert gait.cost > rabbit_gait.cost

@@ -18,6 +18,7 @@ from heelstrike.gait.program import Program, Solution, first_instants
 from heelstrike.gait.refinement import checked_instants, held_between_nodes
 from heelstrike.gait.starts import starts
 from heelstrike.gait.transcription import Group, Transcription
+from heelstrike.robot.motors import torque_range
 from heelstrike.robot.state import State
 
 Floats = NDArray[np.float64]
@@ -105,9 +106,10 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
     position = motion[0][-request.robot.nu :]
     half = request.stance.half_length
     actuator = np.argsort(model.actuator_joint)
-    limits = np.minimum(
-        model.torque_upper[actuator, None] - torque, torque - model.torque_lower[actuator, None]
-    )
+    velocity = np.zeros((fine.share.size, model.nv))
+    velocity[:, 3:] = motion[1][-request.robot.nu :].T
+    lower, upper = (ends[:, actuator].T for ends in torque_range(model, velocity))
+    limits = np.minimum(upper - torque, torque - lower)
     ranges = np.minimum(request.upper[3:, None] - position, position - request.lower[3:, None])
     end = program.at_touchdown(unknowns)
     impulse, landing, lift = (np.array(part).ravel() for part in transcription.landing(*end[:3]))

@@ -257,7 +257,7 @@ class Transcription:
 def _add_joint_limits(
     constraints: Constraints, request: Request, position: Any, velocity: Any, support: Support
 ) -> None:
-    """Add ranges, speeds and torques of the joints, where robot or request have limits.
+    """Add ranges, speeds, torques and motors of the joints, where robot or request have limits.
 
     Positions and velocities are those of the joints from the first leg on, without the trunk.
     """
@@ -268,9 +268,12 @@ def _add_joint_limits(
     for k, name in enumerate(robot.joint_names[3:]):
         lower, upper, speed = request.lower[k + 3], request.upper[k + 3], speeds[k + 3]
         largest = max((abs(limit) for limit in (low[k], high[k]) if np.isfinite(limit)), default=0)
+        stall, free = model.stall_torque[k + 3], model.no_load_speed[k + 3]
+        drag = stall / free * velocity[k] if np.isfinite(stall) else 0.0  # of the motor's winding
         for group, value, least, most, unit in (
             (Group.JOINT_RANGE, position[k], lower, upper, 1.0),
             (Group.TORQUE, support.torque[k], low[k], high[k], largest or 1.0),
+            (Group.TORQUE, support.torque[k] + drag, -stall, stall, stall),
             (Group.JOINT_SPEED, velocity[k], -speed, speed, speed),
         ):
             if np.isfinite([least, most]).any():

@@ -57,7 +57,7 @@ def assembled(
     Raises
     ------
     RobotError
-        If a number is NaN or absurdly large, or a joint moves no mass.
+        If a number is NaN or absurdly large, a joint moves no mass, or a motor never turns.
 
     Warns
     -----
@@ -70,6 +70,7 @@ def assembled(
         model = averaged(model, joint_names, link_names, source)
     origin = link_origins(model)
     _refuse_joints_without_inertia(model, origin, joint_names, source)
+    _refuse_motors_without_speed(model, joint_names, source)
     unlikely = [one.message for one in unlikely_numbers(model, origin, joint_names, link_names)]
     if unlikely:
         more = f" And {len(unlikely) - SHOWN} more." if len(unlikely) > SHOWN else ""
@@ -186,6 +187,16 @@ def _refuse_joints_without_inertia(
         raise RobotError(
             f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
             "nothing resists it. Give the link that it moves a mass and a moment of inertia."
+        )
+
+
+def _refuse_motors_without_speed(model: Model, joint_names: tuple[str, ...], source: str) -> None:
+    """Refuse a motor whose torque has fallen to zero at no speed at all."""
+    still = np.flatnonzero(model.no_load_speed == 0.0)
+    if len(still):
+        raise RobotError(
+            f"{source}: the no-load speed of the motor at joint {joint_names[still[0]]!r} is 0, at "
+            "which it never turns. Leave it out if it is not known."
         )
 
 

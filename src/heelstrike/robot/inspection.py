@@ -301,8 +301,20 @@ def _drives(robot: Robot) -> str:
     """What moves the joints, in a line."""
     sprung = [robot.joint_names[joint] for joint in np.flatnonzero(robot.model.stiffness)]
     told = f"motors at {robot.nu} joints" if robot.nu else "no motors"
+    told += f"; speed-torque lines at {', '.join(_lines(robot))}" if _lines(robot) else ""
     told += f"; springs at {', '.join(sprung)}" if sprung else ""
     return told + ("" if robot.nc else "; no contact points, so it can swing or fly but not stand")
+
+
+def _lines(robot: Robot) -> list[str]:
+    """Joints whose motors have a speed-torque line, with its full voltage if that is known."""
+    model, lines = robot.model, []
+    for joint in model.actuator_joint[np.isfinite(model.stall_torque[model.actuator_joint])]:
+        stall, free = model.stall_torque[joint], model.no_load_speed[joint]
+        volts = np.sqrt(model.winding_resistance[joint] * stall * free)
+        known = 0.0 < volts < np.inf
+        lines.append(robot.joint_names[joint] + (f" ({volts:.3g} V)" if known else ""))
+    return lines
 
 
 def _of_locked(robot: Robot) -> list[str]:

@@ -120,10 +120,10 @@ class Model(Bundle):
         infinite where there is none.
     stall_torque : (nv,) float
         Torque of the motor (N m; N of a slide) at rest and full voltage, seen at the joint;
-        infinite if unknown.
+        infinite if unknown, and then nothing but `torque_lower` and `torque_upper` limits it.
     no_load_speed : (nv,) float
         Speed of the joint (rad/s, m/s) at which that torque is zero, falling along a straight line;
-        infinite if unknown.
+        infinite if unknown, and then it does not fall.
     winding_resistance : (nv,) float
         Electrical resistance of the motor (ohm); zero if unknown.
     gravity : (axes,) float
@@ -236,10 +236,10 @@ class JointProperties(TypedDict, total=False):
         Greatest speed that the drive stands (rad/s, m/s).
     stall_torque, no_load_speed : float
         The motor's straight line from its torque at rest (N m, N) to its speed without load (rad/s,
-        m/s), both at full voltage and seen at the joint. They are data of the robot, kept in files;
-        `torque` alone limits what a simulation lets the motor do.
+        m/s), both at full voltage and seen at the joint. No torque exceeds it, whatever `torque`
+        allows; without a stall torque there is no line.
     winding_resistance : float
-        Electrical resistance of the motor (ohm).
+        Electrical resistance of the motor (ohm), which tells the volts of the full voltage.
     gear, motor_inertia : float
         Ratio of the gear, and the inertia of the motor before it: they add
         ``gear**2 * motor_inertia`` to the armature. Torque and speed are those at the joint.

@@ -32,9 +32,10 @@ from heelstrike.sim.clock import Clock
 from heelstrike.sim.controller.asking import ask
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.law import CONTROLLER_TYPE
+from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import center_height, limit_torque, sound
+from heelstrike.sim.record.recording import center_height, sound
 
 
 class Outcome(enum.IntEnum):
@@ -164,14 +165,14 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 prepare(model, ground, memory, work)
                 if is_due(clock):
                     if control.in_python == 0:
-                        q, v, torque = memory.q, memory.v, memory.torque
-                        ask(controller, clock.time, q, v, model, memory, control, torque)
+                        q, v, command = memory.q, memory.v, memory.command
+                        ask(controller, clock.time, q, v, model, memory, control, command)
                     elif clock.answered == 0:
                         return ASKING
                     clock.answered = 0
                     clock.calls += 1
-                    if not limit_torque(model, memory):
-                        return BAD_CONTROLLER
+                if not limit_torque(model, control, memory):
+                    return BAD_CONTROLLER
                 code = decide(scene, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
                     report(scene, control, memory, work, record, clock)

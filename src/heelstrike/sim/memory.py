@@ -28,7 +28,7 @@ class Tally(Bundle):
     Attributes
     ----------
     steps, saturations : int
-        Steps taken; torques clipped to their limits.
+        Steps taken; commands that motors or their limits did not let through.
     bad_torque : int
         Actuator whose torque was not finite.
     bad_trial : int
@@ -217,8 +217,10 @@ class Memory(Bundle):
         Position and velocity now.
     next_v : (nv,) float
         Velocity at the end of the step.
+    command : (nu,) float
+        What the controller asks for: torques, or voltages as parts of the full one.
     torque : (nu,) float
-        Joint torques of this step, within their limits.
+        What acts of it; see :mod:`heelstrike.sim.controller.motors`.
     stiffness, damping : (nv,) float
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
@@ -247,6 +249,7 @@ class Memory(Bundle):
     q: Floats = array("nq")
     v: Floats = array("nv")
     next_v: Floats = array("nv")
+    command: Floats = array("nu")
     torque: Floats = array("nu")
     stiffness: Floats = array("nv")
     damping: Floats = array("nv")
@@ -291,7 +294,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     problem = assembly.problem
     return Memory.allocate(
         extents,
-        torque=guarded(np.zeros(robot.nu)),
+        command=guarded(np.zeros(robot.nu)),
         dry_joint=dry.astype(np.int64),
         equations=Equations.allocate(extents, programs=programs),
         surface=Surface.allocate(

@@ -202,8 +202,9 @@ class Run:
         Steps taken.
     saturations : int
         Times a torque was clipped to its limit, counted when the controller is called for good: at
-        every step or control period. Of a controller that acts continuously, at the samples or
-        ends of steps only; what is clipped within them is not counted.
+        every step or control period. What the speed-torque line of a motor holds back is counted
+        at every step. Of a controller that acts continuously, at the samples or ends of steps only;
+        what is clipped within them is not counted.
     timing : Timing
     error : BaseException or None
         What the controller raised, if that ended the run.

@@ -24,7 +24,7 @@ from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
-from heelstrike.sim.controller.law import Law, law_of, no_torque
+from heelstrike.sim.controller.law import Law, commands_voltage, law_of, no_torque
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
 from heelstrike.sim.memory import Memory, allocate_memory
@@ -440,7 +440,7 @@ class Simulation:
                 f"{self.robot.name!r} needs ({self.robot.nu},): "
                 f"{', '.join(self.robot.actuator_names)}"
             )
-        self._memory.torque[:] = torque
+        self._memory.command[:] = torque
         self._clock.answered = 1
         return ""
 
@@ -529,8 +529,11 @@ class Simulation:
         self._kernel = compiled.function.finish()
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
+        voltage = commands_voltage(controller, robot)
+        self._control.voltage = voltage
         self._name = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
+        self._decides += " (voltages)" if voltage else ""
         self._shown = read_only(memory.contacts)
         memory.stiffness[:] = robot.model.stiffness
         memory.damping[:] = robot.model.damping
@@ -539,6 +542,10 @@ class Simulation:
             driven = robot.model.actuator_joint
             memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
             memory.damping[driven] += 0.0 if law.damping is None else law.damping
+        if voltage:
+            driven = robot.model.actuator_joint
+            speed = robot.model.no_load_speed[driven]
+            memory.damping[driven] += robot.model.stall_torque[driven] / speed
         self.method.set_clock(setting, clock)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None

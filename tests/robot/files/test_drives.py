@@ -184,6 +184,9 @@ def test_the_line_of_a_motor_is_a_number_of_the_robot(tmp_path: Path) -> None:
         back = load_robot(robot.save(tmp_path / "r.xml"))
     for name, value in motor.items():
         assert getattr(back.model, name).tolist() == [value]
+    told = inspect_robot(robot).text()
+    assert "speed-torque lines at hip (20.8 V)" in told  # √(0.4 Ω · 90 N m · 12 rad/s)
+    assert "stall torque 90, no load speed 12, winding resistance 0.4" in told
     for ending in ("urdf", "sdf"):
         with pytest.warns(RobotWarning, match="Left out: stall torque of hip; no load speed of hi"):
             robot.save(tmp_path / f"r.{ending}")

@@ -12,7 +12,7 @@ from heelstrike.compiler.compilation import uncompiled
 from heelstrike.robot import Robot, read_mjcf
 from heelstrike.sim import Certificates, EventKind, Scheme
 from heelstrike.sim.memory import Memory, allocate_memory
-from heelstrike.sim.record.recording import limit_torque, note_extremes
+from heelstrike.sim.record.recording import note_extremes
 
 G = 9.81
 
@@ -281,13 +281,3 @@ def test_torques_are_clipped_to_their_own_limit_and_counted(wanted: float, given
     np.testing.assert_array_equal(run.torque, given)
     clipped = len(run.time) if wanted != given else 0
     assert run.saturations == clipped
-
-
-def test_what_is_no_number_is_named_by_its_place() -> None:
-    robot = hs.load_robot("bravo7")
-    memory = allocate_memory(robot)
-    limit = uncompiled(limit_torque)
-    assert limit(robot.model, memory)
-    memory.torque[4] = np.inf
-    assert not limit(robot.model, memory)
-    assert memory.tally.bad_torque == 4

@@ -16,6 +16,7 @@ from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import inverse_dynamics, passive_force
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError
+from heelstrike.robot.motors import torque_range
 from heelstrike.robot.robot import Robot
 
 RELATIVE = 1e-9
@@ -42,7 +43,7 @@ class ContactInverseDynamics:
     pulling : (nc,) bool
         Whether the ground would have to pull at the point.
     torque_excess : (nu,) float
-        By how much each torque exceeds its limits, in N m; zero within.
+        By how much each torque exceeds what its motor can give at v, in N m; zero within.
     contact_acceleration : (nc, 2) float
         Acceleration of the gap and of the sliding velocity of every contact point, in m/s²: zero
         at carrying points if the acceleration keeps them where they are.
@@ -138,8 +139,8 @@ def contact_inverse_dynamics(
     contact_force[carrying] = forces
     tiny = RELATIVE * max(1.0, float(np.abs(force).max()))
     use = _friction_use(contact_force, kinematics.friction, tiny)
-    model = robot.model
-    excess = np.maximum(np.maximum(torque - model.torque_upper, model.torque_lower - torque), 0.0)
+    lower, upper = torque_range(robot.model, v)
+    excess = np.maximum(np.maximum(torque - upper, lower - torque), 0.0)
     pulling = contact_force[:, 0] < -tiny
     complaints = [
         *(f"{robot.joint_names[j]} lacks {rest[j]:.3g}" for j in _where(np.abs(rest) > tiny)),

@@ -45,9 +45,9 @@ from heelstrike.sim.contacts.geometry import contact_rows, observe, row_product
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
+from heelstrike.sim.controller.motors import motor_damping, try_torque
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import add_pushes
-from heelstrike.sim.record.recording import try_torque
 
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
 # They only steer the linear systems: their error costs steps, not accuracy.
@@ -131,8 +131,8 @@ class CompliantWorkspace(Bundle):
         Derivatives of the controller's torques.
     age : int
         Steps since these were found.
-    trial_torque : (nu,) float
-        Torques of a perturbed state.
+    trial_command, trial_torque : (nu,) float
+        Commands and torques of a perturbed state.
     base_q, base_v : (nv,) float
     base_rows : (2 nc, nv) float
     base_matrix : (nv, nv) float
@@ -171,6 +171,7 @@ class CompliantWorkspace(Bundle):
     base_words: Integers = array("words", of=int, address=True)
     torque_by_q: Floats = array("nu", "nv")
     torque_by_v: Floats = array("nu", "nv")
+    trial_command: Floats = array("nu")
     trial_torque: Floats = array("nu")
     age: int = cell(int)
     base_q: Floats = array("nv")
@@ -213,7 +214,7 @@ def compliant_workspace(
     base, base_words = in_one_block(rates)
     return CompliantWorkspace.allocate(
         extents, now=now, base=base, now_words=now_words, base_words=base_words,
-        trial_torque=guarded(np.zeros(robot.nu)), age=GAINS_LAST, laws=laws, step=step, rtol=rtol,
+        trial_command=guarded(np.zeros(robot.nu)), age=GAINS_LAST, laws=laws, step=step, rtol=rtol,
         atol=atol, proposed=step,
     )  # fmt: skip
 
@@ -228,19 +229,13 @@ def in_one_block(rates: Rates) -> tuple[Rates, Integers]:
 
 
 @kernel
-def command(controller: Any, control: Control, time: float, model: Model, memory: Memory) -> None:
-    """Ask the controller for its torques at the state now, within their limits."""
-    ask(controller, time, memory.q, memory.v, model, memory, control, memory.torque)
-    try_torque(model, memory.q, memory.v, memory.tally, memory.torque)
-
-
-@kernel
 def try_command(
-    controller: Any, control: Control, time: float, model: Model, memory: Memory, torque: Floats
-) -> None:
+    controller: Any, control: Control, time: float, model: Model, memory: Memory, command: Floats,
+    torque: Floats,
+) -> None:  # fmt: skip
     """Torques that a controller would ask for, were this its next call; it remembers nothing."""
-    consult(controller, time, memory.q, memory.v, model, memory, control, torque)
-    try_torque(model, memory.q, memory.v, memory.tally, torque)
+    consult(controller, time, memory.q, memory.v, model, memory, control, command)
+    try_torque(model, control, memory.q, memory.v, memory.tally, command, torque)
 
 
 @kernel
@@ -258,7 +253,7 @@ def find_gains(
         memory.v[j] = work.base_v[j]
     forward_kinematics(model, memory.q, memory.equations.tree)
     link_velocities(model, memory.v, memory.equations.tree)
-    try_command(controller, control, time, model, memory, memory.torque)
+    try_command(controller, control, time, model, memory, memory.command, memory.torque)
     for kind in range(2):
         varied = memory.q if kind == 0 else memory.v
         gains = work.torque_by_q if kind == 0 else work.torque_by_v
@@ -269,9 +264,10 @@ def find_gains(
                 varied[j] = kept + change
                 forward_kinematics(model, memory.q, memory.equations.tree)
                 link_velocities(model, memory.v, memory.equations.tree)
-                try_command(controller, control, time, model, memory, work.trial_torque)
+                command, torque = work.trial_command, work.trial_torque
+                try_command(controller, control, time, model, memory, command, torque)
                 for i in range(gains.shape[0]):
-                    slope = (work.trial_torque[i] - memory.torque[i]) / change
+                    slope = (torque[i] - memory.torque[i]) / change
                     if side == 0 or abs(slope) < abs(gains[i, j]):
                         gains[i, j] = slope
             varied[j] = kept
@@ -303,10 +299,12 @@ def evaluate(
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
             copy_words(work.force, memory.contacts.force)
+        q, v, command = memory.q, memory.v, memory.command
         if how == TRIED:
-            try_command(controller, control, time, model, memory, memory.torque)
+            consult(controller, time, q, v, model, memory, control, command)
         else:
-            command(controller, control, time, model, memory)
+            ask(controller, time, q, v, model, memory, control, command)
+    try_torque(model, control, memory.q, memory.v, memory.tally, memory.command, memory.torque)
     mass_matrix(model, memory.equations.tree, memory.equations.mass_matrix)
     factorize(model, memory.equations.mass_matrix, memory.equations.factor)
     bias_force(model, memory.equations.tree, memory.equations.rate)
@@ -409,7 +407,9 @@ def tangent_gains(friction: FrictionForces, contact: int, g: float) -> tuple[flo
 
 
 @kernel
-def factorize_step(model: Model, control: Control, g: float, work: CompliantWorkspace) -> None:
+def factorize_step(
+    model: Model, control: Control, g: float, command: Floats, work: CompliantWorkspace
+) -> None:
     """Factorise the linear system of all stages of a step of length g / γ."""
     nv = model.parent.shape[0]
     system, by_q, base = work.system, work.force_by_q, work.base
@@ -425,6 +425,11 @@ def factorize_step(model: Model, control: Control, g: float, work: CompliantWork
             for j in range(nv):
                 system[joint, j] -= g * work.torque_by_v[i, j]
                 by_q[joint, j] += work.torque_by_q[i, j]
+    else:
+        for i in range(model.actuator_joint.shape[0]):
+            joint = model.actuator_joint[i]
+            damping = motor_damping(model, i, control.voltage, command[i], work.base_v)
+            system[joint, joint] += g * damping
     for contact in range(model.contact_link.shape[0]):
         if base.normal.force[contact] <= 0.0:
             continue
@@ -545,7 +550,7 @@ def attempt_step(
     nv = model.parent.shape[0]
     nc = model.contact_link.shape[0]
     g = GAMMA * h
-    factorize_step(model, control, g, work)
+    factorize_step(model, control, g, memory.command, work)
     for stage in range(STAGES):
         if stage > 0:
             for i in range(nv):

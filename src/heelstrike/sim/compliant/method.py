@@ -41,6 +41,7 @@ from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
@@ -53,7 +54,6 @@ from heelstrike.sim.record.recording import (
     SLIP,
     STICK,
     TOUCHDOWN,
-    limit_torque,
     log_event,
     note_event,
     note_row_when_due,
@@ -268,7 +268,7 @@ def sample(
                 for i in range(model.parent.shape[0]):
                     memory.q[i] = work.base_q[i]
                     memory.v[i] = work.base_v[i]
-                return DIVERGED if limit_torque(model, memory) else BAD_CONTROLLER
+                return DIVERGED if limit_torque(model, control, memory) else BAD_CONTROLLER
             h = max(taken * rescaled(error, SHRINK), SHORTEST)
             rejected = True
             continue

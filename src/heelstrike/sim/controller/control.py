@@ -46,6 +46,8 @@ class Control(Bundle):
         What it is shown.
     continuous : int
         Whether it acts within the steps too; otherwise its torques are held.
+    voltage : int
+        Whether it commands voltages; otherwise torques.
     in_python : int
         Whether the loop has to come back for its torques.
     conduct : int
@@ -64,6 +66,7 @@ class Control(Bundle):
     contacts: Contacts = part(Contacts, address=True)
     robot: ControlledRobot = part(ControlledRobot, address=True)
     continuous: int = cell(int)
+    voltage: int = cell(int)
     in_python: int = cell(int)
     conduct: int = cell(int)
 

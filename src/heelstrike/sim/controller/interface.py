@@ -38,7 +38,10 @@ class Contacts(Bundle):
 
 @runtime_checkable
 class Controller(Protocol):
-    """Anything that can say which joint torques to apply."""
+    """Anything that can say which joint torques to apply.
+
+    With an attribute `commands_voltage` that is true it says voltages, as parts of the full one.
+    """
 
     def torque(self, t: float, state: State, contacts: Contacts) -> NDArray[np.float64]:
         """Return the joint torques (nu,), in N m, to hold until the next call.

@@ -244,6 +244,8 @@ class Law:
     stiffness, damping : (nu,) float, optional
         Gains −∂Γ/∂q and −∂Γ/∂v of each actuator on its own joint (N m, N m s), for schemes that
         take stiff forces implicitly.
+    commands_voltage : bool
+        What it writes are no torques but voltages, as parts of the full one: from -1 to 1.
 
     Raises
     ------
@@ -260,6 +262,7 @@ class Law:
         robot: Robot | None = None,
         stiffness: ArrayLike | None = None,
         damping: ArrayLike | None = None,
+        commands_voltage: bool = False,
     ) -> None:
         self.memory = dict(memory or {})
         strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
@@ -272,6 +275,7 @@ class Law:
         self.robot = robot
         self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
         self.damping = None if damping is None else np.asarray(damping, dtype=np.float64)
+        self.commands_voltage = commands_voltage
         self._asked: AskedLaw | None = None
 
     def with_parameters(self, parameters: Bundle) -> Law:
@@ -418,3 +422,24 @@ def law_of(controller: Controller | None, *, begin: bool = False) -> Law | None:
             f"{type(controller).__name__} has none"
         )
     return None
+
+
+def commands_voltage(controller: Controller | None, robot: Robot) -> bool:
+    """Return whether a controller commands voltages, by its attribute `commands_voltage`.
+
+    Raises
+    ------
+    ControllerError
+        If it does, but of a motor nobody knows what torque that is.
+    """
+    if not getattr(controller, "commands_voltage", False):
+        return False
+    joints = robot.model.actuator_joint
+    unknown = [robot.joint_names[j] for j in joints if np.isinf(robot.model.stall_torque[j])]
+    if unknown:
+        raise ControllerError(
+            f"{type(controller).__name__} commands voltages, but the stall torque of the motors of "
+            f"robot {robot.name!r} at {', '.join(unknown)} is not known: give stall_torque and "
+            "no_load_speed to the builder, or as custom numbers in its MJCF file"
+        )
+    return True

@@ -31,7 +31,7 @@ class Watch:
         self._control = law.control
         watched = law.control.conduct != TRUSTED or law.control.in_python
         self._numbers = numbers_of(robot) if watched else {}
-        self._arrays = [("torque", memory.torque), *law.arrays()]
+        self._arrays = [("torque", memory.command), *law.arrays()]
 
     def misdeed(self) -> str | None:
         """Say what the controller did that it may not, and undo what can be undone."""

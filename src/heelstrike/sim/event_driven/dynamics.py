@@ -28,13 +28,13 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.motors import try_torque
 from heelstrike.sim.event_driven.candidates import share_redundant
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory
 from heelstrike.sim.push import Pushes, add_pushes
-from heelstrike.sim.record.recording import try_torque
 
 
 @kernel
@@ -255,8 +255,8 @@ def evaluate(
     locate_contacts(model, scene.ground, equations.tree, memory.contacts, memory.surface)
     watch_geometry(model, equations.tree, memory.contacts, state, phase)
     if control.continuous == 1:
-        consult(scene.controller, time, q, v, model, memory, control, memory.torque)
-        try_torque(model, q, v, memory.tally, memory.torque)
+        consult(scene.controller, time, q, v, model, memory, control, memory.command)
+    try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
     count = gather_closed(model, memory.contacts, phase, equations, assembly)
     phase.closed_count = count

@@ -1,4 +1,4 @@
-"""What every way through time does around its step: limits, events, rows and worst values."""
+"""What every way through time does around its step: events, rows and worst values."""
 
 from __future__ import annotations
 
@@ -29,44 +29,6 @@ LIFTOFF_GAP = 1e-7
 SLIP_SPEED = 1e-6
 # A point that comes down faster than this (m/s) when the run begins touches down; others stand.
 STANDING_SPEED = 1e-6
-INFINITY = float("inf")
-
-
-@dissolved_kernel
-def limit_torque(model: Model, memory: Memory) -> bool:
-    """Clip the torques to their limits; return whether all were finite."""
-    for i in range(model.actuator_joint.shape[0]):
-        wanted = memory.torque[i]
-        if not abs(wanted) < INFINITY:
-            memory.tally.bad_torque = i
-            return False
-        if wanted > model.torque_upper[i]:
-            memory.torque[i] = model.torque_upper[i]
-            memory.tally.saturations += 1
-        elif wanted < model.torque_lower[i]:
-            memory.torque[i] = model.torque_lower[i]
-            memory.tally.saturations += 1
-    return True
-
-
-@kernel
-def try_torque(model: Model, q: Floats, v: Floats, tally: Tally, torque: Floats) -> None:
-    """Clip torques that a controller was asked for within a step, at a state that may be no good.
-
-    Keeps in mind which of them was not finite when it was last asked at a state that was.
-    """
-    bad = 0
-    for i in range(torque.shape[0]):
-        if not abs(torque[i]) < INFINITY:
-            bad = i + 1
-        elif torque[i] > model.torque_upper[i]:
-            torque[i] = model.torque_upper[i]
-        elif torque[i] < model.torque_lower[i]:
-            torque[i] = model.torque_lower[i]
-    for i in range(v.shape[0]):
-        if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
-            return
-    tally.bad_trial = bad
 
 
 @dissolved_kernel

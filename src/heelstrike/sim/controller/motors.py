@@ -1,0 +1,125 @@
+"""What the motors make of commands: torques within their limits and on their speed-torque line.
+
+A motor of direct current under the voltage U, with torque constant K and winding resistance R, has
+at the speed Ω the current I = (U - K Ω) / R and the torque K I. Behind a reduction N the joint
+moves at ω = Ω / N and feels τ = N K I. Let V be the full voltage of the supply. At the joint,
+``stall_torque`` is τ₀ = N K V / R, ``no_load_speed`` is ω₀ = V / (N K), and under the voltage u V
+
+    τ = τ₀ u - D ω,    D = τ₀ / ω₀ = (N K)² / R.
+
+So the motor is a damper D by itself; the time that its current takes to build up is left out. The
+supply gives |u| ≤ 1, and whatever the motor is asked for,
+
+    -τ₀ - D ω ≤ τ ≤ τ₀ - D ω.
+
+A command is either the voltage u, or a torque that the drive follows as far as this line lets it.
+Between the two stand the robot's own limits of the torque. The line has the last word: beyond the
+no-load speed no drive keeps a motor from braking. R is in D; by itself it only tells the volts,
+V² = R τ₀ ω₀, and the amperes, I² = τ² ω₀ / (τ₀ R). Under a constant u a joint with the viscous
+damping d, and nothing else, comes to the speed ω = τ₀ u / (D + d).
+
+While a command is held, ω changes. So commands and torques are two arrays, and torques are found
+anew of the velocity at which they act: at the beginning of a time step, at every stage of an
+integration, before an impact.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.memory import Memory, Tally
+
+INFINITY = float("inf")
+
+
+@dissolved_kernel
+def within(lower: float, upper: float, value: float) -> float:
+    """Return the nearest number in an interval."""
+    if value > upper:
+        return upper
+    return lower if value < lower else value
+
+
+@dissolved_kernel
+def possible_command(model: Model, actuator: int, voltage: int, command: float) -> float:
+    """Return the nearest command, torque or voltage, that is one at any speed."""
+    if voltage == 1:
+        return within(-1.0, 1.0, command)
+    return within(model.torque_lower[actuator], model.torque_upper[actuator], command)
+
+
+@dissolved_kernel
+def free_torque(model: Model, actuator: int, voltage: int, command: float, v: Floats) -> float:
+    """Return what a possible command comes to at the velocities `v` if nothing limits it."""
+    joint = model.actuator_joint[actuator]
+    stall = model.stall_torque[joint]
+    if voltage == 0:
+        return command
+    return stall * command - stall / model.no_load_speed[joint] * v[joint]
+
+
+@dissolved_kernel
+def motor_torque(model: Model, actuator: int, voltage: int, command: float, v: Floats) -> float:
+    """Return what acts of a possible command at the velocities `v`."""
+    joint = model.actuator_joint[actuator]
+    stall = model.stall_torque[joint]
+    if stall == INFINITY:
+        return command
+    torque = free_torque(model, actuator, voltage, command, v)
+    if voltage == 1:
+        torque = within(model.torque_lower[actuator], model.torque_upper[actuator], torque)
+    drag = stall / model.no_load_speed[joint] * v[joint]
+    return within(-stall - drag, stall - drag, torque)
+
+
+@kernel
+def motor_damping(model: Model, actuator: int, voltage: int, command: float, v: Floats) -> float:
+    """Return how fast the torque of a held command falls with the speed of its joint."""
+    joint = model.actuator_joint[actuator]
+    stall = model.stall_torque[joint]
+    torque = motor_torque(model, actuator, voltage, command, v)
+    follows = voltage == 0 and torque == command
+    limited = torque in (model.torque_lower[actuator], model.torque_upper[actuator])
+    return 0.0 if stall == INFINITY or follows or limited else stall / model.no_load_speed[joint]
+
+
+@dissolved_kernel
+def limit_torque(model: Model, control: Control, memory: Memory) -> bool:
+    """Find the torques of an instant from its commands; return whether all of these were finite."""
+    voltage = control.voltage
+    for i in range(model.actuator_joint.shape[0]):
+        wanted = memory.command[i]
+        if not abs(wanted) < INFINITY:
+            memory.tally.bad_torque = i
+            return False
+        command = possible_command(model, i, voltage, wanted)
+        torque = motor_torque(model, i, voltage, command, memory.v)
+        if command != wanted or torque != free_torque(model, i, voltage, command, memory.v):
+            memory.tally.saturations += 1
+        memory.command[i] = command
+        memory.torque[i] = torque
+    return True
+
+
+@kernel
+def try_torque(
+    model: Model, control: Control, q: Floats, v: Floats, tally: Tally, command: Floats,
+    torque: Floats,
+) -> None:  # fmt: skip
+    """Find the torques of commands within a step, at a state that may be no good.
+
+    Keeps in mind which command was not finite when there was one last at a state that was.
+    """
+    bad = 0
+    for i in range(torque.shape[0]):
+        if not abs(command[i]) < INFINITY:
+            bad = i + 1
+            torque[i] = command[i]
+        else:
+            command[i] = possible_command(model, i, control.voltage, command[i])
+            torque[i] = motor_torque(model, i, control.voltage, command[i], v)
+    for i in range(v.shape[0]):
+        if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
+            return
+    tally.bad_trial = bad
