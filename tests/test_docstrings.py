@@ -25,6 +25,7 @@ from public_names import public_names
 
 import heelstrike
 from heelstrike import errors
+from heelstrike.robot import read_mjcf
 
 SECTIONS = {
     "", "Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns", "See Also", "Notes",
@@ -181,6 +182,9 @@ def calls() -> dict[str, Callable[..., Any]]:
     trunk = based.floating_base("trunk", mass=1.0, inertia=1.0)
     bare = heelstrike.RobotBuilder("nothing yet")
     return {
+        "heelstrike.load_robot": partial(heelstrike.load_robot, "bravo7"),
+        "heelstrike.inspect_robot": partial(heelstrike.inspect_robot, robot),
+        "heelstrike.robot.read_mjcf": partial(read_mjcf, "<mujoco/>"),
         "heelstrike.simulate": partial(
             heelstrike.simulate, robot, state=robot.reference_state(), duration=0.0
         ),

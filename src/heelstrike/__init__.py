@@ -67,9 +67,9 @@ if TYPE_CHECKING:
     from heelstrike.robot import RobotWarning as RobotWarning
     from heelstrike.robot import State as State
     from heelstrike.robot import builtin_robots as builtin_robots
-    from heelstrike.robot import human as human
     from heelstrike.robot import inspect_robot as inspect_robot
     from heelstrike.robot import load_robot as load_robot
+    from heelstrike.robot.human import human as human
     from heelstrike.sim import Batch as Batch
     from heelstrike.sim import Compliant as Compliant
     from heelstrike.sim import EventDriven as EventDriven
@@ -133,7 +133,7 @@ _HOME = {
     "contact_kinematics": "heelstrike.contact",
     "controller": "heelstrike.control",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
-    "human": "heelstrike.robot",
+    "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",

@@ -16,7 +16,14 @@ import pytest
 
 import heelstrike.robot.library as library
 from heelstrike.errors import RobotError
-from heelstrike.robot import RobotWarning, builtin_robots, load_robot, read_mjcf
+from heelstrike.robot import (
+    FindingKind,
+    RobotWarning,
+    builtin_robots,
+    inspect_robot,
+    load_robot,
+    read_mjcf,
+)
 
 FILES = Path(library.__file__).parent
 PENDULUM = (
@@ -260,13 +267,18 @@ def test_gymnasiums_walker() -> None:
     np.testing.assert_array_equal(robot.mirror.joint, [0, 1, 2, 6, 7, 8, 3, 4, 5])
 
 
-def test_the_old_walkers_unequal_feet_are_found() -> None:
-    """The slip of the older walker2d.xml, unnoticed for years: friction 0.9 and 1.9."""
+def test_the_old_walkers_unequal_feet_are_found(tmp_path: Path) -> None:
+    """The slip of the older walker2d.xml, unnoticed for years: friction 0.9 and 1.9.
+
+    Friction is the ground's here, so that the robot is its own mirror image; a look finds it.
+    """
     gymnasium = pytest.importorskip("gymnasium")
     path = Path(gymnasium.__file__).parent / "envs" / "mujoco" / "assets" / "walker2d_v5.xml"
-    old = path.read_text(encoding="utf-8").replace('friction="1.9"', 'friction="0.9"', 1)
-    with pytest.warns(RobotWarning, match=r"friction .* of foot and foot_left \(0.9, 1.9\)"):
-        assert read_mjcf(old).mirror is None
+    old = tmp_path / "old.xml"
+    old.write_text(path.read_text("utf-8").replace('friction="1.9"', 'friction="0.9"', 1), "utf-8")
+    assert load_robot(old).mirror is not None
+    found = [one for one in inspect_robot(old).findings if one.kind is FindingKind.FRICTION]
+    assert [one.message for one in found] == ["foot 0.9, foot_left 1.9."]
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,6 @@ def test_opposite_joints_have_sign_minus_one() -> None:
     ("changes", "words"),
     [
         ({"mass": 3.1}, "mass of right_hip and left_hip (3, 3.1)"),
-        ({"friction": 1.9}, "friction of the contact points of right_ankle_link and"),
         ({"high": 61}, "range of right_hip and left_hip"),
         ({"rest": 21}, "rest of the spring of right_ankle and left_ankle"),
         ({"size": 0.11}, "contact points of right_ankle_link and left_ankle_link"),
@@ -141,9 +140,17 @@ def test_a_joint_without_counterpart_is_told() -> None:
 
 
 def test_a_difference_of_two_points_of_a_foot_is_told_once() -> None:
+    radius = "number of contact points"
+    text = biped_text().replace('type="box" size="0.1 0.04 0.01"', 'type="sphere" size="0.1"', 1)
     with pytest.warns(RobotWarning) as caught:
-        biped(friction=1.9)
-    assert str(caught[0].message).count("(0.8, 1.9)") == 1
+        read_mjcf(text)
+    assert str(caught[0].message).count(radius) == 1
+
+
+def test_friction_is_the_grounds_and_makes_no_difference() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert biped(friction=1.9).mirror is not None
 
 
 def test_rounding_is_no_difference() -> None:

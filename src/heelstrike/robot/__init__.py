@@ -2,12 +2,13 @@
 
 from heelstrike.robot.builder import RobotBuilder
 from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.human import BodyTable, human
 from heelstrike.robot.inspection import Finding, FindingKind, Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import JointProperties, Model
-from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.robot import Foot, LockedJoint, Robot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import RobotWarning
 
@@ -18,6 +19,8 @@ __all__ = [
     "Foot",
     "Inspection",
     "JointProperties",
+    "LoadOptions",
+    "LockedJoint",
     "Mirror",
     "Model",
     "Robot",

@@ -11,8 +11,8 @@ from heelstrike.robot.contact_points import ContactPoint
 from heelstrike.robot.feet import find_feet, name_contacts
 from heelstrike.robot.model import NUMBERS, Floats, Model, label
 from heelstrike.robot.plausibility import unlikely_numbers
-from heelstrike.robot.robot import Robot
-from heelstrike.robot.symmetry import find_mirror
+from heelstrike.robot.robot import LockedJoint, Robot
+from heelstrike.robot.symmetry import averaged, find_mirror
 from heelstrike.robot.warning import warn
 
 LARGEST_NUMBER = 1e10
@@ -31,6 +31,8 @@ def assembled(
     actuator_names: tuple[str, ...],
     points: Sequence[ContactPoint],
     source: str,
+    locked: tuple[LockedJoint, ...] = (),
+    average: bool = False,
 ) -> Robot:
     """Make a robot of its numbers and names.
 
@@ -46,6 +48,10 @@ def assembled(
         The contact points of the model, in its order.
     source : str
         What to call the robot in messages.
+    locked : tuple of LockedJoint
+        Joints of its file that do not move.
+    average : bool
+        Make left and right equal.
 
     Raises
     ------
@@ -59,6 +65,8 @@ def assembled(
         if they were in another unit.
     """
     _refuse_impossible_numbers(model, source)
+    if average:
+        model = averaged(model, joint_names, link_names, source)
     origin = link_origins(model)
     _refuse_joints_without_inertia(model, origin, joint_names, source)
     _warn_of_unlikely_numbers(model, origin, joint_names, link_names, source)
@@ -74,10 +82,11 @@ def assembled(
         actuator_names=actuator_names,
         contact_names=name_contacts(link_names, points, feet),
         feet=feet,
-        mirror=find_mirror(model, joint_names, link_names, feet, friction, source),
+        mirror=find_mirror(model, joint_names, link_names, feet, source),
         floating=_is_floating(model, source),
         contact_friction=friction,
         source=source,
+        locked=locked,
     )
 
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.warning import warn
 
 SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
 SMALLEST_RADIUS = 1e-9  # metres; a smaller sphere is a point, which MJCF cannot say otherwise
-ALIGNED = 1e-6  # sine of the angle within which a direction counts as that of y
+LEVEL = 1e-6  # sine of the slope up to which ground counts as level
 
 MOST_POINTS = 2000
 
@@ -183,7 +184,7 @@ def _mention_terrain(file: MujocoFile, ground: Iterable[int]) -> None:
         for g in ground
         if model.geom_type[g] != PLANE
         or abs(pose.geom_xpos[g, 2]) > SAME_PLACE
-        or np.hypot(pose.geom_xmat[g, 2], pose.geom_xmat[g, 5]) > ALIGNED
+        or np.hypot(pose.geom_xmat[g, 2], pose.geom_xmat[g, 5]) > LEVEL
     ]
     if terrain:
         warn(
@@ -198,8 +199,8 @@ def _outline(
     """Centres (world x, z) and radius of the discs that stand for a geom; None if it has none."""
     middle = center[::2]
     along = turn[::2, 2]  # the geom's own axis (third column), seen in the plane
-    across = np.hypot(*along) < ALIGNED
-    in_plane = abs(turn[1, 2]) < ALIGNED
+    across = np.hypot(*along) < IN_PLANE
+    in_plane = abs(turn[1, 2]) < IN_PLANE
     if kind == SPHERE or (kind == CYLINDER and across):
         radius = float(size[0])
         return middle[None], radius if radius > SMALLEST_RADIUS else 0.0

@@ -6,18 +6,19 @@ import enum
 import os
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import UNLIKELY, link_origins
+from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.saving import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
-from heelstrike.robot.files.urdf import MASSLESS
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
@@ -100,17 +101,14 @@ class Inspection:
         else:
             parts.append("findings\n  none")
         if not self.loadable:
-            shown = "" if self.robot is None else " Above, the inertias are the nearest possible."
-            parts.append(f"load_robot refuses this file as it is.{shown}")
+            parts.append("load_robot refuses this file as it is.")
         return "\n\n".join(parts)
 
     def __str__(self) -> str:
         return self.text()
 
 
-def inspect_robot(
-    robot: Robot | str | os.PathLike[str], *, floating: bool = False, projected: bool = False
-) -> Inspection:
+def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptions]) -> Inspection:
     """Look at a robot for what has fooled others.
 
     Left and right that differ; inertias that violate the triangle inequality (the sum of two
@@ -122,7 +120,7 @@ def inspect_robot(
     robot : Robot, str or path
         A robot, the name of a built-in one, or the path of an MJCF or URDF file. A file tells more
         than a robot: a planar robot has forgotten its moments of inertia in space.
-    floating, projected : bool
+    **how : LoadOptions
         As for :func:`load_robot`.
 
     Returns
@@ -142,6 +140,7 @@ def inspect_robot(
     True
     """
     if isinstance(robot, Robot):
+        Options(**how)  # which says what is wrong with them
         return Inspection(robot.source or robot.name, robot, tuple(_of_robot(robot)))
     findings: list[Finding] = []
     path = _file(robot)
@@ -150,14 +149,14 @@ def inspect_robot(
         warnings.simplefilter("always", RobotWarning)
         found: Robot | None = None
         try:
-            found = load_robot(robot, floating=floating, projected=projected)
+            found = load_robot(robot, **how)
         except RobotError as error:
             if path is None:
                 raise
             loadable = False
             findings += _of_inertias(path)
             try:
-                found = read_mjcf(path, floating=floating, projected=projected, lenient=True)
+                found = read_mjcf(path, lenient=True, **how)
             except RobotError as still:
                 findings.append(Finding(FindingKind.FILE, str(still)))
             if not findings:
@@ -192,12 +191,15 @@ def _of_inertias(path: Path) -> Iterator[Finding]:
     for name, mass, tensor in parsed_bodies(path):
         if not mass >= MASSLESS:
             yield Finding(FindingKind.MASS, f"body {name!r} has the mass {mass:g} kg.")
-        if np.all(np.isfinite(tensor)) and not is_possible(tensor):
+        # Who states no other moment than one means a planar robot.
+        planar = np.count_nonzero(tensor) == 1
+        if np.all(np.isfinite(tensor)) and not is_possible(tensor) and not planar:
             given = ", ".join(f"{moment:.4g}" for moment in np.linalg.eigvalsh(tensor))
             yield Finding(
                 FindingKind.INERTIA,
                 f"body {name!r} has the principal moments {given} kg m². No body has: none is "
-                "negative, and the sum of two is at least the third.",
+                "negative, and the sum of two is at least the third. In the plane only the moment "
+                "about its normal acts, which is taken as it is.",
             )
 
 
@@ -211,12 +213,9 @@ def _of_robot(robot: Robot) -> Iterator[Finding]:
 
 
 def _asymmetries(robot: Robot) -> Iterator[Finding]:
-    friction = robot.contact_friction or (1.0,) * robot.nc
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RobotWarning)
-        find_mirror(
-            robot.model, robot.joint_names, robot.link_names, robot.feet, friction, robot.name
-        )
+        find_mirror(robot.model, robot.joint_names, robot.link_names, robot.feet, robot.name)
     for one in caught:
         _, _, words = str(one.message).partition("no mirror image: ")
         differences, _, _ = words.partition(". Gaits")
@@ -342,7 +341,17 @@ def _description(robot: Robot) -> str:
                 + (radius if robot.model.contact_radius[i] else "")
                 + (f", friction {robot.contact_friction[i]:g}" if robot.contact_friction else "")
             )
+    if robot.locked:
+        lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
+
+
+def _of_locked(robot: Robot) -> list[str]:
+    rows: list[tuple[str, ...]] = [("joint", "moves", "kind", "axis", "at", "why")]
+    for one in robot.locked:
+        axis = ", ".join(f"{value:.3g}" for value in one.axis) if any(one.axis) else ""
+        rows.append((one.name, one.link, one.kind, axis, f"{one.position:.4g}", one.reason))
+    return _aligned(rows)
 
 
 def _foot_words(foot: Foot, points: Floats) -> str:
@@ -357,6 +366,10 @@ def _table(robot: Robot) -> list[str]:
     ]
     rows: list[tuple[str, ...]] = [*headings]
     rows += [_row(robot, joint, indent) for joint, indent in _tree(robot)]
+    return _aligned(rows)
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
@@ -465,6 +478,7 @@ def facts(inspection: Inspection) -> dict[str, Any]:
             "actuators": list(robot.actuator_names),
             "contact_points": list(robot.contact_names),
             "feet": [foot.name for foot in robot.feet],
+            "locked": [asdict(one) for one in robot.locked],
         }
         | of_joints
     )

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spre
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import Model
 from heelstrike.robot.state import State
+
+if TYPE_CHECKING:
+    from heelstrike.contact.ground import Ground
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,32 @@ class Foot:
     name: str
     link: int
     contacts: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class LockedJoint:
+    """A joint of a robot's file that the planar robot does not have.
+
+    Attributes
+    ----------
+    name, link : str
+        Name of the joint and of the body that it moves in the file.
+    kind : str
+        ``hinge``, ``slide``, ``ball`` or ``free``.
+    axis : (3,) float
+        Its axis in the world (x forward, y to the left, z up); zero where it has no single one.
+    position : float
+        Where it is locked (rad, m).
+    reason : str
+        Why it does not move.
+    """
+
+    name: str
+    link: str
+    kind: str
+    axis: tuple[float, float, float]
+    position: float
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +93,8 @@ class Robot:
         simulation takes friction from its `Ground`.
     source : str
         File or builder the robot came from, for error messages.
+    locked : tuple of LockedJoint
+        Joints of its file that do not move here, as ``projected=True`` makes them.
     """
 
     name: str
@@ -76,6 +108,7 @@ class Robot:
     floating: bool
     contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
+    locked: tuple[LockedJoint, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if self.mirror is not None:
@@ -311,6 +344,72 @@ class Robot:
         low = np.minimum(self.model.lower, state.q)
         high = np.maximum(self.model.upper, state.q)
         return State(np.clip(q, low, high), v)
+
+    def placed(self, state: State, ground: Ground) -> State:
+        """Return a state moved up or down, until the robot touches the ground and is nowhere in it.
+
+        Parameters
+        ----------
+        state : State
+            The state, left as it is: its posture, place along x and velocities stay.
+        ground : Ground
+            Any ground: level, a slope, stairs, rough.
+
+        Returns
+        -------
+        State
+            The state, with another height of the trunk.
+
+        Raises
+        ------
+        RobotError
+            If nothing lifts the robot, as a floating trunk does, or it has no contact points.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> robot, hill = hs.load_robot("compass_gait"), hs.Ground(slope=0.05)
+        >>> state = robot.placed(robot.reference_state(), hill)
+        >>> float(hs.contact_kinematics(robot, state.q, state.v, hill).gap.min().round(12))
+        0.0
+        """
+        from heelstrike.contact.queries.placing import placed
+
+        return placed(self, state, ground)
+
+    def standing(self, ground: Ground) -> State:
+        """Return a state at rest in which the robot stands on the ground, its soles on it.
+
+        The trunk is upright as in the reference configuration; the legs change as little as they
+        can for all soles to touch with both ends. Where a foot would have to be tilted far, as on
+        the edge of a stair, the posture stays, and the lowest point touches.
+
+        Parameters
+        ----------
+        ground : Ground
+            Any ground: level, a slope, stairs, rough.
+
+        Returns
+        -------
+        State
+            The state.
+
+        Raises
+        ------
+        RobotError
+            If nothing lifts the robot, as a floating trunk does, or it has no contact points.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> robot, hill = hs.load_robot("bravo7"), hs.Ground(slope=0.05)
+        >>> state = robot.standing(hill)
+        >>> hs.contact_kinematics(robot, state.q, state.v, hill).gap.round(9) + 0.0
+        array([0., 0., 0., 0.])
+        """
+        from heelstrike.contact.queries.placing import standing
+
+        return standing(self, ground)
 
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.

@@ -407,13 +407,13 @@ def test_what_plays_no_part_in_motion_costs_nothing(
 ) -> None:
     path = write(mjcf(HARMLESS[case]), tmp_path)
     sizes = []
-    ask = mujoco.MjModel.from_xml_string
+    ask = mujoco.MjSpec.from_string
 
-    def asked(text: str, *files: object) -> mujoco.MjModel:
+    def asked(text: str, **files: object) -> mujoco.MjSpec:
         sizes.append(len(text))
-        return ask(text, *files)
+        return ask(text, **files)
 
-    monkeypatch.setattr(mujoco.MjModel, "from_xml_string", asked)
+    monkeypatch.setattr(mujoco.MjSpec, "from_string", asked)
     model = seen(path)
     assert max(sizes) < 2000
     assert model.narena < 2**26
@@ -547,8 +547,8 @@ def test_a_parser_that_does_not_end_is_stopped(monkeypatch: pytest.MonkeyPatch) 
         mjcf("", WORLD.replace("</worldbody>", '<attach body="b" prefix="p"/></worldbody>')),
         mjcf('<extension><plugin plugin="mujoco.pid"/></extension>'),
         {
-            **urdf(1, [], mesh_link("m.stl")),
-            "m.stl": "solid",
+            **urdf(1, [], mesh_link("m.obj")),
+            "m.obj": "solid",
         },
     ],
     ids=["mesh", "model", "attach", "plugin", "URDF mesh"],

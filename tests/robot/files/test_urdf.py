@@ -216,7 +216,12 @@ def test_a_symmetric_robot_is_projected() -> None:
     with pytest.warns(RobotWarning) as caught:
         robot = read_mjcf(humanoid(), projected=True)
     (told,) = [str(one.message) for one in caught if "projected" in str(one.message)]
-    assert "locked where they stand: right_roll, right_yaw, left_roll, left_yaw." in told
+    assert "4 joints are locked: right_roll, right_yaw, left_roll, left_yaw." in told
+    assert [(one.name, one.link, one.kind, one.axis) for one in robot.locked] == [
+        (f"{side}_{name}", f"{side}_hip", "hinge", axis)
+        for side in ("right", "left")
+        for name, axis in (("roll", (1.0, 0.0, 0.0)), ("yaw", (0.0, 0.0, 1.0)))
+    ]
     assert robot.joint_names[3:] == ("right_pitch", "right_knee", "left_pitch", "left_knee")
     assert robot.actuator_names == ("left_knee", "right_knee")
     assert robot.floating
@@ -232,7 +237,7 @@ def test_a_symmetric_robot_is_projected() -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (humanoid(offset=0.4), "centre of mass is .* m to the side of its trunk"),
+        (humanoid(offset=0.4), "centre of mass is .* m to the side of its middle"),
         (
             humanoid().replace('size="0.1 0.15 0.3"', 'size="0.1 0.15 0.3" euler="0 0 30"'),
             "products of inertia with y",
@@ -283,7 +288,7 @@ def test_what_a_parser_would_pass_over_is_told(old: str, new: str, said: str) ->
             "'value' of <mass> of link 'trunk' is '-5'; it must not be neg",
         ),
         ('value="5"', 'value="5,5"', "'5,5', where a number must be"),
-        ('izz="0.1"', "", "<inertia> of link 'trunk' lacks the attribute 'izz'"),
+        ('iyy="0.1"', "", "<inertia> of link 'trunk' lacks 'iyy', which acts in the plane"),
         ('name="right_hip"', 'name="left_hip"', "two joints are called 'left_hip'"),
         ('xyz="0 1 0"', 'xyz="0 0 0"', "'xyz' of <axis> of joint 'root' is '0 0 0'|no direction"),
         ("<link", "<xacro:link", "Expand it first: xacro robot.xacro > robot.urdf"),

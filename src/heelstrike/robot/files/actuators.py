@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.robot.files.flattening import BALL
 from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.warning import warn
 
@@ -55,61 +57,83 @@ def read_actuators(file: MujocoFile) -> Actuators:
         If an actuator does not act on a joint, is a muscle or the like, or shares its joint.
     """
     model = file.model
+    place = {one.joint: index for index, one in enumerate(file.coordinates) if one.joint >= 0}
     if file.is_urdf and model.nu == 0:
-        return _from_effort_limits(file)
-    joints: list[int] = []
+        return _from_effort_limits(file, place)
+    driven: list[int] = []  # coordinates
+    actuators: list[int] = []
+    gears: list[float] = []
     limits: list[tuple[float, float]] = []
     names: list[str] = []
     for actuator in range(len(model.actuator_trntype)):
         joint = _driven_joint(file, actuator)
         name = file.name("actuator", actuator)
-        if joint in joints:
-            other = names[joints.index(joint)]
+        if joint not in place:
+            continue  # it is locked
+        index = place[joint]
+        gear = _gear(file, actuator, index)
+        if gear is None:
+            continue  # it only turns a ball joint out of the plane
+        if index in driven:
+            other = names[driven.index(index)]
             raise file.error(
                 f"joint {file.name('joint', joint)!r} is driven by two actuators, {other!r} and "
                 f"{name!r}. Keep one, with the torque limits of both together."
             )
-        joints.append(joint)
-        limits.append(_torque_limits(file, actuator, joint))
-        names.append(file.given_name("actuator", actuator) or file.name("joint", joint))
-    gear = model.actuator_gear[:, 0]
+        driven.append(index)
+        actuators.append(actuator)
+        gears.append(gear)
+        limits.append(_torque_limits(file, actuator, joint, gear))
+        names.append(file.given_name("actuator", actuator) or file.coordinates[index].name)
+    squared = np.square(gears)
     return _assembled(
-        joints,
+        file,
+        driven,
         np.array(limits, dtype=np.float64).reshape(-1, 2),
         names,
-        armature=_at_joints(file, "actuator_armature", gear, joints),
-        damping=_at_joints(file, "actuator_damping", gear, joints),
+        armature=squared * _of_actuators(file, "actuator_armature", actuators),
+        damping=squared * _of_actuators(file, "actuator_damping", actuators),
     )
 
 
-def _from_effort_limits(file: MujocoFile) -> Actuators:
+def _from_effort_limits(file: MujocoFile, place: dict[int, int]) -> Actuators:
     """Drive every joint of a URDF that has an effort limit: the format has no actuators."""
-    joints = np.flatnonzero(file.model.jnt_actfrclimited).tolist()
+    joints = [int(joint) for joint in np.flatnonzero(file.model.jnt_actfrclimited)]
+    joints = sorted((joint for joint in joints if joint in place), key=lambda joint: place[joint])
+    driven = [place[joint] for joint in joints]
     names = [file.name("joint", joint) for joint in joints]
-    none = np.zeros(file.model.nv)
-    return _assembled(joints, file.model.jnt_actfrcrange[joints], names, none, none)
+    none = np.zeros(len(driven))
+    return _assembled(file, driven, file.model.jnt_actfrcrange[joints], names, none, none)
 
 
 def _assembled(
-    joints: list[int],
+    file: MujocoFile,
+    driven: list[int],
     limits: Floats,
     names: list[str],
     armature: Floats,
     damping: Floats,
 ) -> Actuators:
     lower, upper = np.ascontiguousarray(limits.T)
-    return Actuators(
-        np.array(joints, dtype=np.int64), lower, upper, tuple(names), armature, damping
-    )
+    at_joints = np.zeros((2, len(file.coordinates)))
+    at_joints[:, driven] = armature, damping
+    return Actuators(np.array(driven, dtype=np.int64), lower, upper, tuple(names), *at_joints)
 
 
-def _at_joints(file: MujocoFile, field: str, gear: Floats, joints: list[int]) -> Floats:
-    """Inertia or damping of the actuators, through their gears, at the joints they drive."""
-    result = np.zeros(file.model.nv)
+def _of_actuators(file: MujocoFile, field: str, actuators: list[int]) -> Floats:
+    """Inertia or damping of the actuators, before their gears."""
     values = file.field(field)  # only newer versions of MuJoCo have it
-    if values.size:
-        result[joints] = gear**2 * values
-    return result
+    return values[actuators] if values.size else np.zeros(len(actuators))
+
+
+def _gear(file: MujocoFile, actuator: int, index: int) -> float | None:
+    """Gear of an actuator on its coordinate, None if it has none in the plane."""
+    model, joint = file.model, file.coordinates[index].joint
+    if model.jnt_type[joint] != BALL:
+        return float(model.actuator_gear[actuator, 0])
+    turn = file.pose.xmat[model.jnt_bodyid[joint]].reshape(3, 3)
+    gear = turn @ model.actuator_gear[actuator, :3]
+    return float(gear[1]) if abs(gear[1]) > IN_PLANE * float(np.linalg.norm(gear)) else None
 
 
 def _driven_joint(file: MujocoFile, actuator: int) -> int:
@@ -131,10 +155,9 @@ def _driven_joint(file: MujocoFile, actuator: int) -> int:
     return int(model.actuator_trnid[actuator, 0])
 
 
-def _torque_limits(file: MujocoFile, actuator: int, joint: int) -> tuple[float, float]:
+def _torque_limits(file: MujocoFile, actuator: int, joint: int, gear: float) -> tuple[float, float]:
     """Range of the torque at the joint that control, force and joint limits leave."""
     model, name = file.model, file.name("actuator", actuator)
-    gear = float(model.actuator_gear[actuator, 0])
     if gear == 0.0:
         raise file.error(f"actuator {name!r} has gear 0 and can exert no torque.")
     plain = (

@@ -46,22 +46,31 @@ def read_joint_numbers(file: MujocoFile) -> dict[str, Floats]:
     RobotError
         If custom data are no number, or one too small.
     """
-    switched = {name: float(not file.disabled(flag)) for name, (_, _, flag) in ATTRIBUTES.items()}
+    sense = np.array([one.sense for one in file.coordinates])
+    model = file.model
+    hinged = np.isin(model.jnt_type, (2, 3))  # slides and hinges, which have one position
+    rest = np.where(hinged, model.qpos_spring[model.jnt_qposadr], 0.0)
     numbers = {
-        name: switched[name] * np.asarray(getattr(file.model, field), dtype=np.float64)
-        for name, (_, field, _) in ATTRIBUTES.items()
+        "reference": np.array([one.reference for one in file.coordinates]),
+        "rest": sense * file.of_joints(rest, 0.0),
+        "stiffness": file.of_joints(model.jnt_stiffness, 0.0),
     }
+    for name, (_, field, flag) in ATTRIBUTES.items():
+        if name not in numbers:
+            numbers[name] = file.of_velocities(getattr(model, field))
+        numbers[name] = numbers[name] * float(not file.disabled(flag))
     return numbers | {name: _custom(file, name) for name in CUSTOM}
 
 
 def _custom(file: MujocoFile, name: str) -> Floats:
-    names = [file.given_name("joint", joint) for joint in range(file.model.njnt)]
+    names = [one.name for one in file.coordinates]
     index = {joint: place for place, joint in reversed(list(enumerate(names)))}
+    known = {file.given_name("joint", joint) for joint in range(file.model.njnt)}
     number = PROPERTIES[name]
     values = np.full(len(names), number.default, dtype=np.float64)
     for joint, value in _written(file, name):
         if joint not in index:
-            if not file.is_urdf:  # whose fixed joints may have limits too
+            if not file.is_urdf and joint not in known:  # fixed joints may have limits too
                 warn(f"{file.source}: {name}:{joint}: there is no joint of that name.")
             continue
         if not value >= number.least:

@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 
 from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
 from heelstrike.robot.contact_points import of_model, read_contact_points
 from heelstrike.robot.files.actuators import read_actuators
+from heelstrike.robot.files.flattening import BALL
 from heelstrike.robot.files.joint_numbers import read_joint_numbers
-from heelstrike.robot.files.links import IN_PLANE, read_links
+from heelstrike.robot.files.links import read_links
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
+from heelstrike.robot.files.options import AVERAGE, LoadOptions, Options
 from heelstrike.robot.files.unmodelled import warn_of_unmodelled
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
+
+SIDEWAYS = 1e-6  # share of gravity that may act out of the plane
 
 
 def read_mjcf(
     source: Path | str,
     *,
     name: str | None = None,
-    floating: bool = False,
-    projected: bool = False,
     lenient: bool = False,
+    **how: Unpack[LoadOptions],
 ) -> Robot:
     """Read a planar robot from an MJCF or URDF file, or from a string that holds one.
 
@@ -37,14 +41,10 @@ def read_mjcf(
         Path of the file, or the XML text itself.
     name : str, optional
         Name of the robot; by default the model name that the file gives, or the file's own.
-    floating : bool
-        Let the trunk float in the x–z plane, though the file fixes it to the world or leaves it
-        free in space.
-    projected : bool
-        Lock the joints that leave the x–z plane, where a symmetric robot of three dimensions is
-        meant to move in it.
     lenient : bool
-        Let impossible masses and inertias pass, to look at the robot; see `inspect_robot`.
+        Let masses pass that MuJoCo refuses, to look at the robot; see `inspect_robot`.
+    **how : LoadOptions
+        How the file is read.
 
     Returns
     -------
@@ -62,17 +62,16 @@ def read_mjcf(
         If the file says something that is not simulated, or left and right differ.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused in the end
-        file = parse(source, floating=floating, projected=projected, lenient=lenient)
-        return _robot(file, name or _model_name(file, source))
+        options = Options(**how, lenient=lenient)
+        file = parse(source, options)
+        return _robot(file, name or _model_name(file, source), options)
 
 
-def _robot(file: MujocoFile, name: str) -> Robot:
-    model = file.model
+def _robot(file: MujocoFile, name: str, options: Options) -> Robot:
     links = read_links(file)
     warn_of_unmodelled(file)
     points = read_contact_points(file, links)
     actuators = read_actuators(file)
-    limited = model.jnt_limited.astype(bool) & (not file.disabled("limit"))
     hinges = np.flatnonzero(links.axis[:, 0])
     numbers = read_joint_numbers(file)
     numbers["armature"] += actuators.armature
@@ -81,8 +80,7 @@ def _robot(file: MujocoFile, name: str) -> Robot:
     arrays = Model.made(
         **numbers,
         **links.numbers,
-        lower=_limits(np.where(limited, model.jnt_range[:, 0], -np.inf)),
-        upper=_limits(np.where(limited, model.jnt_range[:, 1], np.inf)),
+        **_ranges(file),
         gravity=_gravity(file),
         **of_model(points),
         actuator_joint=actuators.joint,
@@ -93,12 +91,29 @@ def _robot(file: MujocoFile, name: str) -> Robot:
     return assembled(
         name,
         arrays,
-        joint_names=_joint_names(file),
+        joint_names=tuple(one.name for one in file.coordinates),
         link_names=links.names,
         actuator_names=actuators.names,
         points=points,
         source=file.source,
+        locked=file.locked,
+        average=options.mirror == AVERAGE,
     )
+
+
+def _ranges(file: MujocoFile) -> dict[str, Floats]:
+    """Ranges of the coordinates; that of a ball joint is the same for all senses."""
+    model = file.model
+    limited = model.jnt_limited.astype(bool) & (not file.disabled("limit"))
+    low, high = np.array(model.jnt_range, dtype=np.float64).T
+    low = np.where(model.jnt_type == BALL, -high, low)
+    low = file.of_joints(np.where(limited, low, -np.inf), -np.inf)
+    high = file.of_joints(np.where(limited, high, np.inf), np.inf)
+    other = np.array([one.sense < 0.0 for one in file.coordinates])
+    return {
+        "lower": _limits(np.where(other, -high, low)),
+        "upper": _limits(np.where(other, -low, high)),
+    }
 
 
 def _limits(values: Floats) -> Floats:
@@ -110,26 +125,12 @@ def _gravity(file: MujocoFile) -> Floats:
     gravity = np.asarray(file.model.opt.gravity)
     if file.disabled("gravity"):
         return np.zeros(2)
-    if abs(gravity[1]) > IN_PLANE * np.linalg.norm(gravity):
+    if abs(gravity[1]) > SIDEWAYS * np.linalg.norm(gravity):
         raise file.error(
             "gravity is ({:g}, {:g}, {:g}), out of the x–z plane in which the robot moves. "
             'Set it in the file: <option gravity="0 0 -9.81"/>.'.format(*gravity)
         )
     return gravity[::2]
-
-
-def _joint_names(file: MujocoFile) -> tuple[str, ...]:
-    """Names of the joints; a nameless one is called after the body that it moves."""
-    model = file.model
-    names: list[str] = []
-    for joint, body in enumerate(model.jnt_bodyid):
-        name = file.given_name("joint", joint)
-        if not name:
-            siblings = int(model.body_jntnum[body])
-            ending = f"_{joint - model.body_jntadr[body]}" if siblings > 1 else ""
-            name = f"{file.name('body', body)}{ending}"
-        names.append(name)
-    return tuple(names)
 
 
 def _model_name(file: MujocoFile, source: Path | str) -> str:

@@ -15,12 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.files.flattening import float_in_plane, project
+from heelstrike.robot.files.flattening import Coordinate, flatten
+from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
+from heelstrike.robot.files.options import Options
 from heelstrike.robot.files.screening.screening import Screened, screen
-from heelstrike.robot.files.screening.trial import try_apart
+from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
 from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
-from heelstrike.robot.files.urdf import let_massless_links_pass, prepare_urdf, urdf_text
+from heelstrike.robot.files.urdf import (
+    WORLD,
+    let_massless_links_pass,
+    let_thin_meshes_pass,
+    missing_moments,
+    urdf_text,
+)
 from heelstrike.robot.plausibility import is_possible
+from heelstrike.robot.robot import LockedJoint
 from heelstrike.robot.warning import warn
 
 LONGEST_REASON = 600  # letters of MuJoCo's own words in a message
@@ -28,14 +37,18 @@ LONGEST_REASON = 600  # letters of MuJoCo's own words in a message
 
 @dataclass(frozen=True)
 class MujocoFile:
-    """A parsed MJCF or URDF file.
+    """A parsed MJCF or URDF file, seen in the plane.
 
     Attributes
     ----------
     model : mujoco.MjModel
         The compiled file.
     pose : mujoco.MjData
-        World poses of joints, bodies and geoms in the reference configuration (``qpos0``).
+        World poses of joints, bodies and geoms in the reference configuration.
+    coordinates : tuple of Coordinate
+        What moves in the plane, in the order of the robot's coordinates.
+    locked : tuple of LockedJoint
+        Joints of the file that do not.
     xml : Element
         The file as it is written, included ones in place, without what plays no part in motion.
     source : str
@@ -46,6 +59,8 @@ class MujocoFile:
 
     model: Any
     pose: Any
+    coordinates: tuple[Coordinate, ...]
+    locked: tuple[LockedJoint, ...]
     xml: Element
     source: str
     flexible: bool = False
@@ -77,37 +92,37 @@ class MujocoFile:
         bit = getattr(mujoco.mjtDisableBit, f"mjDSBL_{flag.upper()}", 0)
         return bool(self.model.opt.disableflags & int(bit))
 
+    def of_joints(self, values: Any, default: float) -> NDArray[np.float64]:
+        """Numbers of the file's joints, for the coordinates; a default where it has none."""
+        given = np.append(np.asarray(values, dtype=np.float64), default)
+        return given[[one.joint for one in self.coordinates]]
+
+    def of_velocities(self, values: Any) -> NDArray[np.float64]:
+        """Numbers of the file's velocities, for the coordinates; zero where it has none."""
+        return self.of_joints(np.asarray(values)[self.model.jnt_dofadr], 0.0)
+
     def field(self, name: str) -> NDArray[np.float64]:
         """Return an array of the model, empty where this version of MuJoCo does not have it."""
         return np.asarray(getattr(self.model, name, np.zeros(0)), dtype=np.float64)
 
 
-def parse(
-    source: Path | str,
-    *,
-    floating: bool = False,
-    projected: bool = False,
-    lenient: bool = False,
-) -> MujocoFile:
+def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     """Parse an MJCF or URDF file, or a string that holds one.
 
     Parameters
     ----------
     source : Path or str
         Path of a file, or the XML text itself.
-    floating : bool
-        Whether the body that the file fixes to the world (or leaves free) floats in the plane.
-    projected : bool
-        Whether joints that leave the x–z plane are locked.
-    lenient : bool
-        Whether masses and inertias that no body can have pass, mended as MuJoCo mends them. For
-        looking at the file, not for simulating the robot.
+    options : Options, optional
+        How the file is read; as it is, by default.
 
     Raises
     ------
     RobotError
-        If the file cannot be read or MuJoCo's parser refuses it; the message is the parser's.
+        If the file cannot be read, MuJoCo's parser refuses it (the message is the parser's), or it
+        cannot be seen in the plane.
     """
+    options = options or Options()
     label = str(source) if isinstance(source, Path) else "XML string"
     file = screen(source, label)
     xml = file.xml
@@ -117,33 +132,29 @@ def parse(
     try:
         with _warnings_into(remarks):
             urdf = xml.tag == "robot"
-            if urdf and not lenient:
+            if urdf and not options.lenient:
                 check_urdf(xml, label)
-            if urdf or floating or projected or lenient:
-                spec = _parsed(source, file, label)
-                if lenient:
-                    spec.compiler.balanceinertia = True
-                    let_massless_links_pass(spec)
-                if floating:
-                    float_in_plane(spec, label)
-                if projected:
-                    project(spec, label)
-                model = compiled(spec, remarks)
-            else:
-                if file.delicate:
-                    try_apart(file.text, file.models, label)
-                model = mujoco.MjModel.from_xml_string(file.text, file.models)
-            pose = mujoco.MjData(model)
-            mujoco.mj_kinematics(model, pose)
+            missing = missing_moments(xml)
+            spec = _parsed(source, file, label, options.packages)
+            if options.lenient:
+                let_massless_links_pass(spec)
+            taken = [] if spec.compiler.balanceinertia else take_out(spec)
+            model = compiled(spec, remarks)
+            held = not urdf or any(link.get("name") == WORLD for link in xml.iterfind("link"))
+            plane = flatten(model, options, label, hanging=not held)
+            refuse_missing(plane.model, plane.pose, missing, label)
+            put_back(plane.model, plane.pose, taken, label)
     except RobotError:
         raise
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
-    for remark in remarks:
+    for remark in (*remarks, *plane.remarks):
         warn(f"{label}: {remark}")
-    if not lenient:
+    if not options.lenient:
         _warn_of_mended_inertias(source, file, label)
-    return MujocoFile(model, pose, xml, label, file.flexible)
+    return MujocoFile(
+        plane.model, plane.pose, plane.coordinates, plane.locked, xml, label, file.flexible
+    )
 
 
 def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
@@ -170,23 +181,13 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
 
 
 def _stated(spec: Any) -> list[tuple[str, float, NDArray[np.float64]]]:
-    result = []
-    for body in spec.bodies:
-        if not body.explicitinertial or body.id == 0:
-            continue
-        full = np.array(body.fullinertia, dtype=np.float64)
-        if np.isnan(full[0]):  # given by its principal moments
-            tensor = np.diag(np.array(body.inertia, dtype=np.float64))
-        else:
-            xx, yy, zz, xy, xz, yz = full
-            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        result.append((body.name, float(body.mass), tensor))
-    return result
+    tensors = [(body, stated_tensor(body)) for body in spec.bodies]
+    return [(body.name, float(body.mass), t) for body, t in tensors if t is not None]
 
 
 def _warn_of_mended_inertias(source: Path | str, file: Screened, label: str) -> None:
     """Warn of inertias that MuJoCo changed because the file says ``balanceinertia="true"``."""
-    compilers = file.xml.iter("compiler")
+    compilers = file.xml.iter("compiler") if file.xml.tag == "mujoco" else ()
     if not any(compiler.get("balanceinertia") == "true" for compiler in compilers):
         return
     with _warnings_into([]), warnings.catch_warnings():
@@ -214,20 +215,26 @@ def compiled(spec: Any, remarks: list[str]) -> Any:
     return model
 
 
-def _parsed(source: Path | str, file: Screened, label: str) -> Any:
+def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path, ...] = ()) -> Any:
     """Return a file as MuJoCo understands it, not yet compiled."""
     import mujoco
 
     text = file.text
-    if file.xml.tag == "robot":
-        check_urdf_tree(file.xml, label)
+    urdf = file.xml.tag == "robot"
+    if urdf:
         directory = source.parent if isinstance(source, Path) else Path()
-        text = urdf_text(file.xml, directory, label)
+        text = urdf_text(file.xml, directory, packages, label)
+        check_urdf_tree(file.xml, label)
     if file.delicate:
         try_apart(text, file.models, label)
     spec = mujoco.MjSpec.from_string(text, include=file.models)
-    if file.xml.tag == "robot":
-        prepare_urdf(spec)
+    # Welded bodies are joined by our own reader, which needs to know where each of them is.
+    spec.compiler.fusestatic = False
+    if urdf:
+        let_massless_links_pass(spec)
+        let_thin_meshes_pass(spec)
+        spec.compiler.balanceinertia = False  # which replaces moments that URDF states
+    lift_sizes(spec)
     return spec
 
 

@@ -7,6 +7,8 @@ import numpy as np
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.warning import warn
 
+JOINT = 2  # MuJoCo's mjtEq
+
 TENDON_FORCES = (
     "tendon_stiffness",
     "tendon_damping",
@@ -20,7 +22,7 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
     """Warn of every part of the file that would act in MuJoCo and does not act here."""
     model = file.model
     acting = {
-        "equality constraints": model.neq > 0 and not file.disabled("equality"),
+        "equality constraints": _holds(file),
         "tendons": any(np.any(file.field(name)) for name in TENDON_FORCES),
         "nonlinear springs or dampers": _any(file, "jnt_stiffnesspoly")
         or _any(file, "dof_dampingpoly")
@@ -45,7 +47,7 @@ def _warn_of_fixed_root(file: MujocoFile) -> None:
     if not file.is_urdf:
         return
     children = {child.get("link") for child in file.xml.iterfind("joint/child")}
-    moving = {file.name("body", int(body)) for body in file.model.jnt_bodyid}
+    moving = {file.name("body", one.body) for one in file.coordinates}
     for link in file.xml.iterfind("link"):
         mass = link.find("inertial/mass")
         if link.get("name") not in children | moving and mass is not None:
@@ -54,6 +56,18 @@ def _warn_of_fixed_root(file: MujocoFile) -> None:
                 "moves it. If the robot floats, load it with floating=True, or put it on a link "
                 "'world' by a planar joint with the axis (0, 1, 0)."
             )
+
+
+def _holds(file: MujocoFile) -> bool:
+    """Whether an equality constraint holds more than joints that are locked anyway."""
+    model = file.model
+    if file.disabled("equality"):
+        return False
+    moving = {one.joint for one in file.coordinates}
+    return any(
+        int(model.eq_type[one]) != JOINT or int(model.eq_obj1id[one]) in moving
+        for one in range(model.neq)
+    )
 
 
 def _any(file: MujocoFile, name: str) -> bool:

@@ -1,90 +1,211 @@
-"""What URDF files need before and after MuJoCo's parser: meshes, massless links, the root."""
+"""URDF files as people write them, made such that MuJoCo's parser reads what they mean."""
 
 from __future__ import annotations
 
-from copy import deepcopy
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.files.flattening import mend_planar_root
-from heelstrike.robot.files.screening.mesh_files import refuse_large_meshes
+from heelstrike.robot.files.packages import find_file
+from heelstrike.robot.files.screening.mesh_files import is_mesh, refuse_large_meshes
+from heelstrike.robot.files.screening.xml_tree import Node, xml_text
 from heelstrike.robot.warning import warn
 
-MASSLESS = 1e-14  # kg; no link that is meant to weigh anything weighs less
-DEEPEST_FOLDER = 40  # most folders in the path of a mesh
+WORLD = "world"
 _SMALLEST = 2e-15  # what MuJoCo takes for a massless link, just above its own limit
+_MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
-def urdf_text(xml: Element, directory: Path, label: str) -> str:
-    """Return a URDF without what is only looked at, and with the meshes that are really there.
+def urdf_text(root: Node, directory: Path, packages: Sequence[Path], label: str) -> str:
+    """Return a URDF in a form that parsers agree on; elements stay on their lines.
 
-    Visual shapes play no part in mechanics, and their files are often missing. A collision mesh
-    whose file cannot be found is left out with a warning, if its link has an inertia of its own.
+    Parameters
+    ----------
+    root : Node
+        The file, which is changed.
+    directory : Path
+        Its folder.
+    packages : sequence of Path
+        Folders of packages, or that hold such.
+    label : str
+        What to call it in messages.
 
     Raises
     ------
     RobotError
-        If it has none, or if the meshes are too large.
+        If a mesh that a link is weighed by is not there, or meshes are too large.
+
+    Warns
+    -----
+    RobotWarning
+        Of links without inertia, and of meshes that are left out.
     """
-    root = deepcopy(xml)
-    missing: list[str] = []
-    weighed: list[str] = []
-    size = 0
-    for link in root.iterfind("link"):
-        for visual in link.findall("visual"):
-            link.remove(visual)
-        has_inertia = link.find("inertial") is not None
-        if not has_inertia and link.find("collision") is not None:
-            weighed.append(link.get("name", ""))
-        for collision in link.findall("collision"):
-            mesh = collision.find("geometry/mesh")
-            if mesh is None:
-                continue
-            file = _found(mesh.get("filename", ""), directory)
-            if file is not None:
-                mesh.set("filename", str(file))
-                size += file.stat().st_size
-            elif has_inertia:
-                link.remove(collision)
-                missing.append(link.get("name", ""))
-            else:
-                raise RobotError(
-                    f"{label}: the collision mesh of link {link.get('name')!r}, "
-                    f"{mesh.get('filename', '')[:200]!r}, is not where the file says, and the link "
-                    "has no <inertial>. Give it one, or the mesh file beside the URDF."
-                )
-    refuse_large_meshes(size, label)
+    _mend_world(root)
+    _take_the_first(root, label)
+    _forget_idle_axes(root)
+    _complete_inertias(root, label)
+    _find_meshes(root, directory, packages, label)
     for extension in root.findall("mujoco"):  # requests for memory, which play no part here
         for request in extension.findall("size"):
             extension.remove(request)
     _keep_paths(root)
+    return xml_text(root)
+
+
+def let_thin_meshes_pass(spec: Any) -> None:
+    """Let meshes without volume pass, such as plates, where nothing is weighed by them."""
+    import mujoco
+
+    weighing = {geom.meshname for geom in spec.geoms if not geom.parent.explicitinertial}
+    for mesh in spec.meshes:
+        if mesh.name not in weighing:
+            mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+
+
+def missing_moments(root: Element) -> dict[str, list[str]]:
+    """Moments of inertia, of those about the axes, that links of a URDF do not give."""
+    found = {}
+    for link in root.iterfind("link"):
+        inertia = link.find("inertial/inertia")
+        absent = [
+            name for name in _MOMENTS[:3] if inertia is not None and name not in inertia.attrib
+        ]
+        if absent:
+            found[link.get("name", "")] = absent
+    return found
+
+
+def let_massless_links_pass(spec: Any) -> None:
+    """Give massless links the least mass that MuJoCo takes, far below any that is meant."""
+    spec.compiler.boundmass = max(spec.compiler.boundmass, _SMALLEST)
+    spec.compiler.boundinertia = max(spec.compiler.boundinertia, _SMALLEST)
+
+
+def _mend_world(root: Node) -> None:
+    """Have a link ``world`` where joints hang on it, without mass, and nowhere below others.
+
+    Parsers know the world by this name: it need not be written down, and it cannot be moved.
+    """
+    links = {link.get("name", ""): link for link in root.iterfind("link")}
+    parents = list(root.iterfind("joint/parent"))
+    children = [child for child in root.iterfind("joint/child") if child.get("link") == WORLD]
+    if WORLD not in links:
+        if any(parent.get("link") == WORLD for parent in parents):
+            link = Node("link", {"name": WORLD})
+            link.line = root.line
+            root.insert(0, link)
+        return
+    if not children:
+        for inertial in links[WORLD].findall("inertial"):
+            links[WORLD].remove(inertial)
+        return
+    other = WORLD
+    while other in links:
+        other += "_"
+    links[WORLD].set("name", other)
+    for end in (*children, *(parent for parent in parents if parent.get("link") == WORLD)):
+        end.set("link", other)
+
+
+def _take_the_first(root: Node, label: str) -> None:
+    """Of two ``<dynamics>`` of a joint the first counts, as for the parsers of ROS."""
+    several = []
+    for joint in root.iterfind("joint"):
+        if joint.get("type") == "planaraxis":  # what Dojo calls a planar joint
+            joint.set("type", "planar")
+        for more in joint.findall("dynamics")[1:]:
+            joint.remove(more)
+            several.append(joint.get("name", ""))
+    if several:
+        warn(f"{label}: {', '.join(several)} have two <dynamics>; the first one counts.")
+
+
+def _forget_idle_axes(root: Node) -> None:
+    """Take away axes of joints that have none: exporters write zeros there."""
+    for joint in root.iterfind("joint"):
+        if joint.get("type") in ("fixed", "floating"):
+            for axis in joint.findall("axis"):
+                joint.remove(axis)
+
+
+def _complete_inertias(root: Node, label: str) -> None:
+    """Make a mass without ``<inertia>`` a point; moments that are left out are zero."""
+    points = []
+    for link in root.iterfind("link"):
+        for inertial in link.iterfind("inertial"):
+            mass, inertia = inertial.find("mass"), inertial.find("inertia")
+            if inertia is None and mass is not None:
+                inertia = SubElement(inertial, "inertia")
+                if mass.get("value", "").strip(" +0.") != "":
+                    points.append(link.get("name", ""))
+            if inertia is not None:
+                for name in _MOMENTS:
+                    if not inertia.get(name, "").strip():
+                        inertia.set(name, "0")
+    if points:
+        warn(
+            f"{label}: {', '.join(points)} have a <mass> and no <inertia>; they are point masses. "
+            "Give them an <inertia>."
+        )
+
+
+def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: str) -> None:
+    """Leave the collision meshes that are really there, and nothing that is only looked at.
+
+    Visual shapes play no part in mechanics, and their files are often missing.
+    """
+    missing: dict[str, str] = {}
+    weighed: list[str] = []
+    size = 0
+    for link in root.iterfind("link"):
+        name = link.get("name", "")
+        for visual in link.findall("visual"):
+            link.remove(visual)
+        has_inertia = link.find("inertial") is not None
+        if not has_inertia and any(not _is_point(shape) for shape in link.findall("collision")):
+            weighed.append(name)
+        for collision in link.findall("collision"):
+            mesh = collision.find("geometry/mesh")
+            if mesh is None:
+                continue
+            address = mesh.get("filename", "")
+            file = find_file(address, directory, packages)
+            if file is not None and is_mesh(file):
+                mesh.set("filename", str(file))
+                size += file.stat().st_size
+            elif has_inertia:
+                link.remove(collision)
+                missing.setdefault(name, address)
+            else:
+                line = getattr(mesh, "line", 0)
+                raise RobotError(
+                    f"{label}: line {line}: the collision mesh of link {name!r}, "
+                    f"{address[:200]!r}, is not where the file says or no mesh that MuJoCo reads "
+                    "(binary .stl, .obj), and the link has no <inertial>. Give it one, or the mesh "
+                    "file beside the URDF."
+                )
+    refuse_large_meshes(size, label)
     if missing:
         warn(
             f"{label}: the collision meshes of {', '.join(missing)} are not where the file says, "
-            "so these links cannot touch the ground. If one is a foot, give it a <collision> with "
-            "a box, or with spheres at heel and toe."
+            "or no meshes that MuJoCo reads (binary .stl, .obj), so these links cannot touch the "
+            "ground. If one is a foot, give it a <collision> with a box, or with spheres at heel "
+            f"and toe; or name the folder of its package: package_path=…. The first is "
+            f"{next(iter(missing.values()))[:200]!r}."
         )
     if weighed:
         warn(
             f"{label}: {', '.join(weighed)} have no <inertial>; their masses are those of their "
             "collision shapes at 1000 kg/m³. Give them an <inertial>."
         )
-    return ElementTree.tostring(root, encoding="unicode")
 
 
-def prepare_urdf(spec: Any) -> None:
-    """Let massless links pass, and give a planar root the coordinates x, z and pitch."""
-    let_massless_links_pass(spec)
-    mend_planar_root(spec)
-
-
-def let_massless_links_pass(spec: Any) -> None:
-    """Give massless links the least mass that MuJoCo takes, below `MASSLESS`."""
-    spec.compiler.boundmass = max(spec.compiler.boundmass, _SMALLEST)
-    spec.compiler.boundinertia = max(spec.compiler.boundinertia, _SMALLEST)
+def _is_point(collision: Element) -> bool:
+    """Whether a shape is a sphere of radius 0, which weighs nothing."""
+    sphere = collision.find("geometry/sphere")
+    return sphere is not None and float(sphere.get("radius", "1")) == 0.0
 
 
 def _keep_paths(root: Element) -> None:
@@ -97,19 +218,3 @@ def _keep_paths(root: Element) -> None:
     compiler = SubElement(extension, "compiler") if compiler is None else compiler
     compiler.set("strippath", "false")
     compiler.attrib.pop("meshdir", None)
-
-
-def _found(name: str, directory: Path) -> Path | None:
-    """File of a mesh, sought where ROS packages and MuJoCo have it."""
-    plain = name.split("://", 1)[-1]
-    parts = Path(plain).parts
-    if len(parts) > DEEPEST_FOLDER:
-        return None
-    for first in range(len(parts)):
-        candidate = directory.joinpath(*parts[first:])
-        try:
-            if candidate.is_file():
-                return candidate.resolve()
-        except (OSError, ValueError):  # no possible name of a file
-            return None
-    return None

@@ -6,9 +6,11 @@ import difflib
 import os
 import reprlib
 from pathlib import Path
+from typing import Unpack
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.mjcf import read_mjcf
+from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.robot import Robot
 
 _HERE = Path(__file__).parent
@@ -27,21 +29,15 @@ def builtin_robots() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _HERE.glob("*.xml")))
 
 
-def load_robot(
-    name_or_path: str | os.PathLike[str], *, floating: bool = False, projected: bool = False
-) -> Robot:
+def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions]) -> Robot:
     """Load a built-in robot by its name, or a planar robot from an MJCF or URDF file.
 
     Parameters
     ----------
     name_or_path : str or path
         A name of `builtin_robots`, or the path of an ``.xml`` (MJCF) or ``.urdf`` file.
-    floating : bool
-        Let the trunk float in the plane by x, z and pitch, though the file fixes it to the world
-        (as a URDF without a root joint does) or leaves it free in space.
-    projected : bool
-        Lock the joints of a robot of three dimensions that leave the x–z plane, and let its trunk
-        float in the plane. Its mass must be symmetric about that plane.
+    **how : LoadOptions
+        How a file is read: floating, projected, forward, pose, package_path, mirror.
 
     Returns
     -------
@@ -57,8 +53,8 @@ def load_robot(
     Warns
     -----
     RobotWarning
-        If the file says something that is not simulated, its left and right differ, or joints
-        are locked.
+        If the file says something that is not simulated, its left and right differ, axes are
+        turned into the plane, or joints are locked.
 
     Examples
     --------
@@ -75,10 +71,10 @@ def load_robot(
         )
     name = os.fspath(name_or_path)
     if isinstance(name_or_path, str) and name in builtin_robots():
-        return read_mjcf(_HERE / f"{name}.xml", name=name, floating=floating, projected=projected)
+        return read_mjcf(_HERE / f"{name}.xml", name=name, **how)
     path = Path(name)
     if path.suffix.lower() in _FILE_TYPES:
-        return read_mjcf(path, floating=floating, projected=projected)
+        return read_mjcf(path, **how)
     if name and _exists(path):
         raise RobotError(f"{path}: expected an MJCF file (.xml) or a URDF file (.urdf).")
     raise RobotError(_unknown(name))

@@ -22,6 +22,8 @@ know have 200 kB."""
 DEEPEST_INCLUDE = 20
 """Most files that include one another in a chain."""
 
+_AROUND = "\0\ufeff \t\r\n"  # what a text may have before and after it
+
 MOST_FILES = 500
 """Most files that a robot is made of, each counted as often as it is included."""
 
@@ -88,8 +90,22 @@ def read_tree(source: Path | str, reading: Reading) -> tuple[Node, Place, str]:
         place = Place(source.parent, source.parent, (source,))
     else:
         place = Place(Path(), Path())
-    text = _read(source, reading.label) if isinstance(source, Path) else source
+    text = plain(_read(source, reading.label) if isinstance(source, Path) else source)
     return _tree(text, reading.label, place, reading), place, text
+
+
+def plain(text: str) -> str:
+    """Return a text without what editors leave around it, every line where it was.
+
+    That is null characters and byte order marks at both ends, and blank lines before the XML
+    declaration, which has to come first. The declaration goes: it says nothing, and some are wrong.
+    """
+    bare = text.lstrip(_AROUND)
+    if not bare:
+        return text  # which is refused
+    end = bare.find("?>") + 2 if bare.startswith("<?xml") else 0
+    lines = text[: len(text) - len(bare) + end].count("\n")
+    return "\n" * lines + bare[end:].rstrip(_AROUND)
 
 
 def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
@@ -160,7 +176,7 @@ def _below(path: Path, label: str, where: str, place: Place, reading: Reading) -
             "which no robot needs. Join some of them."
         )
     below = Place(place.main, path.parent, (*place.above, here))
-    return _tree(_read(path, label), label, below, reading)
+    return _tree(plain(_read(path, label)), label, below, reading)
 
 
 def read_model(element: Element, label: str, place: Place, reading: Reading) -> tuple[Node, Place]:

@@ -12,6 +12,9 @@ from heelstrike.robot.files.screening.inclusion import Place, is_readable, is_th
 LARGEST_MESHES = 256 * 2**20
 """Bytes of all mesh files of a robot together."""
 
+MOST_FACES = 200_000
+"""Most faces of an .stl file that MuJoCo reads."""
+
 
 def name_mesh_files(root: Element, label: str, place: Place) -> bool:
     """Give every mesh of a tree the whole path of its file; return whether one has a file.
@@ -53,6 +56,21 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
     # One more compiler element: MuJoCo reads them all, the last one last.
     SubElement(root, "compiler", {"strippath": "false"})
     return True
+
+
+def is_mesh(file: Path) -> bool:
+    """Whether a file is a mesh in a format that MuJoCo reads: .obj, .msh or binary .stl."""
+    kind = file.suffix.lower()
+    if kind != ".stl":
+        return kind in (".obj", ".msh")
+    try:
+        with file.open("rb") as stream:
+            header = stream.read(84)
+        size = file.stat().st_size
+    except OSError:
+        return False
+    faces = int.from_bytes(header[80:84], "little")
+    return len(header) == 84 and 0 < faces <= MOST_FACES and size >= 84 + 50 * faces
 
 
 def refuse_large_meshes(size: int, label: str) -> None:

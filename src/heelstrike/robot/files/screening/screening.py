@@ -119,7 +119,7 @@ def screen(source: Path | str, label: str) -> Screened:
         )
     tags: set[str] = set()
     changed, _ = _screen_tree(root, label, place, reading, tags)
-    if (changed or reading.elements) and root.tag == "mujoco":
+    if (changed or reading.elements or root.mended) and root.tag == "mujoco":
         text = xml_text(root)
     models = {name: xml_text(model).encode() for name, model in reading.models.items()}
     return Screened(

@@ -12,15 +12,23 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
+import math
 import os
 import subprocess
 import sys
+from typing import Any
 
 from heelstrike.errors import RobotError
 
 LONGEST = 300.0
 """Seconds after which a file counts as one that never ends. Large meshes take ten, on a machine
 that does nothing else."""
+
+POINT = 1e-12
+"""Metres; sizes of zero become this, which is nothing to everybody but a parser."""
+
+_SIZES = {2: 1, 3: 2, 4: 3, 5: 2, 6: 3}
+"""How many sizes there are, by MuJoCo's mjtGeom: sphere, capsule, ellipsoid, cylinder, box."""
 
 _tried: dict[bytes, str] = {}
 
@@ -55,6 +63,17 @@ def try_apart(text: str, models: dict[str, bytes], label: str) -> None:
         )
 
 
+def lift_sizes(spec: Any) -> None:
+    """Give shapes without extent, such as spheres of radius 0 for points, one that parsers take."""
+    for geom in spec.geoms:
+        sizes = _SIZES.get(int(geom.type), 0)
+        if not math.isnan(geom.fromto[0]):  # the length is told by two points
+            sizes = 1
+        for k in range(sizes):
+            if geom.size[k] == 0.0:
+                geom.size[k] = POINT
+
+
 def _trouble(order: bytes) -> str:
     """What happens to a process that parses a file, in words; nothing if it ends well."""
     if not sys.executable:
@@ -82,6 +101,7 @@ def _try(text: str, models: dict[str, bytes]) -> None:
 
     mujoco.set_mju_user_warning(lambda _: None)  # it would write them into the work directory
     spec = mujoco.MjSpec.from_string(text, include=models)
+    lift_sizes(spec)
     spec.compiler.balanceinertia = True
     spec.compiler.boundmass = spec.compiler.boundinertia = 1e-12
     model = spec.compile()

@@ -48,14 +48,16 @@ _CHILDREN: dict[str, set[str]] = {
     "geometry": {"box", "sphere", "cylinder", "capsule", "mesh"},
     "joint": {"origin", "parent", "child", "axis", "limit", "dynamics"},
 }
-_SEVERAL = {("robot", "link"), ("robot", "joint"), ("link", "collision")}
+_SEVERAL = {
+    *(("robot", "link"), ("robot", "joint"), ("link", "collision")),
+    ("joint", "dynamics"),  # of which the first counts
+}
 _REQUIRED = {
     "link": ("name",),
     "joint": ("name", "type"),
     "parent": ("link",),
     "child": ("link",),
     "mass": ("value",),
-    "inertia": _MOMENTS[:3],
 }
 # What is known, and is about other things than mechanics, or told elsewhere (mimic).
 _OTHER_MATTERS = {
@@ -167,17 +169,23 @@ def check_urdf_tree(root: Element, label: str) -> None:
         )
 
 
-def _check(element: Element, where: str, label: str, strange: list[str]) -> None:
+def _at(label: str, element: Element) -> str:
+    return f"{label}: line {getattr(element, 'line', 0)}"
+
+
+def _check(element: Element, where: str, label: str, strange: list[str], joint: str = "") -> None:
     tag = element.tag
+    if tag == "joint":
+        joint = element.get("type", "")
     if tag in ("link", "joint"):
         where = f"{tag} {element.get('name', '')!r}"
     attributes = _ATTRIBUTES[tag]
     for name in _REQUIRED.get(tag, ()):
         if name not in element.attrib:
-            raise RobotError(f"{label}: <{tag}> of {where} lacks the attribute {name!r}.")
+            raise RobotError(f"{_at(label, element)}: <{tag}> of {where} lacks {name!r}.")
     for name, text in element.attrib.items():
         if name in attributes:
-            _check_numbers(element, name, text, attributes[name], where, label)
+            _check_numbers(element, name, text, attributes[name], where, label, joint)
         elif ":" not in name and not name.startswith("xmlns"):
             strange.append(
                 f"<{tag}> of {where} has the unknown attribute {name[:60]!r}"
@@ -189,23 +197,23 @@ def _check(element: Element, where: str, label: str, strange: list[str]) -> None
     for child in element:
         if child.tag in known:
             if child.tag in seen and (tag, child.tag) not in _SEVERAL:
-                raise RobotError(f"{label}: {where} has two <{child.tag}>. Keep one.")
+                raise RobotError(f"{_at(label, child)}: {where} has two <{child.tag}>. Keep one.")
             seen.add(child.tag)
-            _check(child, where, label, strange)
+            _check(child, where, label, strange, joint)
         elif child.tag not in other and ":" not in child.tag:
             strange.append(
                 f"<{child.tag[:60]}> in <{tag}> of {where} is unknown{_guess(child.tag, known)}"
             )
-    if tag == "inertial" and not {"mass", "inertia"} <= seen:
-        raise RobotError(f"{label}: the <inertial> of {where} needs <mass> and <inertia>.")
+    if tag == "inertial" and "mass" not in seen:
+        raise RobotError(f"{_at(label, element)}: the <inertial> of {where} needs a <mass>.")
 
 
 def _check_numbers(
-    element: Element, name: str, text: str, count: int, where: str, label: str
+    element: Element, name: str, text: str, count: int, where: str, label: str, joint: str
 ) -> None:
-    if count == 0:
-        return
-    what = f"{label}: {name!r} of <{element.tag}> of {where}"
+    if count == 0 or (element.tag == "inertia" and not text.strip()):
+        return  # a word, or a moment that is left out
+    what = f"{_at(label, element)}: {name!r} of <{element.tag}> of {where}"
     try:
         values = [float(word) for word in text.split()]
     except ValueError:
@@ -217,10 +225,11 @@ def _check_numbers(
     limit = element.tag == "limit"
     if any(math.isnan(value) or (math.isinf(value) and not limit) for value in values):
         raise RobotError(f"{what} is {text[:60]!r}, which is no finite number.")
-    signed = element.tag in ("origin", "axis") or name in ("lower", "upper", "ixy", "ixz", "iyz")
+    # Of the moments of inertia only the one about the plane's normal has to be one; see `inertias`.
+    signed = element.tag in ("origin", "axis", "inertia") or name in ("lower", "upper")
     if not signed and name != "scale" and min(values) < 0.0:
         raise RobotError(f"{what} is {text[:60]!r}; it must not be negative.")
-    if element.tag == "axis" and not any(values):
+    if element.tag == "axis" and not any(values) and joint not in ("fixed", "floating"):
         raise RobotError(f"{what} is zero, which is no direction.")
 
 

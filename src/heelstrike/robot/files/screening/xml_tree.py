@@ -7,6 +7,7 @@ entities until the memory is full.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import NoReturn
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -22,6 +23,9 @@ MOST_ELEMENTS = 20_000
 """Most elements of a robot, copies included; the largest we know has some 2000."""
 
 
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+
+
 class Node(Element):
     """An element that knows where it was written.
 
@@ -31,10 +35,13 @@ class Node(Element):
         Line of the main file on which it begins, or that of the ``<include>`` that brought it.
     folder : Path or None
         Folder of the file that it was included from, None if it is in the main file.
+    mended : bool
+        Whether the text had to be changed to be read.
     """
 
     line = 0
     folder: Path | None = None
+    mended = False
 
 
 def xml_tree(text: str, label: str) -> Node:
@@ -48,6 +55,24 @@ def xml_tree(text: str, label: str) -> Node:
         If the text is not well-formed XML, with line and column; if it is nested too deeply, has
         too many elements, or declares a document type or entities.
     """
+    try:
+        return _tree(text, label)
+    except RobotError:
+        # Two hyphens in a comment, which XML forbids and everybody writes.
+        bare = _COMMENT.sub(lambda found: "\n" * found.group().count("\n"), text)
+        if bare == text:
+            raise
+        try:
+            root = _tree(bare, label)
+        except RobotError:
+            root = None
+        if root is None:
+            raise
+    root.mended = True
+    return root
+
+
+def _tree(text: str, label: str) -> Node:
     builder: TreeBuilder = TreeBuilder(element_factory=Node)
     depth = count = 0
 

@@ -1,0 +1,115 @@
+"""Robots put on the ground: above no part of it, and in no part of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike import dynamics
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.contact.workspace import Floats
+from heelstrike.errors import RobotError
+from heelstrike.robot.coordinates import checked
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+
+TRUNK = (0, 1, 2)  # coordinates of a floating trunk: x, z, pitch
+LEVEL = (
+    1e-4  # m; contact points of a foot that are no higher than this above its lowest are its sole
+)
+CLOSE = 1e-12  # m; gaps that small are closed
+MOST_ITERATIONS = 60
+LARGEST_CHANGE = 0.2  # rad, m; of a joint in one iteration
+MOST_TILT = 0.6  # rad, m; of all joints together, beyond which a foot is not made to fit the ground
+
+
+def placed(robot: Robot, state: State, ground: Ground) -> State:
+    """Move a robot up or down until it touches the ground; see :meth:`Robot.placed`."""
+    state = checked(robot, state)
+    lift = _lift(robot)
+    centers = dynamics.contact_positions(robot, state.q)
+    touching = [
+        touching_height(ground, float(x), float(radius))
+        for (x, _), radius in zip(centers, robot.model.contact_radius, strict=True)
+    ]
+    q = state.q.copy()
+    q[lift] += robot.model.axis[lift, 2] * float(np.max(touching - centers[:, 1]))
+    return State(q, state.v)
+
+
+def standing(robot: Robot, ground: Ground) -> State:
+    """Stand a robot on the ground with its soles on it; see :meth:`Robot.standing`."""
+    start = placed(robot, robot.reference_state(), ground)
+    sole = _soles(robot)
+    lift = _lift(robot)
+    held = {*_above(robot, lift), *(TRUNK if robot.floating else ())} - {lift}
+    free = np.array([joint for joint in range(robot.nq) if joint not in held])
+    low, high = np.minimum(robot.model.lower, start.q), np.maximum(robot.model.upper, start.q)
+    # Where little mass moves, as at ankles, much may change.
+    ease = 1.0 / np.sqrt(np.diag(dynamics.mass_matrix(robot, start.q)))
+    q = start.q.copy()
+    for _ in range(MOST_ITERATIONS if sole else 0):
+        at = contact_kinematics(robot, q, start.v, ground)
+        gap = at.gap[sole]
+        if np.abs(gap).max() < CLOSE:
+            break
+        # The least change that closes the gaps, were the ground straight around each point.
+        rows = at.jacobian[sole, 0][:, free] * ease[free]
+        change = ease[free] * np.linalg.lstsq(rows, -gap, rcond=1e-9)[0]
+        wanted = q[free] + np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
+        q[free] = np.clip(wanted, low[free], high[free])
+        free = free[q[free] == wanted]  # a joint that comes to its stop stays there
+        if np.any(np.abs(np.delete(q - start.q, lift)) > MOST_TILT):
+            return start
+    return placed(robot, State(q, start.v), ground)
+
+
+def _lift(robot: Robot) -> int:
+    """Coordinate that moves the whole robot straight up or down."""
+    model = robot.model
+    for joint in range(robot.nv):
+        slides = not np.any(model.axis[_above(robot, joint), 0])
+        carried = [joint in _above(robot, link) for link in set(model.contact_link.tolist())]
+        if slides and model.axis[joint, 1] == 0.0 and carried and all(carried):
+            return joint
+    raise RobotError(
+        f"robot {robot.name!r} cannot be put on the ground, for it "
+        + ("has no joint that lifts all of it." if robot.nc else "has no contact points.")
+    )
+
+
+def _above(robot: Robot, link: int) -> list[int]:
+    """Links from one up to the world, itself first."""
+    found = [link]
+    while (parent := int(robot.model.parent[found[-1]])) >= 0:
+        found.append(parent)
+    return found
+
+
+def touching_height(ground: Ground, x: float, radius: float) -> float:
+    """Height of the centre of a disc above x that touches the ground and lies in no part of it."""
+    model = ground.model()
+    left, right = model.vertices[:-1], model.vertices[1:]
+    heights = [float(ground.height(x)) + radius]
+    for corner in model.vertices[np.abs(model.vertices[:, 0] - x) <= radius]:
+        heights.append(float(corner[1] + np.sqrt(radius**2 - (corner[0] - x) ** 2)))
+    for k in np.flatnonzero(model.normal[:, 1] > 0.0):
+        foot = x - radius * model.normal[k, 0]  # where the disc would touch this segment
+        first, last = k == 0, k == len(left) - 1  # which go on for ever
+        if (first or left[k, 0] <= foot) and (last or foot <= right[k, 0]):
+            slope = -model.normal[k, 0] / model.normal[k, 1]
+            base = left[k, 1] + slope * (x - left[k, 0])
+            heights.append(float(base + radius / model.normal[k, 1]))
+    return max(heights)
+
+
+def _soles(robot: Robot) -> list[int]:
+    """First and last of the contact points on which each foot stands in the reference."""
+    bottoms: Floats = dynamics.contact_positions(robot, robot.model.reference)[:, 1]
+    bottoms = bottoms - robot.model.contact_radius
+    ends: list[int] = []
+    for foot in robot.feet:
+        contacts = np.array(foot.contacts)
+        low = contacts[bottoms[contacts] <= bottoms[contacts].min() + LEVEL]
+        ends += sorted({int(low[0]), int(low[-1])})
+    return ends

@@ -1,0 +1,148 @@
+"""Inertias that no body in space can have, and that are good enough for the plane.
+
+Of a planar robot only the moment about the plane's normal acts. Files of planar robots often give
+no other, or round them until no body could have them, and parsers refuse such bodies or replace
+their moments. Here such a tensor is taken out of the file before it is compiled, and its moment
+about the normal put into the compiled robot.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.files.snapping import IN_PLANE
+from heelstrike.robot.plausibility import is_possible
+from heelstrike.robot.warning import warn
+
+Floats = NDArray[np.float64]
+
+MASSLESS = 1e-14  # kg, kg m²; no link that is meant to weigh anything weighs less
+MARGIN = 1e-9  # share of the largest moment by which parsers may judge otherwise than we do
+
+
+def stated_tensor(body: Any) -> Floats | None:
+    """Return the tensor of inertia (3, 3) that a file states of a body, in axes of its own."""
+    if not body.explicitinertial or body.id == 0:
+        return None
+    full = np.array(body.fullinertia, dtype=np.float64)
+    if np.isnan(full[0]):  # given by its principal moments
+        return np.diag(np.array(body.inertia, dtype=np.float64))
+    xx, yy, zz, xy, xz, yz = full
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def take_out(spec: Any) -> list[tuple[Any, Floats]]:
+    """Replace tensors that a parser may refuse by spheres of about their size; return them.
+
+    Parameters
+    ----------
+    spec : mujoco.MjSpec
+        The parsed file, which is changed.
+
+    Returns
+    -------
+    list of (mujoco.MjsBody, (3, 3) float)
+        The bodies and their tensors.
+    """
+    taken = []
+    for body in spec.bodies:
+        tensor = stated_tensor(body)
+        if tensor is None or not np.all(np.isfinite(tensor)):
+            continue
+        low, middle, high = np.linalg.eigvalsh(tensor)
+        if low > MARGIN * high and low + middle >= (1.0 + MARGIN) * high:
+            continue
+        taken.append((body, tensor))
+        body.fullinertia[0] = np.nan
+        body.inertia[:] = _size(tensor)
+    return taken
+
+
+def put_back(model: Any, pose: Any, taken: list[tuple[Any, Floats]], label: str) -> None:
+    """Give bodies the moments about the plane's normal that their file states.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        The compiled file, which is changed.
+    pose : mujoco.MjData
+        Its pose, in which y is the normal.
+    taken : list
+        What `take_out` returned.
+    label : str
+        What to call the file in messages.
+
+    Raises
+    ------
+    RobotError
+        If such a moment is negative.
+
+    Warns
+    -----
+    RobotWarning
+        Of tensors that say something about other axes which no body can have.
+    """
+    impossible = []
+    for body, tensor in taken:
+        name, place = body.name or f"body {body.id}", body.id
+        normal = pose.ximat[place].reshape(3, 3)[1]
+        moment = float(normal @ tensor @ normal)
+        if moment < -MARGIN * _size(tensor) - MASSLESS:
+            raise RobotError(
+                f"{label}: body {name!r} has the moment of inertia {moment:.6g} kg m² about the "
+                "normal of the plane in which the robot moves. It must not be negative."
+            )
+        # What the parser made of the stand-in: a file may ask for another mass of the whole.
+        share = float(model.body_inertia[place, 0]) / _size(tensor)
+        model.body_inertia[place] = max(moment, 0.0) * share
+        if not is_possible(tensor) and not _is_planar(tensor, normal, moment):
+            impossible.append(name)
+    if impossible:
+        warn(
+            f"{label}: no body has the inertia that the file gives {', '.join(impossible)}: "
+            "moments are not negative, and none is more than the sum of the other two. Only the "
+            "moments about the normal of the plane act here; they are taken as they are."
+        )
+
+
+def refuse_missing(model: Any, pose: Any, missing: dict[str, list[str]], label: str) -> None:
+    """Refuse moments that a URDF leaves out, where they act in the plane.
+
+    Parameters
+    ----------
+    model : mujoco.MjModel
+        The compiled file.
+    pose : mujoco.MjData
+        Its pose, in which y is the normal.
+    missing : dict of str to list of str
+        Names of the moments that links lack.
+    label : str
+        What to call the file in messages.
+
+    Raises
+    ------
+    RobotError
+        With the link and the moment.
+    """
+    for link, moments in missing.items():
+        normal = pose.ximat[model.body(link).id].reshape(3, 3)[1]
+        for moment in moments:
+            if abs(normal["xyz".index(moment[-1])]) > IN_PLANE:
+                raise RobotError(
+                    f"{label}: <inertia> of link {link!r} lacks {moment!r}, which acts in the "
+                    "plane. Give it."
+                )
+
+
+def _size(tensor: Floats) -> float:
+    return float(np.abs(np.linalg.eigvalsh(tensor)).max()) or 1.0
+
+
+def _is_planar(tensor: Floats, normal: Floats, moment: float) -> bool:
+    """Whether a tensor has the moment about the plane's normal and nothing else."""
+    rest = tensor - moment * np.outer(normal, normal)
+    return bool(np.abs(rest).max() <= 1e-6 * abs(moment))

@@ -1,0 +1,104 @@
+"""Files that a robot file names by ``package://``, found where ROS keeps packages."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from urllib.parse import unquote
+
+DEEPEST_FOLDER = 40  # most folders in the path of a file, and above a robot file
+DEEPEST_PACKAGE = 3  # folders below one of ROS_PACKAGE_PATH in which packages are sought
+MOST_FOLDERS = 2000  # that are looked into for one package
+
+_SCHEMES = ("package://", "model://", "file://")
+
+
+def find_file(name: str, directory: Path, packages: Sequence[Path]) -> Path | None:
+    """Return the file that a robot file means, None if it is not there.
+
+    Parameters
+    ----------
+    name : str
+        A path, or an address that begins with package://, model:// or file://.
+    directory : Path
+        Folder of the robot file.
+    packages : sequence of Path
+        Folders of packages, or that hold such, which are sought first.
+    """
+    scheme = next((each for each in _SCHEMES if name.startswith(each)), "")
+    plain = name[len(scheme) :].replace("\\", "/")
+    if "%" in plain and scheme:
+        plain = unquote(plain)
+    parts = Path(plain).parts
+    if not parts or len(parts) > DEEPEST_FOLDER or "\0" in plain:
+        return None
+    if scheme in ("package://", "model://"):
+        for folder in _package_folders(parts[0], directory, packages):
+            if _is_file(path := folder.joinpath(*parts[1:])):
+                return path.resolve()
+    # Beside the robot file; packages were often copied without the folders around them.
+    for first in range(len(parts)):
+        if _is_file(path := directory.joinpath(*parts[first:])):
+            return path.resolve()
+    return None
+
+
+def _package_folders(name: str, directory: Path, packages: Sequence[Path]) -> Iterator[Path]:
+    """Folders that may be a package: asked for, around the robot file, and those of ROS."""
+    for folder in packages:
+        yield from _packages_in(folder, name)
+    try:
+        here = directory.resolve()
+    except (OSError, RuntimeError):
+        here = directory
+    for above in (here, *here.parents[:DEEPEST_FOLDER]):
+        if above.name == name or (_is_file(above / "package.xml") and _named(above, name)):
+            yield above
+        yield above / name
+    for folder in _folders_of("ROS_PACKAGE_PATH"):
+        yield from _packages_in(folder, name)
+    for folder in _folders_of("AMENT_PREFIX_PATH"):
+        yield folder / "share" / name
+
+
+def _packages_in(folder: Path, name: str) -> Iterator[Path]:
+    """Return the folder itself, and packages of that name in it, nearest first."""
+    if folder.name == name or _named(folder, name):
+        yield folder
+    level = [folder]
+    seen = 0
+    for _ in range(DEEPEST_PACKAGE):
+        below: list[Path] = []
+        for each in level:
+            yield each / name
+            try:
+                inner = sorted(path for path in each.iterdir() if path.is_dir())
+            except OSError:
+                continue
+            seen += len(inner)
+            if seen > MOST_FOLDERS:
+                return
+            yield from (path for path in inner if _named(path, name))
+            below += inner
+        level = below
+
+
+def _named(folder: Path, name: str) -> bool:
+    """Whether a folder is a package of a name that differs from its own."""
+    manifest = folder / "package.xml"
+    try:
+        return manifest.is_file() and f"<name>{name}</name>" in manifest.read_text("utf-8")[:10_000]
+    except (OSError, ValueError):
+        return False
+
+
+def _folders_of(variable: str) -> list[Path]:
+    return [Path(text) for text in os.environ.get(variable, "").split(os.pathsep) if text]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # no possible name of a file
+        return False
