@@ -10,20 +10,24 @@ from __future__ import annotations
 
 import enum
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics import link_poses
+from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.push import Push
 from heelstrike.view.style import (
+    FORCE_COLOR,
     INK,
     ORANGE,
     PALE,
@@ -44,6 +48,7 @@ THICKEST = 15.0  # points, of a bone that has the whole mass
 THINNEST = 2.5
 DISC_WIDTH = 1.2
 WIDTH_SHARE = 0.74  # of the height of a portrait that the robot may take in width
+PUSH_LENGTH = 0.15  # of the size of a portrait
 LEGS_APART = 0.3  # rad that each leg of a portrait is turned at its root
 
 
@@ -251,7 +256,13 @@ def _says_left(robot: Robot, link: int) -> bool:
     return "left" in f"{robot.joint_names[link]} {robot.link_names[link]}".lower()
 
 
-def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
+def robot_picture(
+    robot: Robot,
+    path: str | os.PathLike[str],
+    *,
+    ground: Ground | None = None,
+    pushes: Sequence[Push] = (),
+) -> Path:
     """Write a portrait of a robot, standing as in its file but with its legs apart.
 
     Parameters
@@ -260,6 +271,10 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         The robot.
     path : str or path
         Picture to write: .png, .pdf or .svg.
+    ground : Ground, optional
+        Ground on which it stands instead, as :meth:`heelstrike.Robot.standing` puts it there.
+    pushes : sequence of Push
+        Pushes to draw, as arrows that end at what they push.
 
     Returns
     -------
@@ -270,11 +285,15 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
     ------
     ViewError
         If the file cannot be written.
+    RobotError
+        If there is a ground, and the robot cannot stand on any.
+    SimulationError
+        If the robot has no such link as is pushed.
     """
     model = robot.model
-    q = legs_apart(robot)
+    q = legs_apart(robot) if ground is None else robot.standing(ground).q
     poses = link_poses(robot, q)
-    if robot.floating and robot.nc:  # stand on z = 0
+    if ground is None and robot.floating and robot.nc:  # stand on z = 0
         q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
         poses = link_poses(robot, q)
     bones = skeleton(robot)
@@ -299,12 +318,19 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         for label, (places, marker, look) in marks.items():
             if len(places):
                 axes.plot(*places.T, marker, label=label, **({"ms": 5, "zorder": 6} | look))
-        ground = float(points[:, 1].min()) if len(points) else float(low[1])
-        axes.axhspan(ground - 0.06 * size, ground, color=PALE, zorder=0)
         middle = 0.5 * float(low[0] + high[0])
+        left, right = middle - 0.42 * size, middle + 0.42 * size
+        if ground is None:
+            height = float(points[:, 1].min()) if len(points) else float(low[1])
+            surface = np.array([[left, height], [right, height]])
+        else:
+            surface = ground_outline(ground, left, right)
+        bottom = float(surface[:, 1].min()) - 0.06 * size
+        axes.fill_between(surface[:, 0], surface[:, 1], bottom, color=PALE, lw=0.0, zorder=0)
+        _draw_pushes(axes, robot, poses, pushes, size)
         axes.set(
-            xlim=(middle - 0.42 * size, middle + 0.42 * size),
-            ylim=(ground - 0.06 * size, high[1] + 0.06 * size),
+            xlim=(left, right),
+            ylim=(bottom, high[1] + 0.06 * size),
             xlabel="x (m)",
             ylabel="z (m)",
             aspect="equal",
@@ -315,6 +341,28 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         )
         legend_above(axes)
         return save_figure(figure, path)
+
+
+def _draw_pushes(
+    axes: Axes, robot: Robot, poses: LinkPoses, pushes: Sequence[Push], size: float
+) -> None:
+    """Draw pushes as arrows of one length that end where they act, with their forces."""
+    for push in pushes:
+        link, place = push.place(robot)
+        x, z = in_world(poses.origin[link], poses.angle[link], np.array(place)).tolist()
+        strength = float(np.hypot(*push.force))
+        along = (np.array(push.force) / (strength or 1.0)).tolist()
+        arrow = {"arrowstyle": "-|>", "color": FORCE_COLOR, "lw": 2.0}
+        axes.annotate(
+            f"{strength:.4g} N",
+            (x, z),
+            xytext=(x - PUSH_LENGTH * size * along[0], z - PUSH_LENGTH * size * along[1]),
+            arrowprops=arrow,
+            color=FORCE_COLOR,
+            ha="right" if along[0] > 0.0 else "left",
+            va="center",
+            zorder=7,
+        )
 
 
 def legs_apart(robot: Robot) -> Floats:
