@@ -15,9 +15,9 @@ import numpy as np
 
 def perturb_gaits(size: float) -> None:
     """Have every gait that this process designs perturbed by `size`, relative to its numbers."""
-    from heelstrike.gait import optimize
+    from heelstrike.gait import design
 
-    optimize.designed_gait = perturbed(optimize.designed_gait, size)  # type: ignore[assignment]
+    design.designed_gait = perturbed(design.designed_gait, size)  # type: ignore[assignment]
 
 
 def perturbed(designed: Callable[[Any, Any], Any], size: float) -> Callable[[Any, Any], Any]:

@@ -13,6 +13,8 @@ import heelstrike as hs
 from heelstrike.dynamics import contact_positions
 from heelstrike.robot import read_mjcf
 from heelstrike.sim import Certificates, Event, EventKind, RunStatus, SolverCount, Timing
+from heelstrike.sim.record.record import ROW_EXTENTS
+from heelstrike.sim.run import QUANTITIES
 
 
 def make_run(
@@ -43,6 +45,20 @@ def make_run(
     normal = np.array([-np.sin(ground.slope), np.cos(ground.slope)])
     center = np.array([contact_positions(robot, row) for row in q]).reshape(rows, robot.nc, 2)
     radius = robot.model.contact_radius
+    extents = robot.model.extents | ROW_EXTENTS
+    given: dict[str, Any] = {
+        "position": q,
+        "velocity": velocity,
+        "torque": torque,
+        "contact_point": center - radius[:, None] * normal,
+        "contact_normal": normal,
+        "gap": center @ normal - radius,
+        "contact_force": force,
+    }
+    recorded: dict[str, Any] = {
+        name: full(given.get(name), *(extents[each] for each in quantity.shape))
+        for name, quantity in QUANTITIES.items()
+    }
     run = hs.Run(
         robot=robot,
         ground=ground,
@@ -50,17 +66,7 @@ def make_run(
         status=RunStatus.COMPLETED,
         message="made up",
         time=time,
-        position=q,
-        velocity=full(velocity, robot.nv),
-        torque=full(torque, robot.nu),
-        stop_torque=full(None, robot.nv),
-        friction_torque=full(None, robot.nv),
-        contact_point=center - radius[:, None] * normal,
-        contact_normal=full(normal, robot.nc, 2),
-        gap=center @ normal - radius,
-        contact_force=full(force, robot.nc, 2),
-        slip_velocity=full(None, robot.nc),
-        residual=full(None, 3),
+        **recorded,
         events=tuple(events),
         certificates=Certificates(0.0, 0.0, 0.0, 0.0),
         solver=SolverCount("lemke", rows, 0, 0, 0),

@@ -24,7 +24,7 @@ from heelstrike.cli.walk import walk
 from heelstrike.compiler.recording import Program, Recording
 from heelstrike.compiler.tape import Entry, Operation, Result
 from heelstrike.dynamics.kernels import state_equations
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import builtin_robots, load_robot
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -182,7 +182,8 @@ def test_operations_are_those_that_are_recorded() -> None:
     equations = Program(
         state_equations,
         {
-            "model": robot.model, "q": vector, "v": vector, "tree": workspace(robot.nv),
+            "model": robot.model, "q": vector, "v": vector,
+            "tree": Workspace.allocate(robot.model.extents),
             "matrix": matrix, "factor": matrix, "bias": vector,
         },
     )  # fmt: skip

@@ -10,6 +10,7 @@ error.
 from __future__ import annotations
 
 import ctypes
+import weakref
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -48,6 +49,22 @@ def _compiled_for(signature: Any, function: Any, **options: Any) -> Any:
     del signature, options
     return _twin(function)
 
+
+import heelstrike.compiler.bundle as bundles  # noqa: E402
+
+_by_address: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
+_make_table = bundles.Bundle._new_table
+
+
+def _new_table(self: Any) -> Any:
+    table = _make_table(self)
+    _by_address[table.ctypes.data] = self
+    return table
+
+
+bundles.Bundle._new_table = _new_table  # type: ignore[method-assign]
+bundles.address_of = lambda bundle: bundle.address
+bundles.bundle_at = lambda _: lambda address: _by_address[int(address)]  # type: ignore
 
 compilation.compiled_for = _compiled_for
 compilation.loop_for = _compiled_for  # type: ignore[assignment]

@@ -130,6 +130,23 @@ def test_allocation_follows_the_declaration() -> None:
     assert (bundle.count, bundle.scale, bundle.turns, bundle.angle) == (4, 0.0, 3, 0.0)
 
 
+def test_extents_of_a_robot_may_be_more_than_a_bundle_has() -> None:
+    """Those that are named apart have an array, or are slips of the pen."""
+
+    class Sized(Bundle):
+        nv: int = number(int)
+        inner: Inner = part(Inner)
+
+    sized = Sized.allocate({"n": 3, "nv": 2, "nu": 5})
+    assert (sized.nv, sized.inner.values.shape, sized.inner.extents) == (2, (3,), {"n": 3})
+    with pytest.raises(TypeError, match="Sized has no nu, neither member nor extent"):
+        Sized.allocate(n=3, nu=5)
+    with pytest.raises(TypeError, match="Inner: the extent 'n' is not given"):
+        Sized.allocate(nv=2)
+    with pytest.raises(TypeError, match="Inner: the extent n is a whole number"):
+        Inner.allocate(n=2.0)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -172,6 +189,23 @@ def test_contents_put_back_are_the_bundle_as_it_was() -> None:
     for spoilt in (before | {"row": np.zeros(3)}, {"cells": before["cells"]}):
         with pytest.raises(ValueError, match="missing, or of another shape"):
             bundle.fill(spoilt)
+
+
+class Whole(Bundle):
+    own: np.ndarray = array("n")
+    inner: Inner = part(Inner, flat=True)
+    other: Inner = part(Inner)
+
+
+def test_a_flat_part_is_stored_under_the_names_of_its_own_members() -> None:
+    whole = Whole.allocate(n=2)
+    whole.inner.values[:] = [1.0, 2.0]
+    assert [name for name, _ in whole.storage()] == ["own", "values", "other.values"]
+    again = Whole.allocate(n=2)
+    again.fill(whole.contents())
+    assert again.inner.values.tolist() == [1.0, 2.0]
+    copied = whole.stored(lambda name, array: array + (name == "values"))
+    assert copied.inner.values.tolist() == [2.0, 3.0]
 
 
 @pytest.mark.parametrize(

@@ -69,6 +69,7 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
         [
             ("compiler/bundle.py", '"""Bundles', '"""A bundle'),
             ("compiler/bundle.py", '"""Base class of bundles', '"""Class of bundles'),
+            ("compiler/bundle_type.py", '"""Read a member', '"""Get a member'),
             ("compiler/private_numba.py", '"""Turn a', '# words\n    """Make of a'),
             ("compiler/recording.py", '"""What the kernel of', '"""What a kernel of'),
             ("compiler/tape.py", '"""Return the entries', '"""Give the entries'),
@@ -134,7 +135,7 @@ EDITS: dict[str, tuple[list[tuple[str, str, str]], set[str]]] = {
         BY_NUMBA,
     ),
     "how bundles are read": (
-        [("compiler/bundle.py", "place += 1 +", "place += 2 +")],
+        [("compiler/bundle_type.py", "place += 1 +", "place += 2 +")],
         BY_NUMBA | RECORDED,
     ),
 }  # fmt: skip

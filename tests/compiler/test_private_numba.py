@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import ast
 import os
+import re
 import subprocess
 import sys
 import threading
 from pathlib import Path
 
+import numpy as np
 import pytest
 from numba.core.types.functions import BaseFunction
 
-from heelstrike.compiler import kept_code, private_numba
+import heelstrike
+from heelstrike.compiler import documented_numba, kept_code, private_members, private_numba
 from heelstrike.compiler.compilation import SWITCH, numba_in_use
 from heelstrike.compiler.private_numba import PrivateNumba
 
 PROGRAM = """
 import numpy as np
 from numba import types
+from heelstrike.compiler.bundle import Bundle, array, cell, extent, number
 from heelstrike.compiler.compilation import compiled_for, kernel, numba_in_use
 
 @kernel
@@ -27,9 +32,27 @@ def inner(x):
 def outer(x):
     return inner(x) + 1.0
 
+class Rod(Bundle):
+    n: int = extent()
+    mass: float = number(float)
+    end: np.ndarray = array("n")
+    swings: int = cell(int)
+
+    @kernel
+    def weight(self, gravity):
+        return gravity * self.mass
+
+@kernel
+def swing(rod):
+    rod.swings += rod.n
+    return rod.end[1] + rod.weight(10.0)
+
+rod = Rod(mass=2.0, end=np.array([3.0, 4.0]))
 compiled = compiled_for(types.float64(types.float64), outer)
-print(type(numba_in_use()).__name__, compiled(1.0), inner(5.0))
+print(type(numba_in_use()).__name__, compiled(1.0), inner(5.0), swing(rod), rod.swings)
 """
+
+COMPUTED = "3.0 10.0 24.0 2"
 
 
 def told(tmp_path: Path, before: str = "", switch: str = "") -> tuple[str, list[str]]:
@@ -59,21 +82,38 @@ def test_what_has_passed_is_not_tested_again(
     def tested_again(*_: object) -> None:
         raise AssertionError
 
-    monkeypatch.setattr(PrivateNumba, "compile", tested_again)
+    monkeypatch.setattr(np, "ones", tested_again)  # no function of ours: theirs are in the key
     PrivateNumba().test()
-    monkeypatch.setattr(private_numba, "fingerprint", lambda *_: "00" * 32)  # another Numba
+    monkeypatch.setattr(documented_numba, "fingerprint", lambda *_: "00" * 32)  # another Numba
     with pytest.raises(AssertionError):
         PrivateNumba().test()
 
 
-MISSING = """
-import numba.core.codegen
-del numba.core.codegen.JITCodeLibrary
-"""
+def private_names() -> list[tuple[str, str]]:
+    """Modules and names that modules of ours take from inside Numba."""
+    files = (Path(str(module.__file__)) for module in (private_numba, private_members))
+    return [
+        (node.module, name.name)
+        for file in files
+        for node in ast.walk(ast.parse(file.read_text()))
+        if isinstance(node, ast.ImportFrom)
+        and node.module is not None
+        and node.module.startswith(("numba.core", "numba.np"))
+        for name in node.names
+    ]
 
-RAISING = """
-import numba.core.codegen
-numba.core.codegen.JITCodeLibrary.add_llvm_module = None
+
+GONE = """
+import builtins
+usual = builtins.__import__
+
+def without(name, globals=None, locals=None, names=(), level=0):
+    ours = (globals or {{}}).get("__name__", "").startswith("heelstrike")
+    if ours and name == {module!r} and {name!r} in (names or ()):
+        raise ImportError("cannot import name " + {name!r})
+    return usual(name, globals, locals, names, level)
+
+builtins.__import__ = without
 """
 
 ANOTHER_MEANING = """
@@ -83,19 +123,37 @@ CompileResult._rebuild = lambda *_: types.SimpleNamespace(entry_point=lambda *_:
 """
 
 
-@pytest.mark.parametrize("before", [MISSING, ANOTHER_MEANING], ids=["missing", "another meaning"])
-def test_without_them_kernels_compute_the_same_after_one_warning(
-    tmp_path: Path, before: str
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Machine code by documented names, compiled once."""
+    return tmp_path_factory.mktemp("kept")
+
+
+@pytest.mark.parametrize(("module", "name"), private_names())
+def test_without_any_of_them_kernels_compute_the_same_after_one_warning(
+    kept: Path, module: str, name: str
 ) -> None:
+    out, warnings = told(kept, GONE.format(module=module, name=name))
+    assert out == f"DocumentedNumba {COMPUTED}"
+    assert len(warnings) == 1
+    assert "CompilerWarning: Numba" in warnings[0]
+
+
+def test_no_other_module_takes_names_from_inside_numba() -> None:
+    for file in Path(heelstrike.__file__).parent.rglob("*.py"):
+        if not file.name.startswith("private_"):
+            assert not re.search(r"^\s*(from|import) numba\.(core|np)\b", file.read_text(), re.M)
+
+
+def test_with_another_meaning_kernels_compute_the_same_after_one_warning(tmp_path: Path) -> None:
     for _ in range(2):
-        out, warnings = told(tmp_path, before)
-        assert out == "DocumentedNumba 3.0 10.0"
+        out, warnings = told(tmp_path, ANOTHER_MEANING)
+        assert out == f"DocumentedNumba {COMPUTED}"
         assert len(warnings) == 1
-        assert "CompilerWarning: Numba" in warnings[0]
 
 
 def test_who_asks_for_documented_names_is_not_warned(tmp_path: Path) -> None:
-    assert told(tmp_path, switch="1") == ("DocumentedNumba 3.0 10.0", [])
+    assert told(tmp_path, switch="1") == (f"DocumentedNumba {COMPUTED}", [])
 
 
 def test_threads_that_compile_at_once_leave_numba_as_it_was() -> None:

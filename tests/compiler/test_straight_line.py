@@ -19,13 +19,14 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.recording import Program, Recording
 from heelstrike.compiler.straight_line import add_function, play
 from heelstrike.compiler.tape import Tape, Value
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.sim.contacts.straight_line import (
     KERNELS,
     MOST_COORDINATES,
     straight_line_programs,
     usual_points,
 )
+from heelstrike.sim.controller.interface import Contacts
 
 # Both sides do the same few hundred operations in another order, with products and sums fused.
 ROUNDING = 1e-11
@@ -40,10 +41,13 @@ def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
     """Arguments of all kernels at a random state; the arrays that carry results are shared."""
     rng = np.random.default_rng(seed)
     model, nv, nc = case.robot().model, case.robot().nv, case.robot().nc
-    tree, matrix, factor = workspace(nv), np.zeros((nv, nv)), np.zeros((nv, nv))
+    tree = Workspace.allocate(model.extents)
+    matrix, factor = np.zeros((nv, nv)), np.zeros((nv, nv))
     q = model.reference + rng.uniform(-1.0, 1.0, nv)
     v = rng.uniform(-3.0, 3.0, nv)
-    position, normal = rng.uniform(-1.0, 1.0, (nc, 2)), rng.normal(size=(nc, 2))
+    contacts = Contacts.allocate(model.extents, components=2)
+    contacts.position[:] = rng.uniform(-1.0, 1.0, (nc, 2))
+    contacts.normal[:] = rng.normal(size=(nc, 2))
     impulse = rng.uniform(-1.0, 1.0, (nc, 2))
     x, w = rng.uniform(-1.0, 1.0, (2, nv))
     points = usual_points(case.robot())
@@ -52,9 +56,9 @@ def arguments(case: RobotCase, seed: int) -> list[tuple[Any, ...]]:
     return [
         (model, q, v, tree, matrix, factor, np.zeros(nv)),
         (model, factor, x),
-        (model, points, tree, position, normal, factor, rows, delassus),
-        (model, points, tree, position, normal, v, np.zeros((nc, 2))),
-        (model, points, tree, position, normal, factor, impulse, np.zeros(nv), w),
+        (model, points, tree, contacts, factor, rows, delassus),
+        (model, points, contacts, v, tree, np.zeros((nc, 2))),
+        (model, points, contacts, factor, impulse, tree, np.zeros(nv), w),
     ]
 
 

@@ -108,5 +108,5 @@ def test_an_interval_is_a_section_of_a_cone(solver: int, speed: float, impulse: 
     problem = ContactProblem.allocate(nc=4, count=2, friction=np.array([0.5, 9.0, 0.0, 0.0]))
     problem.delassus[[0, 1, 3], [0, 1, 3]] = 0.5
     problem.free[:4] = [-1.0, 0.0, 0.0, speed]
-    press(problem, 1, 3.0)
+    press(1, 3.0, problem)
     np.testing.assert_allclose(solved(problem, solver)[:4], [2.0, 0.0, 3.0, impulse], atol=1e-12)

@@ -264,7 +264,7 @@ def test_readings_are_rounded_and_due_once_a_period() -> None:
         walking.bravo7(), walking.gait(), encoder=Encoder(period=0.01, resolution=0.25)
     ).parameters
     memory = law.Memory.allocate(nu=6)
-    state = law.ControlState.allocate(**extents_of(walking.bravo7()))
+    state = law.ControlState.allocate(extents_of(walking.bravo7()))
     for k, t in enumerate([0.0, 0.005, 0.01, 0.02, 0.03, 0.04]):
         state.joint_position[:] = 0.3 * k + np.arange(6)
         read(t, state, parameters, memory)
@@ -309,7 +309,7 @@ def test_the_estimate_is_exact_for_cubics() -> None:
         ({"kd": np.nan}, "kd"),
         ({"kp": [1.0, 1.0, -1.0, 1.0, 1.0, 1.0]}, "kp"),
         ({"kd": [1.0, 1.0, np.nan, 1.0, 1.0, 1.0]}, "kd"),
-        ({"kp": [1.0, 2.0]}, "kp must be one number or 6"),
+        ({"kp": [1.0, 2.0]}, "kp must be one finite number or 6"),
     ],
 )
 def test_gains_are_checked(options: dict[str, object], words: str) -> None:

@@ -37,7 +37,7 @@ def test_rows_and_forces_of_a_point(case: RobotCase) -> None:
         jacobian = dynamics.point_jacobian(robot, q, link, local)
         position = dynamics.point_position(robot, q, link, local)
         rows = np.full((4, robot.nv), 7.0)
-        write_point_rows(robot.model, work, link, position, NORMAL, rows, 1)
+        write_point_rows(robot.model, work, link, position, NORMAL, 1, rows)
         np.testing.assert_allclose(rows[1:3], FRAME @ jacobian[:2], atol=ROUNDING)
         assert np.all(rows[[0, 3]] == 7.0)
         total = np.ones(robot.nv)

@@ -118,7 +118,10 @@ def put(key: str, value: Any) -> Callable[[dict[str, Any]], object]:
         (in_phase(put("contacts", {"0": "toe"})), '"0" must be one of "flat", "point"'),
         (in_phase(put("breakpoints_s", [0.0, 1e300])), "which no gait has"),
         (in_phase(put("breakpoints_s", [0.0, 0.0])), "must rise from 0"),
-        (in_phase(put("joint_pieces", [[[0.0] * 5] * 4])), "of 6 joints for every piece"),
+        (
+            in_phase(put("joint_pieces", [[[0.0] * 5] * 4])),
+            '"joint_pieces" must hold lists of 6 numbers',
+        ),
         (in_phase(put("joint_pieces", [[["0"] * 6] * 4])), "must be a number"),
         (delete("margins"), '"margins" is missing'),
         (put("margins", []), '"margins" must be an object'),
@@ -276,7 +279,7 @@ def test_files_of_version_1_with_pieces_still_load(saved: Path) -> None:
         (put("end_velocity_rad_per_s", [0.0] * 5), "a list of 6 numbers"),
         (put("step_duration_s", 0), "must be positive"),
         (put("step_duration_s", 1e300), "which no gait has"),
-        (put("stance_foot", 0.5), "whole numbers"),
+        (put("stance_foot", 0.5), "stance_foot must be 0 or 1"),
         (put("stance_foot", 7), "stance_foot must be 0 or 1"),
     ],
 )

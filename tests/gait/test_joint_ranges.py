@@ -60,7 +60,8 @@ def test_a_counterpart_that_turns_the_other_way_gets_the_mirrored_range() -> Non
             upper=np.full(robot.nv, 3.0),
         ),
     )
-    lower, upper = ranges_kept(turned, {"right_knee": (0.4, 1.5)})
+    assert turned.mirror is not None
+    lower, upper = ranges_kept(turned, turned.mirror, {"right_knee": (0.4, 1.5)})
     assert (lower[right], upper[right]) == (0.4, 1.5)
     # 0.1 below and 1.0 above the right one's reference: 0.1 above and 1.0 below the left one's.
     assert (lower[left], upper[left]) == pytest.approx((-1.2, -0.1))
@@ -73,8 +74,9 @@ def test_an_infinite_end_leaves_the_robot_s_own() -> None:
     robot = hs.load_robot("bravo7")
     knee = robot.joint_names.index("right_knee")
     model = robot.model.replaced(lower=np.full(robot.nv, -0.5), upper=np.full(robot.nv, 2.0))
+    assert robot.mirror is not None
     lower, upper = ranges_kept(
-        dataclasses.replace(robot, model=model), {"right_knee": (-np.inf, 1.0)}
+        dataclasses.replace(robot, model=model), robot.mirror, {"right_knee": (-np.inf, 1.0)}
     )
     assert (lower[knee], upper[knee]) == (-0.5, 1.0)
 

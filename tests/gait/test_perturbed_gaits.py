@@ -26,8 +26,8 @@ def test_gaits_of_this_suite_are_perturbed_if_asked(
     request: pytest.FixtureRequest, gait: hs.Gait
 ) -> None:
     size = request.config.getoption("perturb_gaits")
-    from heelstrike.gait import optimize
+    from heelstrike.gait import design
 
-    assert (optimize.designed_gait.__name__ == "perturbed_gait") == (size > 0.0)
+    assert (design.designed_gait.__name__ == "perturbed_gait") == (size > 0.0)
     assert gait.step_length == 0.30
     assert gait.step_duration == 0.70

@@ -223,12 +223,13 @@ def test_file_keeps_every_digit(walker: tuple[hs.Robot, hs.Gait], tmp_path: Path
     [
         ("breakpoints_s", None, '"breakpoints_s" is missing'),
         ("joint_pieces", None, '"joint_pieces" is missing'),
-        ("joint_pieces", [[[1.0, 2.0], [1.0]]], "lists of one length"),
-        ("joint_pieces", [[1.0]], "for every piece"),
-        ("joint_pieces", [[["1"]]], "must be a number"),
+        ("joint_pieces", [[[1.0, 2.0]]], '"joint_pieces" must hold lists of 4 numbers'),
+        ("joint_pieces", [[1.0]], '"joint_pieces" must hold lists of 4 numbers'),
+        ("joint_pieces", [[["1"] * 4]], "must be a number"),
+        ("pitch_pieces", [[0.0] * 6, [0.0]], "lists of one length"),
         ("pitch_pieces", [[0.0] * 6], "pitch_pieces must have shape"),
         ("pitch_pieces", None, '"pitch_pieces" is missing'),
-        ("pitch_pieces", 0.0, "pitch_pieces must have shape"),
+        ("pitch_pieces", 0.0, '"pitch_pieces" must be a list of numbers'),
         ("breakpoints_s", [0.0, 0.6], "2 breakpoints need pieces"),
     ],
 )

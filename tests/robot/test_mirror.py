@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from heelstrike import dynamics
+from heelstrike.errors import RobotError
 from heelstrike.robot import Robot, RobotWarning, State, builtin_robots, load_robot, read_mjcf
 
 LEG = """<body name="{hip}_link" pos="0 0 0">
@@ -46,8 +47,8 @@ def biped_text(
         </body></worldbody><actuator>{motors}</actuator></mujoco>"""
 
 
-def biped(*names: tuple[str, str], **changes: object) -> Robot:
-    return read_mjcf(biped_text(*names, **changes))  # type: ignore[arg-type]
+def biped(*names: tuple[str, str], mirror: str | None = None, **changes: object) -> Robot:
+    return read_mjcf(biped_text(*names, **changes), mirror=mirror)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", [name for name in builtin_robots() if name != "rimless_wheel"])
@@ -80,6 +81,11 @@ def test_a_wheel_has_no_sides() -> None:
         (("righthip", "rightankle"), ("lefthip", "leftankle")),
         (("hip", "ankle"), ("hip_left", "ankle_left")),
         (("hip_right", "ankle_right"), ("hip", "ankle")),
+        (("hip_R", "ankle_R"), ("hip_L", "ankle_L")),
+        (("FR_hip", "FR_foot"), ("FL_hip", "FL_foot")),
+        (("hip_rr", "foot_rr"), ("hip_rl", "foot_rl")),
+        (("RH_HAA", "RH_KFE"), ("LH_HAA", "LH_KFE")),
+        (("RR_hip", "RR_foot"), ("LR_hip", "LR_foot")),
     ],
 )
 def test_words_for_left_and_right(right: tuple[str, str], left: tuple[str, str]) -> None:
@@ -154,7 +160,87 @@ def test_friction_is_the_grounds_and_makes_no_difference() -> None:
 
 
 def test_rounding_is_no_difference() -> None:
-    assert biped(mass=3.0 * (1.0 + 1e-8)).mirror is not None
+    """Four digits of a mass, hundredths of a millimetre of a length, as drawings are exported."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert biped(mass=3.0002, size=0.100003, high=60.004).mirror is not None
+    with pytest.warns(RobotWarning, match="left and right differ"):
+        assert biped(mass=3.001).mirror is None
+
+
+def test_feet_whose_points_nearly_coincide_are_matched_one_to_one() -> None:
+    """Points a hundredth of a millimetre apart: the nearest one of both would be the same."""
+    many = "".join(
+        f'<geom type="sphere" size="0.01" mass="0" pos="{0.1 + 8e-6 * k:.6f} 0 -0.05"/>'
+        for k in range(4)
+    )
+    box = '<geom type="box"'
+    assert read_mjcf(biped_text().replace(box, many + box)).mirror is not None
+    head, _, tail = biped_text().replace(box, many + box).rpartition("0.100024")
+    mirror = read_mjcf(f"{head}0.100023{tail}").mirror
+    assert mirror is not None
+    np.testing.assert_array_equal(mirror.contact[mirror.contact], np.arange(len(mirror.contact)))
+
+
+def test_left_and_right_are_made_equal() -> None:
+    """Every number is the mean, and what was changed is said."""
+    motors = '<motor joint="left_hip" ctrlrange="-2 2"/><motor joint="right_hip" ctrlrange="-2 3"/>'
+    changes = {"mass": 3.2, "high": 62, "rest": 24, "size": 0.12, "motors": motors}
+    words = (
+        r"made equal by their means. They differed in mass by 0.2 \(right_hip\), "
+        r".*upper by .* rest by .*torque upper by 1 .*contact position by 0.02"
+    )
+    with pytest.warns(RobotWarning, match=words) as caught:
+        robot = biped(mirror="average", **changes)
+    assert len(caught) == 1
+    model, mirror = robot.model, robot.mirror
+    assert mirror is not None
+    np.testing.assert_allclose(model.mass[[3, 5]], 3.1)
+    np.testing.assert_allclose(model.upper[[3, 5]], np.radians(61.0))
+    np.testing.assert_allclose(model.rest[[4, 6]], np.radians(22.0))
+    np.testing.assert_array_equal(model.torque_upper, 2.5)
+    places = model.contact_position
+    np.testing.assert_array_equal(places, mirror.at_contacts(places))
+    np.testing.assert_allclose(np.ptp(places[:2, 0]), 0.22)
+
+
+def test_joints_of_opposite_senses_are_made_equal() -> None:
+    with pytest.warns(RobotWarning, match="made equal"):
+        robot = biped(mirror="average", opposite=True, mass=3.2)
+    np.testing.assert_allclose(robot.model.mass[[3, 5]], 3.1)
+    assert robot.mirror is not None
+    np.testing.assert_allclose(robot.model.lower[3:], -robot.model.upper[[5, 6, 3, 4]], atol=1e-15)
+
+
+def test_an_average_that_changes_nothing_says_nothing() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        robot = load_robot("bravo7", mirror="average")
+    for name, values in load_robot("bravo7").model.members().items():
+        np.testing.assert_allclose(robot.model.members()[name], values, rtol=1e-15, err_msg=name)
+
+
+@pytest.mark.parametrize(
+    ("names", "changes", "words"),
+    [
+        (
+            (("hip1", "ankle1"), ("hip2", "ankle2")),
+            {},
+            "needs to know left from right by the names",
+        ),
+        (
+            (),
+            {"motors": '<motor joint="left_hip"/>'},
+            "left_hip has an actuator, right_hip has none",
+        ),
+        ((("right_hip", "right_ankle"), ("left_hip", "ankle_port")), {}, "has no counterpart"),
+    ],
+)
+def test_what_has_no_mean(
+    names: tuple[tuple[str, str], ...], changes: dict[str, object], words: str
+) -> None:
+    with pytest.raises(RobotError, match=words):
+        biped(*names, mirror="average", **changes)
 
 
 def test_the_warning_points_at_the_caller() -> None:

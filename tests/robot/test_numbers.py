@@ -91,7 +91,7 @@ def test_a_number_goes_from_the_builder_through_files(name: str, tmp_path: Path)
     if number.later:
         assert np.all(getattr(stored_robot(held).model, name) == number.default)
     else:
-        with pytest.raises(ValueError, match=f"{name} is missing"):
+        with pytest.raises(ValueError, match=f"'{name}' is missing"):
             stored_robot(held)
     # MJCF holds all of them, URDF says what it leaves out.
     back = load_robot(robot.save(tmp_path / "two.xml"))

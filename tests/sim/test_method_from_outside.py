@@ -51,56 +51,53 @@ def begin(model: Any, ground: Any, memory: Any, work: Any, record: Any) -> int:
 
 @kernel
 def prepare(model: Any, ground: Any, memory: Any, work: Any) -> None:
-    evaluate_equations(model, memory.q, memory.v, memory)
-    locate_contacts(model, ground, memory)
+    evaluate_equations(model, memory.q, memory.v, memory.equations)
+    locate_contacts(model, ground, memory.equations.tree, memory.contacts, memory.surface)
 
 
 @kernel
 def decide(
-    controller: Any, control: Any, model: Any, ground: Any, memory: Any, work: Any, record: Any,
-    clock: Any,
+    scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> int:  # fmt: skip
-    passive_force(model, memory.q, memory.v, memory.force)
+    model, equations = scene.model, memory.equations
+    force, rate = equations.force, equations.rate
+    passive_force(model, memory.q, memory.v, force)
     for i in range(model.actuator_joint.shape[0]):
-        memory.force[model.actuator_joint[i]] += memory.torque[i]
-    if share_over_step(memory.pushes, clock.time, work.step):
-        add_pushes(model, memory.tree, memory.pushes, memory.force)
+        force[model.actuator_joint[i]] += memory.torque[i]
+    if share_over_step(clock.time, work.step, memory.pushes):
+        add_pushes(model, equations.tree, memory.pushes, force)
     contacts = memory.contacts
     for point in range(model.contact_link.shape[0]):
-        speed, slip = contact_velocity(
-            model.contact_link[point], contacts.position[point], contacts.normal[point], memory.tree
-        )
+        speed, slip = contact_velocity(model, equations.tree, contacts, point)
         push = -work.stiffness * contacts.gap[point] - work.damping * speed
         push = max(push, 0.0) if contacts.gap[point] < 0.0 else 0.0
         contacts.force[point, 0] = push
-        contacts.force[point, 1] = -memory.friction[point] * push * np.tanh(slip / 1e-2)
-        memory.slip[point] = slip
-        contact_rows(model, memory, point, 0)
+        contacts.force[point, 1] = -memory.surface.friction[point] * push * np.tanh(slip / 1e-2)
+        memory.reaction.slip[point] = slip
+        contact_rows(model, equations.tree, contacts, point, 0, memory.assembly)
         for j in range(memory.v.shape[0]):
             for k in range(2):
-                memory.force[j] += memory.jacobian[k, j] * contacts.force[point, k]
+                force[j] += memory.assembly.jacobian[k, j] * contacts.force[point, k]
     for j in range(memory.v.shape[0]):
-        memory.rate[j] = memory.force[j] - memory.bias[j]
-    solve_mass_matrix(model, memory, memory.rate)
+        rate[j] = force[j] - equations.bias[j]
+    solve_mass_matrix(model, equations, rate)
     for j in range(memory.v.shape[0]):
-        memory.next_v[j] = memory.v[j] + work.step * memory.rate[j]
+        memory.next_v[j] = memory.v[j] + work.step * rate[j]
     note_extremes(model, memory)
-    note_events(model, record, clock.time, work.step, memory)
+    note_events(model, clock.time, work.step, memory, record)
     return DONE
 
 
 @kernel
 def report(
-    controller: Any, control: Any, model: Any, ground: Any, memory: Any, work: Any, record: Any,
-    clock: Any,
+    scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> None:  # fmt: skip
-    note_row_when_due(record, memory, clock)
+    note_row_when_due(memory, clock, record)
 
 
 @kernel
 def move(
-    controller: Any, control: Any, model: Any, ground: Any, memory: Any, work: Any, record: Any,
-    clock: Any,
+    scene: Any, control: Any, memory: Any, work: Any, record: Any, clock: Any
 ) -> int:  # fmt: skip
     for j in range(memory.v.shape[0]):
         old = memory.v[j]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,8 @@ from synthetic_runs import box
 
 import heelstrike as hs
 from heelstrike.sim import RunStatus, Scheme
+from heelstrike.sim import simulation as simulation_module
+from heelstrike.sim.record.record import allocate_record
 
 METHODS = {
     "time stepping": hs.TimeStepping(),
@@ -131,7 +134,7 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import numpy as np
 import heelstrike as hs
-from sim_test_stepping import simulation
+from {module} import simulation
 kept = hs.load_snapshot(sys.argv[2])
 again = simulation(sys.argv[3], sys.argv[4], state=kept)
 for _ in range(50):
@@ -151,9 +154,13 @@ def test_a_snapshot_goes_on_in_another_process(
     for _ in range(17):
         never.step()
     file = never.snapshot().save(tmp_path / "kept.npz")
-    (tmp_path / "sim_test_stepping.py").write_text(Path(__file__).read_text(encoding="utf-8"))
+    # The same module, for a controller in Python is known by it and by its class.
+    copy = tmp_path.joinpath(*__name__.split(".")).with_suffix(".py")
+    copy.parent.mkdir(parents=True, exist_ok=True)
+    copy.write_text(Path(__file__).read_text(encoding="utf-8"))
     places = [str(tmp_path), str(Path(__file__).parents[1])]
     script = FRESH.replace("sys.path.insert(0, sys.argv[1])", f"sys.path[:0] = {places!r}")
+    script = script.format(module=__name__)
     subprocess.run(
         [sys.executable, "-c", script, "", str(file), method, controller, str(tmp_path / "end")],
         check=True,
@@ -309,3 +316,55 @@ def test_ctrl_c_stops_and_the_simulation_goes_on() -> None:
     assert some.advance(1.0) is RunStatus.COMPLETED
     left.advance(1.0)
     np.testing.assert_array_equal(some.state.q, left.state.q)
+
+
+def test_controllers_in_python_are_known_by_where_they_are_defined() -> None:
+    class Sway:  # by the same name, but another
+        def torque(self, t: float, state: hs.State, contacts: Any) -> np.ndarray:
+            return np.zeros(6)
+
+        def snapshot(self) -> np.ndarray:
+            return np.zeros(1)
+
+        def restore(self, numbers: np.ndarray) -> None:
+            raise AssertionError("this is not its memory")
+
+    kept = simulation("time stepping", "python").snapshot()
+    other = hs.Simulation(walking.bravo7(), Sway(), state=walking.gait().initial_state)
+    theirs, its = re.escape(f"{__name__}.Sway"), re.escape(f"{__name__}.{Sway.__qualname__}")
+    with pytest.raises(hs.SimulationError, match=f"another controller: {theirs}, not {its}"):
+        other.restore(kept)
+
+
+def test_where_there_is_no_memory_for_more_of_the_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was recorded until then is kept, and the simulation goes on when there is some."""
+    some, left = simulation("time stepping"), simulation("time stepping")
+    chunks = []
+
+    def allocate(*arguments: Any) -> Any:
+        if chunks:
+            raise MemoryError
+        chunks.append(allocate_record(*arguments))
+        return chunks[0]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(simulation_module, "CHUNK", 64)
+        patched.setattr(simulation_module, "allocate_record", allocate)
+        assert some.advance(0.2) is RunStatus.INTERRUPTED
+    assert "no memory left to record more" in some.message
+    assert isinstance(some.error, MemoryError)
+    assert some.time == pytest.approx(0.064, abs=2e-3)
+    assert some.record.time[-1] == pytest.approx(some.time, abs=2e-3)
+    assert some.advance(0.2) is RunStatus.COMPLETED
+    left.advance(0.2)
+    assert_same(some.record, left.record)
+
+
+def test_where_there_is_no_memory_for_any_record(monkeypatch: pytest.MonkeyPatch) -> None:
+    def allocate(*_: Any) -> Any:
+        raise MemoryError
+
+    some = simulation("time stepping")
+    monkeypatch.setattr(simulation_module, "allocate_record", allocate)
+    with pytest.raises(hs.SimulationError, match="no memory left to record anything"):
+        some.advance(0.1)

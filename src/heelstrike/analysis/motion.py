@@ -91,8 +91,8 @@ def motion(
         World positions (x, z) at which the links' velocities are asked for, in m.
     """
     q, v, point = (np.ascontiguousarray(a, np.float64) for a in (position, velocity, contact_point))
-    result = Motion.allocate(nt=len(q), **robot.model.extents)
-    _follow(robot.model, q, v, point, Workspace.allocate(**robot.model.extents), result)
+    result = Motion.allocate(robot.model.extents, nt=len(q))
+    _follow(robot.model, q, v, point, Workspace.allocate(robot.model.extents), result)
     return result
 
 

@@ -2,7 +2,8 @@
 
 Its doors, which other rooms import from:
 
-- ``bundle``: arrays and numbers by name, which kernels receive by address;
+- ``bundle``: arrays and numbers by name, which kernels receive by address, and
+  ``bundle_type``, the same in compiled code;
 - ``compilation``: ``kernel``, ``dissolved_kernel``, and how they are compiled, or left alone;
 - ``separate_kernel``: kernels compiled apart, called by their address;
 - ``recording`` and ``straight_line``: kernels without loops; ``c_text``: the same in C;

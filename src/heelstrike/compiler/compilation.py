@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 import numba
 from numba import njit
+from numba.extending import typeof_impl
 
 from heelstrike.compiler.documented_numba import OPTIONS, DocumentedNumba
 from heelstrike.compiler.fingerprint import is_ours as is_ours
@@ -67,14 +68,16 @@ class Kernel:
         self._called = False
         self.dissolved = dissolved
 
-    @cached_property
-    def _part(self) -> Any:
-        return numba_in_use().part(self.py_func, dissolved=self.dissolved)
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        """Copies and pickles are the one of that name: so Numba knows loops that enclose it."""
+        if "<locals>" in self.py_func.__qualname__:
+            return Kernel, (self.py_func,), {"dissolved": self.dissolved}
+        return self.py_func.__qualname__
 
-    @property
-    def _numba_type_(self) -> Any:
+    @cached_property
+    def part(self) -> Any:
         """What Numba takes it for where another kernel names it."""
-        return type_of(self._part)
+        return numba_in_use().part(self.py_func, dissolved=self.dissolved)
 
     def __get__(self, instance: Any, owner: Any = None) -> Any:
         """Bind it to the bundle whose method it is."""
@@ -124,9 +127,12 @@ def within_bounds(function: Any) -> Any:
     return njit(**OPTIONS, boundscheck=True)(function)
 
 
-def compiled_for(
-    signature: Any, function: Function, *, address: bool = False, boundscheck: bool = False
-) -> Function:
+@typeof_impl.register(Kernel)
+def _typeof_kernel(value: Kernel, _: Any) -> Any:
+    return numba.typeof(value.part)
+
+
+def compiled_for(signature: Any, function: Function, *, boundscheck: bool = False) -> Function:
     """Compile a kernel at once for the given Numba signature, or load its machine code.
 
     Parameters
@@ -135,15 +141,13 @@ def compiled_for(
         Types of the result and the arguments.
     function : callable
         The kernel.
-    address : bool
-        Whether its address is needed, to pass it as an argument to other kernels.
     boundscheck : bool
         Whether an index beyond an array raises IndexError.
     """
-    compiled = numba_in_use().kept(function, address=address, boundscheck=boundscheck)
+    compiled = numba_in_use().kept(function, boundscheck=boundscheck)
     numba_in_use().compile(lambda: compiled.compile(signature))
     compiled.disable_compile()
-    result: Function = numba_in_use().known(compiled, signature) if address else compiled
+    result: Function = compiled
     return result
 
 
@@ -155,11 +159,6 @@ def loop_for(signature: Any, function: Function) -> Function:
     entry: Any = numba_in_use().entry(compiled_for(signature, function), signature)
     loop: Function = entry
     return loop
-
-
-def type_of(value: Any) -> Any:
-    """Return the Numba type of an example value."""
-    return numba.typeof(value)
 
 
 def uncompiled(function: Function, replace: Mapping[Any, Any] | None = None) -> Function:

@@ -3,21 +3,17 @@
 Functions and classes are followed through what they name: the kernels they call, the constants
 they read, in whatever file those are. Their bytecode counts; docstrings, comments, line numbers and
 whatever else stands in their files do not. Of a module, and of an object whose making nobody can
-follow, the syntax of its file counts, without docstrings.
+follow, all counts that its module defines.
 """
 
 from __future__ import annotations
 
-import ast
 import enum
 import functools
 import hashlib
-import os
 import sys
 import types
 from collections.abc import Mapping
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import llvmlite
@@ -64,9 +60,9 @@ class _Account:
         """Add a value that is known by a name."""
         if isinstance(value, _PLAIN):
             self._write(type(value).__name__, value)
-        elif isinstance(value, tuple | list | frozenset | set):
+        elif isinstance(value, tuple | frozenset):  # what lists hold may change, and shapes nothing
             self._write(type(value).__qualname__, len(value))
-            for item in sorted(value, key=repr) if isinstance(value, frozenset | set) else value:
+            for item in sorted(value, key=repr) if isinstance(value, frozenset) else value:
                 self.add(item)
         elif isinstance(value, enum.Enum):
             self._write(type(value).__qualname__, value.name, repr(value.value))
@@ -101,10 +97,15 @@ class _Account:
             self.add_module(home)
 
     def add_module(self, name: str) -> None:
-        """Add the syntax of a module."""
-        if _root(name) not in _BY_VERSION and self._is_new(name, name):
-            self._write("module", name)
-            self._digest.update(_syntax(getattr(sys.modules.get(name), "__file__", None) or ""))
+        """Add what a module defines."""
+        self._write("module", name)
+        if _root(name) in _BY_VERSION or name not in sys.modules or not self._is_new(name, name):
+            return
+        for member, value in sorted(vars(sys.modules[name]).items()):
+            own = isinstance(value, _PLAIN) or getattr(value, "__module__", None) == name
+            if own and not member.startswith("__"):
+                self._write(member)
+                self.add(value)
 
     def add_class(self, kind: type) -> None:
         """Add what a class is made of: its bases, and all that it defines."""
@@ -187,22 +188,3 @@ def _wrapped(value: Any) -> Any:
 
 def _root(module: str) -> str:
     return module.split(".")[0]
-
-
-@cache
-def _syntax(file: str) -> bytes:
-    """Return what a file says to Python, or what is in it if it is in another language."""
-    try:
-        content = Path(file).read_bytes()
-    except OSError:  # typed at a prompt
-        return os.urandom(16)  # good for this process only
-    try:
-        tree = ast.parse(content)
-    except (SyntaxError, ValueError):
-        return content
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) and ast.get_docstring(
-            node
-        ):
-            node.body[0] = ast.Pass()
-    return ast.dump(tree).encode()

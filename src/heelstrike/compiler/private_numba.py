@@ -1,4 +1,7 @@
-"""What Numba does not document, and what makes it compile in half its time: all of it is here.
+"""What Numba does not document, and what makes it compile in half its time.
+
+All of it is here, but for the members of bundles, which are in
+:mod:`heelstrike.compiler.private_members`.
 
 Numba optimises every function, turns it into machine code, and does so again in every function that
 calls it. For kernels nested six deep that is a third of the time to compile. Here a kernel that
@@ -18,20 +21,18 @@ import re
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from llvmlite.binding import parse_assembly
-from numba import njit, types
+from numba import TypingError, njit, types
 from numba.core.caching import NullCache
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
-from numba.core.errors import TypingError
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
@@ -39,7 +40,7 @@ from numba.core.types.functions import BaseFunction
 from numba.core.untyped_passes import InlineClosureLikes
 from numba.np import linalg
 
-from heelstrike.compiler import bundle, kept_code
+from heelstrike.compiler import kept_code
 from heelstrike.compiler.documented_numba import (
     OPTIONS,
     DocumentedNumba,
@@ -54,7 +55,8 @@ from heelstrike.interruption import kept_interrupts
 class PrivateNumba(DocumentedNumba):
     """The same, in half the time."""
 
-    shaping = (bundle, sys.modules[__name__])
+    shaping = (*DocumentedNumba.shaping, "heelstrike.compiler.private_members", __name__)
+    level = 3
 
     def part(self, function: Callable[..., Any], *, dissolved: bool) -> Any:
         """Return a kernel without machine code of its own; it counts no references."""
@@ -63,13 +65,11 @@ class PrivateNumba(DocumentedNumba):
         return njit(**options, pipeline_class=_InnerKernelCompiler)(function)
 
     def kept(
-        self, function: Callable[..., Any], *, address: bool = False, boundscheck: bool = False
+        self, function: Callable[..., Any], *, boundscheck: bool = False, separate: bool = False
     ) -> Any:
         """Return a function that is compiled when it is called, and kept on disk."""
-        options = OPTIONS | {"no_cfunc_wrapper": not address}
-        if boundscheck:
-            options["boundscheck"] = True
-        compiled: Any = njit(**options)(function)
+        options = OPTIONS | {"no_cfunc_wrapper": not separate}
+        compiled: Any = njit(**options, boundscheck=boundscheck or None)(function)
         compiled._cache = _Cache(compiled, self.made_of(function))
         return compiled
 
@@ -83,16 +83,6 @@ class PrivateNumba(DocumentedNumba):
             stack.enter_context(no_garbage_collection())
             return call()
 
-    def known(self, compiled: Any, signature: Any) -> Any:
-        """Have a compiled function remember where its machine code is.
-
-        Numba asks twice, and takes 0.2 ms to answer, each time that the function is an argument.
-        """
-        known = compiled.get_compile_result(signature)
-        known.library.get_pointer_to_function = lru_cache(known.library.get_pointer_to_function)
-        compiled.get_compile_result = lambda _: known
-        return compiled
-
     def entry(self, compiled: Any, signature: Any) -> Callable[..., Any]:
         """Return what may be called with arguments of exactly the right types.
 
@@ -105,7 +95,7 @@ class PrivateNumba(DocumentedNumba):
         self, signature: Any, function: Callable[..., Any], *, boundscheck: bool = False
     ) -> tuple[Any, int]:
         """Compile a function for the C calling convention; return it and its address."""
-        compiled = self.kept(function, address=True, boundscheck=boundscheck)
+        compiled = self.kept(function, boundscheck=boundscheck, separate=True)
         self.compile(lambda: compiled.compile(signature))
         compiled.disable_compile()
         result = compiled.get_compile_result(signature)
@@ -115,7 +105,7 @@ class PrivateNumba(DocumentedNumba):
 
     def is_kept(self, signature: Any, function: Callable[..., Any]) -> bool:
         """Whether :meth:`separate` would find machine code, or has no disk to look on."""
-        cache: _Cache = self.kept(function, address=True)._cache
+        cache: _Cache = self.kept(function, separate=True)._cache
         return cache.read(signature) is not None or kept_code.first_writable(cache.places) is None
 
     def test(self) -> None:
@@ -124,7 +114,7 @@ class PrivateNumba(DocumentedNumba):
         What has passed is kept on disk, until Numba or this module changes.
         """
         places = kept_code.directories(Path(__file__))
-        name, key = "private_numba.tested", bytes.fromhex(fingerprint(*self.shaping))
+        name, key = "private_numba.tested", bytes.fromhex(self.made_of(_inner))
         if kept_code.read(places, name, key) is not None:
             return
         compiled = self.kept(_outer(self.part(_inner, dissolved=False)))

@@ -138,8 +138,8 @@ class _Writer:
             arguments = self.recording.program.arguments
             word = builder.function.args[list(arguments).index(holder)]
             if member:
-                kind = arguments[holder]._numba_type_
-                slot = builder.gep(word, [ir.Constant(_WORD, kind.place(member))])
+                place = arguments[holder].compiled_type().places[member]
+                slot = builder.gep(word, [ir.Constant(_WORD, place)])
                 address = builder.load(slot)
                 address.set_metadata("invariant.load", self._unchanging)
                 word = builder.inttoptr(address, _POINTER)

@@ -23,7 +23,7 @@ LINE = 2
 
 
 @kernel
-def press(problem: ContactProblem, group: int, limit: float) -> None:
+def press(group: int, limit: float, problem: ContactProblem) -> None:
     """Make a group's set the interval ``|λ_t| ≤ limit``.
 
     It is a cone whose normal row is coupled to nothing and pressed by just that::

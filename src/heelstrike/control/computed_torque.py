@@ -14,14 +14,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
+from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import ControllerError
+from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.law import Law, controller
+from heelstrike.sim.controller.law import Law, controller, per_actuator
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_still
 
@@ -131,12 +133,8 @@ class Encoder:
 @kernel
 def approaching_speed(work: Workspace, contacts: Contacts, link: int, contact: int) -> float:
     """Speed at which a contact point of a link comes down on the ground."""
-    x = contacts.position[contact, 0] - work.pivot[0]
-    z = contacts.position[contact, 1] - work.pivot[1]
-    w = work.velocity[link, 0]
-    vx = work.velocity[link, 1] + w * z
-    vz = work.velocity[link, 2] - w * x
-    return -(vx * contacts.normal[contact, 0] + vz * contacts.normal[contact, 1])
+    place = place_of(work, contacts.position[contact])
+    return -into_frame(contacts.normal[contact], velocity_at(work.velocity, link, place))[0]
 
 
 @kernel
@@ -173,17 +171,16 @@ def has_landed(
     differ from the reference by as much as the impact itself. A foot that has touched without
     coming flat counts as landed after a while.
     """
-    if memory.landed == 0:
-        landed = t - memory.start > parameters.landing
-        if not landed:
-            landed = True
-            link = robot.foot_link[memory.stance]
-            for i in range(robot.nc):
-                if robot.contact_foot[i] == memory.stance:
-                    speed = approaching_speed(state.kinematics, contacts, link, i)
-                    landed = landed and speed < LANDED_SPEED
-        memory.landed = 1 if landed else 0
-    return memory.landed == 1
+    landed = memory.landed == 1 or t - memory.start > parameters.landing
+    if not landed:
+        landed = True
+        link = robot.foot_link[memory.stance]
+        for i in range(robot.nc):
+            if robot.contact_foot[i] == memory.stance:
+                speed = approaching_speed(state.kinematics, contacts, link, i)
+                landed = landed and speed < LANDED_SPEED
+    memory.landed = 1 if landed else 0
+    return landed
 
 
 @kernel
@@ -239,11 +236,8 @@ def estimate_pose(
 @kernel
 def estimate_velocity(robot: ControlledRobot, foot: int) -> None:
     """Complete `robot.estimate`, whose joint velocities are known, with the foot at rest (29)."""
-    seen = robot.estimate
-    for i in range(robot.nu):
-        seen.v[robot.model.actuator_joint[i]] = seen.joint_velocity[i]
-    hold_still(robot, seen, foot)
-    link_velocities(robot.model, seen.v, seen.kinematics)
+    hold_still(robot, robot.estimate, foot)
+    link_velocities(robot.model, robot.estimate.v, robot.estimate.kinematics)
 
 
 @controller
@@ -341,19 +335,19 @@ class ComputedTorque(Law):
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
-        pitch = _pitch_of(robot, gait)
-        duration = gait.step_duration
+        pitch = _pitch_of(robot)
+        try:
+            gait.check_joints(robot)
+        except GaitError as error:
+            raise ControllerError(str(error)) from None
         if gait.point_feet:
-            _check_points(robot, gait, encoder)
-            breakpoints = gait.breakpoints
-            pieces, mirrored = gait.pieces, gait.mirrored_pieces()
-        else:
-            breakpoints = np.array([0.0, duration])
-            pieces, mirrored = gait.coefficients[None], gait.mirrored_coefficients(robot)[None]
+            _check_points(robot, encoder)
+        duration = gait.step_duration
+        pieces, mirrored = gait.pieces, gait.mirrored_pieces()
         parameters = Parameters(
             kp=_gains("kp", kp, robot),
             kd=_gains("kd", kd, robot),
-            breakpoints=breakpoints,
+            breakpoints=gait.breakpoints,
             coefficients=np.array([mirrored, pieces] if gait.stance_foot else [pieces, mirrored]),
             earliest=0.5 * duration,
             latest=1.1 * duration,
@@ -370,7 +364,7 @@ class ComputedTorque(Law):
         self.encoder = encoder
 
 
-def _pitch_of(robot: Robot, gait: Gait) -> int:
+def _pitch_of(robot: Robot) -> int:
     """Return the coordinate of the trunk's pitch, or refuse what the law cannot control."""
     model = robot.model
     actuated = set(model.actuator_joint.tolist())
@@ -386,17 +380,11 @@ def _pitch_of(robot: Robot, gait: Gait) -> int:
             f"computed torque on a flat foot needs every joint but the trunk's x, z and pitch "
             f"actuated; robot {robot.name!r} leaves {names} without a motor"
         )
-    if len(gait.joint_names) != robot.nu:
-        raise ControllerError(
-            f"the gait has {len(gait.joint_names)} joints, robot {robot.name!r} has "
-            f"{robot.nu} actuators"
-        )
     return next(j for j in unactuated if model.axis[j, 0])
 
 
-def _check_points(robot: Robot, gait: Gait, encoder: Encoder | None) -> None:
+def _check_points(robot: Robot, encoder: Encoder | None) -> None:
     """Refuse what cannot be done on point feet."""
-    gait.check_joints(robot)
     if any(len(foot.contacts) != 1 for foot in robot.feet):
         raise ControllerError(
             f"the gait is one on point feet; the feet of robot {robot.name!r} have several "
@@ -410,11 +398,7 @@ def _check_points(robot: Robot, gait: Gait, encoder: Encoder | None) -> None:
 
 
 def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    gains = np.asarray(value, dtype=np.float64)
-    if gains.ndim > 1 or gains.size not in (1, robot.nu):
-        raise ControllerError(
-            f"{name} must be one number or {robot.nu} (one an actuator), got shape {gains.shape}"
-        )
-    if not np.all(np.isfinite(gains)) or np.any(gains < 0.0):
-        raise ControllerError(f"{name} must be finite and not negative, got {value!r}")
-    return np.broadcast_to(gains, (robot.nu,)).copy()
+    gains = per_actuator(name, value, robot)
+    if np.any(gains < 0.0):
+        raise ControllerError(f"{name} must not be negative, got {value!r}")
+    return gains

@@ -9,13 +9,14 @@ whose command is c at the time of each step.
 from __future__ import annotations
 
 import numpy as np
+from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.controller.law import Law, controller
+from heelstrike.sim.controller.law import Law, controller, per_actuator
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 # A piece begins this much (s) early, so that round-off of time does not hold it up.
@@ -96,7 +97,7 @@ class JointFeedback(Law):
         begins: ArrayLike = (0.0,),
     ) -> None:
         begins = np.atleast_1d(np.asarray(begins, dtype=np.float64))
-        kp, kd = _of_actuators("kp", kp, robot), _of_actuators("kd", kd, robot)
+        kp, kd = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
         pieces = (len(begins), robot.nu)
         reference = _polynomials("position", position, *pieces)
         feedforward = _polynomials("torque", torque, *pieces)
@@ -114,10 +115,8 @@ class JointFeedback(Law):
         times = np.asarray(times, dtype=np.float64)
         begins, coefficients = self.parameters.begins, self.parameters.coefficients
         piece = np.maximum(np.searchsorted(begins, times + EARLY, side="right") - 1, 0)
-        since = times - begins[piece]
-        command = np.zeros((len(times), coefficients.shape[1]))
-        for power in range(coefficients.shape[2] - 1, -1, -1):
-            command = command * since[:, None] + coefficients[piece, :, power]
+        terms = np.moveaxis(coefficients[piece], -1, 0)
+        command: Floats = polyval((times - begins[piece])[:, None], terms, tensor=False)
         return command
 
 
@@ -131,12 +130,3 @@ def _polynomials(name: str, value: ArrayLike, pieces: int, nu: int) -> NDArray[n
             f"{np.shape(value)}"
         )
     return polynomials
-
-
-def _of_actuators(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    gains = np.asarray(value, dtype=np.float64)
-    if gains.ndim > 1 or gains.size not in (1, robot.nu) or not np.all(np.isfinite(gains)):
-        raise ControllerError(
-            f"{name} must be one finite number or {robot.nu} (one an actuator), got {value!r}"
-        )
-    return np.broadcast_to(gains, (robot.nu,)).copy()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from heelstrike.dynamics.coordinates import difference, integrate
-from heelstrike.dynamics.queries.energies import energy, kinetic_energy, potential_energy
 from heelstrike.dynamics.queries.equations_of_motion import (
     applied_force,
     bias_force,
@@ -23,8 +21,11 @@ from heelstrike.dynamics.queries.momenta import (
     center_of_mass_bias_acceleration,
     center_of_mass_jacobian,
     center_of_mass_velocity,
+    energy,
+    kinetic_energy,
     momentum,
     momentum_matrix,
+    potential_energy,
 )
 from heelstrike.dynamics.queries.points import (
     contact_bias_acceleration,
@@ -35,7 +36,14 @@ from heelstrike.dynamics.queries.points import (
     point_position,
     point_velocity,
 )
-from heelstrike.dynamics.queries.poses import LinkPoses, LinkVelocities, link_poses, link_velocities
+from heelstrike.dynamics.queries.poses import (
+    LinkPoses,
+    LinkVelocities,
+    difference,
+    integrate,
+    link_poses,
+    link_velocities,
+)
 
 if TYPE_CHECKING:
     from heelstrike.dynamics.queries.casadi_functions import CasadiDynamics as CasadiDynamics

@@ -72,7 +72,7 @@ def articulate(model: Model, work: Workspace, added: Floats, bodies: Articulated
         u0 = i00 * m0 + i01 * m1 + i02 * m2
         u1 = i01 * m0 + i11 * m1 + i12 * m2
         u2 = i02 * m0 + i12 * m1 + i22 * m2
-        write(momentum, i, (u0, u1, u2))
+        write(i, (u0, u1, u2), momentum)
         scale = 1.0 / (m0 * u0 + m1 * u1 + m2 * u2 + armature[i] + added[i])
         inverse[i] = scale
         parent = parents[i]
@@ -89,12 +89,12 @@ def articulate(model: Model, work: Workspace, added: Floats, bodies: Articulated
 
 
 @kernel
-def solve_articulated(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Floats) -> None:
+def solve_articulated(model: Model, bodies: ArticulatedBodies, work: Workspace, x: Floats) -> None:
     """Replace x by A⁻¹ x, after :func:`articulate`."""
     parents, motion, force = model.parent, work.motion, work.force
     momentum, inverse = bodies.momentum, bodies.inverse
     for i in range(model.nl):
-        write(force, i, (0.0, 0.0, 0.0))
+        write(i, (0.0, 0.0, 0.0), force)
     for i in range(model.nl - 1, -1, -1):
         p0, p1, p2 = spatial(force, i)
         share = inverse[i] * (x[i] + motion[i, 0] * p0 + motion[i, 1] * p1 + motion[i, 2] * p2)
@@ -103,12 +103,12 @@ def solve_articulated(model: Model, work: Workspace, bodies: ArticulatedBodies, 
         if parent >= 0:
             u0, u1, u2 = spatial(momentum, i)
             left = p0 - u0 * share, p1 - u1 * share, p2 - u2 * share
-            write(force, parent, plus(spatial(force, parent), left))
-    carry_along(model, work, bodies, x)
+            write(parent, plus(spatial(force, parent), left), force)
+    carry_along(model, bodies, work, x)
 
 
 @kernel
-def carry_along(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Floats) -> None:
+def carry_along(model: Model, bodies: ArticulatedBodies, work: Workspace, x: Floats) -> None:
     """Second half of :func:`solve_articulated`: x holds u / D and receives accelerations."""
     parents, motion, acceleration = model.parent, work.motion, work.acceleration
     momentum, inverse = bodies.momentum, bodies.inverse
@@ -120,4 +120,4 @@ def carry_along(model: Model, work: Workspace, bodies: ArticulatedBodies, x: Flo
             a = spatial(acceleration, parent)
             own -= inverse[i] * power(spatial(momentum, i), a)
             x[i] = own
-        write(acceleration, i, plus(a, scaled(spatial(motion, i), own)))
+        write(i, plus(a, scaled(spatial(motion, i), own)), acceleration)

@@ -22,9 +22,12 @@ SINGULAR = 2e-15
 CONSISTENT = 1e-12
 """Equations that are left with less than this, relative to the largest, are met."""
 
+NO_PIVOT = 1e-11
+"""Pivots of any matrix below this, relative to its largest entry, count as zero."""
+
 
 @kernel
-def pivot(tableau: Floats, rows: int, columns: int, row: int, column: int) -> None:
+def pivot(rows: int, columns: int, row: int, column: int, tableau: Floats) -> None:
     """Exchange the basic variable of ``row`` with the other variable of ``column``."""
     inverse = 1.0 / tableau[row, column]
     for j in range(columns):
@@ -90,7 +93,7 @@ def eliminate(
                     row = i
                     column = j
         if row < size:
-            pivot(tableau, size, size + 1, row, column + 1)
+            pivot(size, size + 1, row, column + 1, tableau)
             taken[row] = 1
             pivot_row[column] = row
             nullity -= 1
@@ -104,6 +107,52 @@ def eliminate(
             break
         smallest = SINGULAR
     return nullity
+
+
+@kernel
+def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) -> int:
+    """Solve equations of any kind, their right-hand side in the last column, by complete pivoting.
+
+    Returns the rank; unknowns that the equations leave free are zero.
+    """
+    largest = 0.0
+    for i in range(size):
+        column[i] = i
+        unknown[i] = 0.0
+        for j in range(size):
+            largest = max(largest, abs(system[i, j]))
+    rank = size
+    for k in range(size):
+        best = NO_PIVOT * largest
+        row = -1
+        place = -1
+        for i in range(k, size):
+            for j in range(k, size):
+                if abs(system[i, j]) > best:
+                    best = abs(system[i, j])
+                    row = i
+                    place = j
+        if row < 0:
+            rank = k
+            break
+        if row != k:
+            for j in range(size + 1):
+                system[k, j], system[row, j] = system[row, j], system[k, j]
+        if place != k:
+            column[k], column[place] = column[place], column[k]
+            for i in range(size):
+                system[i, k], system[i, place] = system[i, place], system[i, k]
+        for i in range(k + 1, size):
+            ratio = system[i, k] / system[k, k]
+            if ratio != 0.0:
+                for j in range(k + 1, size + 1):
+                    system[i, j] -= ratio * system[k, j]
+    for k in range(rank - 1, -1, -1):
+        total = system[k, size]
+        for j in range(k + 1, rank):
+            total -= system[k, j] * unknown[column[j]]
+        unknown[column[k]] = total / system[k, k]
+    return rank
 
 
 @dissolved_kernel

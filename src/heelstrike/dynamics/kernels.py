@@ -114,10 +114,10 @@ def link_velocities(model: Model, v: Floats, work: Workspace) -> None:
         if parent >= 0:
             w, vx, vz = spatial(work.velocity, parent)
             _, bx, bz = spatial(work.bias_acceleration, parent)
-        write(work.velocity, i, (w + m0 * v[i], vx + m1 * v[i], vz + m2 * v[i]))
+        write(i, (w + m0 * v[i], vx + m1 * v[i], vz + m2 * v[i]), work.velocity)
         bx = bx + (w * m2 - m0 * vz) * v[i]
         bz = bz + (m0 * vx - w * m1) * v[i]
-        write(work.bias_acceleration, i, (0.0, bx, bz))
+        write(i, (0.0, bx, bz), work.bias_acceleration)
 
 
 @kernel
@@ -132,19 +132,19 @@ def inverse_dynamics(model: Model, acceleration: Floats, work: Workspace, force:
         if model.parent[i] >= 0:
             a = spatial(work.acceleration, model.parent[i])
         a = plus(a, scaled(spatial(work.motion, i), acceleration[i]))
-        write(work.acceleration, i, a)
+        write(i, a, work.acceleration)
         # The recursion above carries the part of the joints; the velocity part is ready.
         a = plus(a, spatial(work.bias_acceleration, i))
         w, vx, vz = spatial(work.velocity, i)
         px, pz = linear_momentum_of(work.inertia, i, (w, vx, vz))
         moment, fx, fz = momentum_of(work.inertia, i, a)
-        write(work.force, i, (moment + vz * px - vx * pz, fx + w * pz, fz - w * px))
+        write(i, (moment + vz * px - vx * pz, fx + w * pz, fz - w * px), work.force)
     for i in range(model.nl - 1, -1, -1):
         f = spatial(work.force, i)
         force[i] = power(spatial(work.motion, i), f) + model.armature[i] * acceleration[i]
         parent = model.parent[i]
         if parent >= 0:
-            write(work.force, parent, plus(spatial(work.force, parent), f))
+            write(parent, plus(spatial(work.force, parent), f), work.force)
 
 
 @kernel
@@ -161,22 +161,30 @@ def passive_force(model: Model, q: Floats, v: Floats, force: Floats) -> None:
 
 
 @kernel
-def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
-    """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
+def composite_inertias(model: Model, work: Workspace) -> None:
+    """Inertias of the subtrees of all links, each as one rigid body, about the pivot."""
     for i in range(model.nl):
         for k in range(4):
             work.composite[i, k] = work.inertia[i, k]
+    for i in range(model.nl - 1, 0, -1):
+        parent = model.parent[i]
+        if parent >= 0:
+            for k in range(4):
+                work.composite[parent, k] += work.composite[i, k]
+
+
+@kernel
+def mass_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
+    """Mass matrix, the paper's A(q) (eq. 1), by composite rigid bodies."""
+    composite_inertias(model, work)
+    for i in range(model.nv):
         for j in range(model.nv):
             matrix[i, j] = 0.0
     for i in range(model.nl - 1, -1, -1):
         motion = spatial(work.motion, i)
         p = momentum_of(work.composite, i, motion)
         matrix[i, i] = power(motion, p) + model.armature[i]
-        parent = model.parent[i]
-        if parent >= 0:
-            for k in range(4):
-                work.composite[parent, k] += work.composite[i, k]
-        j = parent
+        j = model.parent[i]
         while j >= 0:
             entry = power(spatial(work.motion, j), p)
             matrix[i, j] = entry
@@ -298,7 +306,7 @@ def point_bias_acceleration(
 
 @kernel
 def forward_dynamics(
-    model: Model, matrix: Floats, factor: Floats, force: Floats, work: Workspace, v_dot: Floats
+    model: Model, force: Floats, work: Workspace, matrix: Floats, factor: Floats, v_dot: Floats
 ) -> None:
     """Acceleration under a generalised force: A⁻¹ (force − H), with `matrix` and `factor` filled.
 
@@ -382,18 +390,12 @@ def momentum_matrix(model: Model, work: Workspace, matrix: Floats) -> None:
     Jacobian of the centre of mass.
     """
     mass, hx, hz = first_moments(model, work)
-    for i in range(model.nl):
-        for k in range(4):
-            work.composite[i, k] = work.inertia[i, k]
+    composite_inertias(model, work)
     for i in range(model.nl - 1, -1, -1):
         moment, px, pz = momentum_of(work.composite, i, spatial(work.motion, i))
         matrix[0, i] = px
         matrix[1, i] = pz
         matrix[2, i] = moment - (hz * px - hx * pz) / mass
-        parent = model.parent[i]
-        if parent >= 0:
-            for k in range(4):
-                work.composite[parent, k] += work.composite[i, k]
 
 
 @kernel
@@ -401,14 +403,14 @@ def state_equations(
     model: Model,
     q: Floats,
     v: Floats,
-    work: Workspace,
+    tree: Workspace,
     matrix: Floats,
     factor: Floats,
     bias: Floats,
 ) -> None:
     """Everything that follows from a state: kinematics, factor of the mass matrix, bias force."""
-    forward_kinematics(model, q, work)
-    link_velocities(model, v, work)
-    mass_matrix(model, work, matrix)
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    mass_matrix(model, tree, matrix)
     factorize(model, matrix, factor)
-    bias_force(model, work, bias)
+    bias_force(model, tree, bias)

@@ -35,8 +35,8 @@ def write_point_rows(
     link: int,
     position: Floats,
     normal: Floats,
-    rows: Floats,
     first: int,
+    rows: Floats,
 ) -> None:
     """Write the Jacobian of a point of a link in the contact frame of a normal.
 

@@ -19,7 +19,7 @@ def spatial(rows: Floats, i: int) -> Spatial:
 
 
 @kernel
-def write(rows: Floats, i: int, value: Spatial) -> None:
+def write(i: int, value: Spatial, rows: Floats) -> None:
     """Write a motion or force into an array."""
     rows[i, 0], rows[i, 1], rows[i, 2] = value
 

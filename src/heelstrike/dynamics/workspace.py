@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -56,8 +54,3 @@ class Workspace(Bundle):
     inertia: Floats = array("nl", 4)
     composite: Floats = array("nl", 4)
     zero: Floats = array("nv")
-
-
-def workspace(nv: int, dtype: Any = np.float64) -> Workspace:
-    """Make the scratch arrays for a robot of `nv` coordinates (dtype ``object`` for symbols)."""
-    return Workspace.allocate(nl=nv, nv=nv, axes=2, dtype=dtype)

@@ -5,23 +5,19 @@ Reading a file never runs anything from it.
 
 from __future__ import annotations
 
-import enum
-import json
 import math
-from collections.abc import Mapping
 from dataclasses import fields
 from os import PathLike
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, fingerprint
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.polynomials import cubic
-from heelstrike.json_checksum import read_json, require_unchanged, shown, with_checksum
+from heelstrike.json_checksum import Entries, json_text, reading_json, shown
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
@@ -31,24 +27,18 @@ VERSION = 2
 LARGEST_NUMBER = 1e9
 """No angle, velocity, force or cost of a gait is larger than this, in any unit."""
 
-Made = TypeVar("Made", Gait, Phase)
-Member = TypeVar("Member", bound=enum.Enum)
-
-_ENTRIES = {
-    "robot": ("robot", "text"),
-    "robot_fingerprint": ("fingerprint", "text"),
-    "step_length_m": ("step_length", "number"),
-    "cost_N2m2s": ("cost", "number"),
-    "friction": ("friction", "number"),
-    "clearance_m": ("clearance", "number"),
-    "clearance_profile": ("clearance_profile", "profile"),
-    "joints": ("joint_names", "names"),
-    "mirror_sign": ("mirror_sign", "joints"),
-    "mirror_offset_rad": ("mirror_offset", "joints"),
-    "mirror_joint": ("mirror_joint", "indices"),
-    "touchdown_impulse_Ns": ("touchdown_impulse", "impulse"),
+_TEXTS = {"robot": "robot", "robot_fingerprint": "fingerprint"}
+_NUMBERS: dict[str, tuple[str, tuple[int, ...]]] = {
+    "step_length_m": ("step_length", ()),
+    "cost_N2m2s": ("cost", ()),
+    "friction": ("friction", ()),
+    "clearance_m": ("clearance", ()),
+    "mirror_sign": ("mirror_sign", (0,)),
+    "mirror_offset_rad": ("mirror_offset", (0,)),
+    "mirror_joint": ("mirror_joint", (0,)),
+    "touchdown_impulse_Ns": ("touchdown_impulse", (3,)),
 }
-"""What stands in a file: the attribute of a gait, and the method of `_Reader` that reads it."""
+"""Entries of a file: the attribute of the gait, and the shape of its numbers; 0 is one a joint."""
 
 _MARGINS = {"_".join([each.name, *each.metadata.values()]): each.name for each in fields(Margins)}
 """Names of the margins with their units."""
@@ -56,42 +46,35 @@ _MARGINS = {"_".join([each.name, *each.metadata.values()]): each.name for each i
 
 def save_gait(gait: Gait, path: str | PathLike[str]) -> None:
     """Write a gait to a JSON file, which appears whole or not at all."""
-    data: dict[str, Any] = {
-        "format": "heelstrike gait",
-        "version": VERSION,
-        **{key: _plain(getattr(gait, name)) for key, (name, _) in _ENTRIES.items()},
+    entries: dict[str, Any] = {
+        **{key: getattr(gait, name) for key, name in _TEXTS.items()},
+        **{key: np.asarray(getattr(gait, name)).tolist() for key, (name, _) in _NUMBERS.items()},
+        "clearance_profile": gait.clearance_profile.value,
+        "joints": list(gait.joint_names),
         "initial_position": gait.initial_state.q.tolist(),
         "initial_velocity": gait.initial_state.v.tolist(),
-        "phases": [
-            {key: _plain(getattr(phase, name)) for key, name in _phase_entries(phase).items()}
-            for phase in gait.phases
-        ],
+        "phases": [_of_phase(phase) for phase in gait.phases],
         # JSON knows no infinity: no limit, no margin.
         "margins": {
             key: value if math.isfinite(value := getattr(gait.margins, name)) else None
             for key, name in _MARGINS.items()
         },
     }
-    data = with_checksum(data)
-    lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items())
     try:
-        write_whole(path, f"{{\n{lines}\n}}\n")
+        write_whole(path, json_text("gait", VERSION, entries))
     except WriteError as error:
         raise GaitError(str(error)) from error
 
 
-def _phase_entries(phase: Phase) -> dict[str, str]:
-    entries = {"contacts": "contacts", "breakpoints_s": "breakpoints", "joint_pieces": "pieces"}
-    return entries if phase.pitch_pieces is None else {**entries, "pitch_pieces": "pitch_pieces"}
-
-
-def _plain(value: Any) -> Any:
-    """What JSON knows of a value."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
-    if isinstance(value, enum.Enum):
-        return value.value
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+def _of_phase(phase: Phase) -> dict[str, Any]:
+    entries = {
+        "contacts": {str(foot): footing.value for foot, footing in phase.contacts.items()},
+        "breakpoints_s": phase.breakpoints.tolist(),
+        "joint_pieces": phase.pieces.tolist(),
+    }
+    if phase.pitch_pieces is not None:
+        entries["pitch_pieces"] = phase.pitch_pieces.tolist()
+    return entries
 
 
 def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
@@ -115,181 +98,88 @@ def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
         If there is no such file, it is not a gait, its numbers are missing, of the wrong number,
         not finite or not those that were saved, or the gait belongs to another robot.
     """
-    data = read_json(path, "gait", (1, VERSION), GaitError)
-    gait = _Reader(path, data).gait()
-    if robot is not None:
-        _check_robot(gait, robot, path)
-    require_unchanged(path, data, GaitError)
-    return gait
+    with reading_json(path, "gait", (1, VERSION), LARGEST_NUMBER, GaitError) as entries:
+        gait = _gait(entries)
+        if robot is not None:
+            _check_robot(gait, robot)
+        return gait
 
 
-class _Reader:
-    """Entries of a gait file, or of an object in it, each checked for its kind before use."""
-
-    def __init__(self, path: str | PathLike[str], data: Any) -> None:
-        self.path = path
-        self.data = data
-
-    def error(self, what: str) -> GaitError:
-        return GaitError(f"{self.path}: {what}")
-
-    def gait(self) -> Gait:
-        values = {name: getattr(self, kind)(key) for key, (name, kind) in _ENTRIES.items()}
-        nu = len(values["joint_names"])
-        size = nu + 3
-        values["initial_state"] = State(
-            self.vector("initial_position", size), self.vector("initial_velocity", size)
-        )
-        margins = self.object("margins")
-        values["margins"] = Margins(**{n: margins.margin(key) for key, n in _MARGINS.items()})
-        if self.data["version"] == 1:
-            return self.made(Gait, **values, phases=(self.only_phase(nu),))
-        phases = self.entry("phases")
-        if not isinstance(phases, list):
-            raise self.error('"phases" must be a list')
-        read = tuple(_Reader(self.path, phase).phase(nu) for phase in phases)
-        return self.made(Gait, **values, phases=read)
-
-    def made(self, kind: type[Made], **values: Any) -> Made:
-        try:
-            return kind(**values)
-        except GaitError as error:
-            raise self.error(str(error)) from None
-
-    def phase(self, nu: int) -> Phase:
-        contacts = self.object("contacts")
-        feet = {key: contacts.member(key, Footing) for key in contacts.data}
-        if not feet or not set(feet) <= {"0", "1"}:
-            raise self.error(f'"contacts" must name feet "0" or "1", got {shown(list(feet))}')
-        return self.piecewise({int(foot): feet[foot] for foot in feet}, nu)
-
-    def only_phase(self, nu: int) -> Phase:
-        """What a file of version 1 says of the motion."""
-        foot = self.whole("stance_foot", self.number("stance_foot"))
-        if {"breakpoints_s", "joint_pieces", "pitch_pieces"} & set(self.data):
-            return self.piecewise({foot: Footing.POINT}, nu)
-        duration = self.number("step_duration_s")
-        if not duration > 0.0:
-            raise self.error("step_duration must be positive")
-        positions = [self.vector(f"{end}_position_rad", nu) for end in ("start", "end")]
-        velocities = [self.vector(f"{end}_velocity_rad_per_s", nu) for end in ("start", "end")]
-        pieces = cubic(positions, velocities, duration)[None]
-        breakpoints = np.array([0.0, duration])
-        contacts = {foot: Footing.FLAT}
-        return self.made(Phase, contacts=contacts, breakpoints=breakpoints, pieces=pieces)
-
-    def piecewise(self, contacts: dict[int, Footing], nu: int) -> Phase:
-        values = {"breakpoints": self.table("breakpoints_s"), "pieces": self.table("joint_pieces")}
-        if "pitch_pieces" in self.data or Footing.FLAT not in contacts.values():
-            values["pitch_pieces"] = self.table("pitch_pieces")
-        if values["breakpoints"].ndim != 1 or values["pieces"].shape[2:] != (nu,):
-            raise self.error(
-                f'"joint_pieces" must hold a list of coefficients of {nu} joints for every piece, '
-                '"breakpoints_s" the times between them'
-            )
-        return self.made(Phase, contacts=contacts, **values)
-
-    def table(self, key: str) -> NDArray[np.float64]:
-        """Numbers in lists of lists, all of the same length."""
-
-        def checked(value: Any, depth: int) -> Any:
-            if depth and isinstance(value, list) and value:
-                return [checked(each, depth - 1) for each in value]
-            return self.checked(key, value)
-
-        numbers = checked(self.entry(key), 3)
-        try:
-            return np.array(numbers, dtype=np.float64)
-        except ValueError:
-            raise self.error(f'"{key}" must hold lists of one length') from None
-
-    def entry(self, key: str) -> Any:
-        if not isinstance(self.data, dict):
-            raise self.error(f'an object with "{key}" must stand where {shown(self.data)} does')
-        if key not in self.data:
-            raise self.error(f'"{key}" is missing')
-        return self.data[key]
-
-    def object(self, key: str) -> _Reader:
-        value = self.entry(key)
-        if not isinstance(value, dict):
-            raise self.error(f'"{key}" must be an object')
-        return _Reader(self.path, value)
-
-    def text(self, key: str) -> str:
-        value = self.entry(key)
-        if not isinstance(value, str):
-            raise self.error(f'"{key}" must be a text, got {shown(value)}')
-        return value
-
-    def member(self, key: str, kind: type[Member]) -> Member:
-        try:
-            return kind(self.text(key))
-        except ValueError:
-            names = ", ".join(f'"{known.value}"' for known in kind)
-            raise self.error(f'"{key}" must be one of {names}') from None
-
-    def names(self, key: str) -> tuple[str, ...]:
-        value = self.entry(key)
-        if (
-            not isinstance(value, list)
-            or not value
-            or not all(isinstance(name, str) for name in value)
-            or len(set(value)) != len(value)
-        ):
-            raise self.error(f'"{key}" must be a list of different names, got {shown(value)}')
-        return tuple(value)
-
-    def number(self, key: str) -> float:
-        return self.checked(key, self.entry(key))
-
-    def joints(self, key: str) -> NDArray[np.float64]:
-        return self.vector(key, len(self.names("joints")))
-
-    def indices(self, key: str) -> list[int]:
-        return [self.whole(key, value) for value in self.joints(key)]
-
-    def impulse(self, key: str) -> NDArray[np.float64]:
-        return self.vector(key, 3)
-
-    def profile(self, key: str) -> ClearanceProfile:
-        return self.member(key, ClearanceProfile)
-
-    def margin(self, key: str) -> float:
-        value = self.entry(key)
-        return math.inf if value is None else self.checked(key, value)
-
-    def vector(self, key: str, size: int) -> NDArray[np.float64]:
-        value = self.entry(key)
-        if not isinstance(value, list) or len(value) != size:
-            raise self.error(f'"{key}" must be a list of {size} numbers, got {shown(value)}')
-        return np.array([self.checked(key, number) for number in value])
-
-    def checked(self, key: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.error(f'"{key}" must be a number, got {shown(value)}')
-        if not abs(value) <= LARGEST_NUMBER:
-            raise self.error(f'"{key}" holds {shown(value)}, which no gait has')
-        return float(value)
-
-    def whole(self, key: str, value: float) -> int:
-        if value != int(value):
-            raise self.error(f'"{key}" must hold whole numbers, got {value:g}')
-        return int(value)
+def _gait(entries: Entries) -> Gait:
+    joints = entries.names("joints")
+    nu, size = len(joints), len(joints) + 3
+    values: dict[str, Any] = {
+        name: entries.numbers(key, *(length or nu for length in shape)).tolist()
+        for key, (name, shape) in _NUMBERS.items()
+    }
+    values |= {name: entries.text(key) for key, name in _TEXTS.items()}
+    if entries.data["version"] == 1:
+        phases = [_only_phase(entries, nu)]
+    else:
+        phases = [_phase(each, nu) for each in entries.objects("phases")]
+    margins = entries.object("margins")
+    return Gait(
+        **values,
+        clearance_profile=entries.member("clearance_profile", ClearanceProfile),
+        joint_names=joints,
+        initial_state=State(
+            entries.numbers("initial_position", size), entries.numbers("initial_velocity", size)
+        ),
+        phases=tuple(phases),
+        margins=Margins(
+            **{
+                name: math.inf if margins.entry(key) is None else margins.number(key)
+                for key, name in _MARGINS.items()
+            }
+        ),
+    )
 
 
-def _check_robot(gait: Gait, robot: Robot, path: str | PathLike[str]) -> None:
+def _phase(entries: Entries, nu: int) -> Phase:
+    contacts = entries.object("contacts")
+    if not contacts.data or not set(contacts.data) <= {"0", "1"}:
+        raise GaitError(f'"contacts" must name feet "0" or "1", got {shown(list(contacts.data))}')
+    return _of_pieces(
+        entries, {int(foot): contacts.member(foot, Footing) for foot in contacts.data}, nu
+    )
+
+
+def _only_phase(entries: Entries, nu: int) -> Phase:
+    """What a file of version 1 says of the motion."""
+    foot: Any = entries.number("stance_foot")
+    if {"breakpoints_s", "joint_pieces", "pitch_pieces"} & set(entries.data):
+        return _of_pieces(entries, {foot: Footing.POINT}, nu)
+    duration = entries.number("step_duration_s")
+    if not duration > 0.0:
+        raise GaitError("step_duration must be positive")
+    positions = [entries.numbers(f"{end}_position_rad", nu) for end in ("start", "end")]
+    velocities = [entries.numbers(f"{end}_velocity_rad_per_s", nu) for end in ("start", "end")]
+    return Phase(
+        contacts={foot: Footing.FLAT},
+        breakpoints=np.array([0.0, duration]),
+        pieces=cubic(positions, velocities, duration)[None],
+    )
+
+
+def _of_pieces(entries: Entries, contacts: dict[int, Footing], nu: int) -> Phase:
+    free = "pitch_pieces" in entries.data or Footing.FLAT not in contacts.values()
+    return Phase(
+        contacts=contacts,
+        breakpoints=entries.numbers("breakpoints_s", None),
+        pieces=entries.numbers("joint_pieces", None, None, nu),
+        pitch_pieces=entries.numbers("pitch_pieces", None, None) if free else None,
+    )
+
+
+def _check_robot(gait: Gait, robot: Robot) -> None:
     if gait.robot != robot.name:
         raise GaitError(
-            f"{path}: is a gait of robot {shown(gait.robot)}, not of {robot.name!r}. Load that "
+            f"is a gait of robot {shown(gait.robot)}, not of {robot.name!r}. Load that "
             "robot, or design a gait for this one with optimize_gait."
         )
-    try:
-        gait.check_joints(robot)
-    except GaitError as error:
-        raise GaitError(f"{path}: {error}") from None
+    gait.check_joints(robot)
     if gait.fingerprint != fingerprint(robot):
         raise GaitError(
-            f"{path}: was designed for another version of robot {robot.name!r}, with other masses, "
+            f"was designed for another version of robot {robot.name!r}, with other masses, "
             "lengths or limits. Design it again with optimize_gait."
         )

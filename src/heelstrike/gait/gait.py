@@ -64,7 +64,8 @@ class Phase:
         for name in ("breakpoints", "pieces", "pitch_pieces"):
             if getattr(self, name) is not None:
                 _store(self, name)
-        object.__setattr__(self, "contacts", dict(self.contacts))
+        contacts = {int(foot): footing for foot, footing in self.contacts.items()}
+        object.__setattr__(self, "contacts", contacts)
         count, shape = self.breakpoints.size - 1, self.pieces.shape
         if self.breakpoints.ndim != 1 or len(shape) != 3 or shape[0] != count or 0 in shape:
             raise GaitError(
@@ -146,10 +147,10 @@ class Gait:
         nu = len(self.joint_names)
         for name, size in (("mirror_sign", nu), ("mirror_offset", nu), ("touchdown_impulse", 3)):
             _store(self, name, (size,))
-        counterpart = np.array(self.mirror_joint, dtype=np.int64)
-        if counterpart.shape != (nu,) or set(counterpart.tolist()) != set(range(nu)):
+        counterpart = np.asarray(self.mirror_joint)
+        if not np.array_equal(np.sort(counterpart), np.arange(nu)):
             raise GaitError(f"gait: mirror_joint must be a permutation of {nu} joints")
-        object.__setattr__(self, "mirror_joint", counterpart)
+        object.__setattr__(self, "mirror_joint", counterpart.astype(np.int64))
         if not np.all(np.abs(self.mirror_sign) == 1.0):
             raise GaitError("gait: mirror_sign must hold +1 and -1 only")
         for name in ("step_length", "friction", "clearance", "cost"):

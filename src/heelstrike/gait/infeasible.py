@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -32,7 +33,7 @@ def nearest_to_feasible(program: Program) -> Floats:
     InfeasibleGaitError
         If some violation always remains; the message names the constraints in conflict.
     """
-    elastic = program.relaxed()
+    elastic = replace(program, elastic=True)
     found = []
     for start in islice(starts(program.request), ATTEMPTS):
         found.append(elastic.solve(program.sampled(start)))

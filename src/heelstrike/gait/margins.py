@@ -2,17 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from heelstrike.gait.program import Program
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -69,59 +59,3 @@ class Margins:
     lift_velocity: float = field(metadata={"unit": "m_per_s"})
     touchdown_error: float
     impact_error: float
-
-
-def margins_of(program: Program, unknowns: Floats) -> Margins:
-    """Worst values at the instants at which a program was checked, from the motion itself."""
-    from heelstrike.gait.refinement import checked_instants
-    from heelstrike.gait.transcription import Group
-
-    transcription, request = program.transcription, program.request
-    model = request.robot.model
-    fine = checked_instants(program)
-    motion = program.motion(unknowns, fine)
-    wrench, torque, heights = (
-        np.array(part) for part in transcription.motion.map(fine.share.size)(*motion)
-    )
-    position = motion[0][-request.robot.nu :]
-    half = request.stance.half_length
-    actuator = np.argsort(model.actuator_joint)
-    limits = np.minimum(
-        model.torque_upper[actuator, None] - torque, torque - model.torque_lower[actuator, None]
-    )
-    ranges = np.minimum(request.upper[3:, None] - position, position - request.lower[3:, None])
-    end = program.at_touchdown(unknowns)
-    impulse, landing, lift = (np.array(part).ravel() for part in transcription.landing(*end[:3]))
-    touchdown = np.array(transcription.touchdown(*end)).ravel()
-    groups = np.array([row.group for row in transcription.touchdown_rows])
-    placed = (groups == Group.TOUCHDOWN_PLACE) | (groups == Group.TOUCHDOWN_ANGLE)
-    periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)
-    return Margins(
-        normal_force=float(wrench[1].min()),
-        friction_use=_use(wrench, request.friction),
-        zero_moment_point=_inside(wrench, half),
-        clearance=float((heights - program.clearance(fine)).min()),
-        joint_range=float(ranges.min()),
-        torque=float(limits.min()),
-        peak_torque=float(np.abs(torque).max()),
-        impulse=float(impulse[1]) if request.impact else 0.0,
-        impulse_friction_use=_use(impulse, request.friction) if request.impact else 0.0,
-        impulse_center=_inside(impulse, half) if request.impact else half,
-        landing_velocity=float(landing.max()),
-        lift_velocity=float(lift.min()),
-        touchdown_error=float(np.abs(touchdown[placed]).max()),
-        impact_error=float(np.abs(touchdown[periodic]).max()),
-    )
-
-
-def _use(wrench: Floats, friction: float) -> float:
-    """Largest share of the friction cone in use."""
-    if friction == 0.0:
-        return 0.0 if not np.any(wrench[0]) else math.inf
-    return float((np.abs(wrench[0]) / (friction * wrench[1])).max())
-
-
-def _inside(wrench: Floats, half_length: float) -> float:
-    """Least distance of the centre of pressure from the ends of the sole (m)."""
-    moment = wrench[2:].sum(axis=0)  # none on a point foot
-    return float((half_length - np.abs(moment / wrench[1])).min())

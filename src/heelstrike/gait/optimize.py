@@ -5,25 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from contextlib import suppress
-from itertools import islice
-from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
 
 from heelstrike.errors import InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
-from heelstrike.gait.margins import margins_of
+from heelstrike.gait.gait import Gait
 from heelstrike.gait.request import JointRanges, Request
 from heelstrike.robot.robot import Robot
-from heelstrike.robot.state import State
-
-if TYPE_CHECKING:
-    from heelstrike.gait.program import Program, Solution
-    from heelstrike.gait.transcription import Transcription
-
-Floats = NDArray[np.float64]
 
 
 def optimize_gait(
@@ -129,103 +116,24 @@ def optimize_gait(
     (2, 6)
     """
     asked = dict(locals())  # all arguments, by name
-    report = _Forward(asked.pop("progress"))
+    del asked["progress"]
     request = Request(**asked)
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
+    from heelstrike.gait.design import designed
     from heelstrike.gait.transcription import Transcription
+
+    furthest = 0.0
+
+    def report(fraction: float) -> None:
+        """Tell progress that never goes back, also when the work turns out to be more."""
+        nonlocal furthest
+        furthest = max(furthest, fraction)
+        if progress is not None:
+            progress(furthest)
 
     transcription = Transcription(request)
     *others, last = request.profiles
     for profile in others:
         with suppress(InfeasibleGaitError):  # the last profile asks least of the swing foot
-            return _designed(transcription, profile, report)
-    return _designed(transcription, last, report)
-
-
-class _Forward:
-    """Progress that never goes back, also when the work turns out to be more."""
-
-    def __init__(self, progress: Callable[[float], None] | None) -> None:
-        self._progress = progress
-        self._furthest = 0.0
-
-    def __call__(self, fraction: float) -> None:
-        self._furthest = max(self._furthest, fraction)
-        if self._progress is not None:
-            self._progress(self._furthest)
-
-
-def _designed(
-    transcription: Transcription, profile: ClearanceProfile, report: Callable[[float], None]
-) -> Gait:
-    from heelstrike.gait.program import Program, first_instants
-    from heelstrike.gait.refinement import held_between_nodes
-
-    program = Program(transcription, profile, *first_instants(transcription.request))
-    report(0.05)
-    best = _best_of_starts(program, report)
-    unknowns = held_between_nodes(program, best)
-    report(1.0)
-    return designed_gait(program, unknowns)
-
-
-def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:
-    from heelstrike.gait.infeasible import nearest_to_feasible
-    from heelstrike.gait.starts import starts
-
-    request = program.request
-    guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
-    solutions: list[Solution] = []
-    while guesses:
-        solutions.append(program.solve(guesses.pop(0)))
-        if len(solutions) == 1 and not solutions[0].converged:
-            # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise
-            # a point that satisfies all constraints is as good a start as can be.
-            guesses.insert(0, nearest_to_feasible(program))
-        report(0.05 + 0.75 * len(solutions) / (len(solutions) + len(guesses)))
-    converged = [solution for solution in solutions if solution.converged]
-    if not converged:
-        raise InfeasibleGaitError(
-            f"robot {request.robot.name!r}: gaits with {request} exist only just: points that "
-            f"satisfy all constraints were found, but no optimum ({solutions[-1].status}). Ask "
-            "for a shorter or slower step or a lower clearance of the swing foot."
-        )
-    return min(converged, key=lambda solution: solution.objective)
-
-
-def designed_gait(program: Program, unknowns: Floats) -> Gait:
-    """Gait with the given unknowns, its joints in the order of the actuators."""
-    transcription, request = program.transcription, program.request
-    robot, stance = request.robot, request.stance
-    mirror, joint = robot.mirror, robot.model.actuator_joint
-    assert mirror is not None
-    pieces = program.pieces(unknowns)
-    end, _, start_velocity, duration, length = touchdown = program.at_touchdown(unknowns)
-    impulse = np.zeros(3)
-    if request.impact:
-        impulse[: stance.held] = np.array(transcription.landing(*touchdown[:3])[0]).ravel()
-    state = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
-    phase = Phase(
-        contacts={stance.foot: Footing.FLAT if stance.flat else Footing.POINT},
-        breakpoints=float(duration) * np.linspace(0.0, 1.0, len(pieces) + 1),
-        pieces=pieces[:, :, joint - stance.held],
-        pitch_pieces=None if stance.flat else pieces[:, :, 0],
-    )
-    legs = mirror.among(joint)
-    return Gait(
-        robot=robot.name,
-        fingerprint=fingerprint(robot),
-        joint_names=actuated_joints(robot),
-        step_length=float(length),
-        phases=(phase,),
-        mirror_joint=legs.joint,
-        mirror_sign=legs.sign,
-        mirror_offset=legs.offset,
-        initial_state=State(*state),
-        cost=program.effort(unknowns),
-        friction=request.friction,
-        clearance=request.clearance,
-        clearance_profile=program.profile,
-        touchdown_impulse=impulse[[1, 0, 2]],
-        margins=margins_of(program, unknowns),
-    )
+            return designed(transcription, profile, report)
+    return designed(transcription, last, report)

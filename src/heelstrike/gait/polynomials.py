@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import Legendre, Polynomial, legendre
-from numpy.polynomial.polynomial import polyder, polyvander
+from numpy.polynomial.polynomial import polyder, polyval, polyvander
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -95,10 +95,8 @@ def evaluated(pieces: Floats, breakpoints: Floats, t: Floats, order: int) -> Flo
     piece = np.searchsorted(breakpoints, t, side="right") - 1
     piece = np.clip(piece, 0, len(pieces) - 1)
     local = (t - breakpoints[piece])[..., None]
-    value: Floats = np.zeros((1,))
-    for coefficient in np.moveaxis(polyder(pieces, order, axis=1), 1, 0)[::-1]:
-        value = value * local + coefficient[piece]
-    return value
+    terms = np.moveaxis(polyder(pieces, order, axis=1), 1, 0)
+    return np.asarray(polyval(local, terms[:, piece], tensor=False), np.float64)
 
 
 @dataclass(frozen=True)

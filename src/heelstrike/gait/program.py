@@ -83,8 +83,8 @@ class Solution:
         Value of the objective.
     converged : bool
         Whether it is an optimum within the tolerance.
-    status : str
-        IPOPT's own word for how it ended.
+    ended : str
+        IPOPT's own word for how it did.
     multipliers : (m,) float
         Multipliers of the scaled constraints, in the order of :meth:`Program.labelled_rows`.
     """
@@ -92,10 +92,11 @@ class Solution:
     unknowns: Floats
     objective: float
     converged: bool
-    status: str
+    ended: str
     multipliers: Floats
 
 
+@dataclass(eq=False)
 class Program:
     """The program on a mesh of equal pieces.
 
@@ -120,24 +121,17 @@ class Program:
         the effort: shows which constraints are in conflict when there is no solution.
     """
 
-    def __init__(
-        self,
-        transcription: Transcription,
-        profile: ClearanceProfile,
-        degree: int,
-        instants: Instants,
-        *,
-        elastic: bool = False,
-    ) -> None:
-        self.transcription = transcription
-        self.request = transcription.request
-        self.profile = profile
-        self.degree = degree
-        self.instants = instants
-        self.elastic = elastic
-        n, pieces = transcription.size, instants.pieces
+    transcription: Transcription
+    profile: ClearanceProfile
+    degree: int
+    instants: Instants
+    elastic: bool = False
+
+    def __post_init__(self) -> None:
+        self.request = self.transcription.request
+        n, pieces = self.transcription.size, self.instants.pieces
         self._ends = Instants(pieces, np.arange(pieces), np.ones(pieces), np.zeros(pieces))
-        sizes = [n * pieces, n * pieces, n * pieces * (degree - 1), 1, 1]
+        sizes = [n * pieces, n * pieces, n * pieces * (self.degree - 1), 1, 1]
         self._places = [0, *np.cumsum(sizes).tolist()]
         self._gaps = n * (2 * pieces - 1)
         self._lower, self._upper = self._bounds()
@@ -147,16 +141,6 @@ class Program:
     def size(self) -> int:
         """Number of unknowns."""
         return int(self._places[-1])
-
-    def refined(self, instants: Instants) -> Program:
-        """Return the same program with more instants."""
-        return Program(
-            self.transcription, self.profile, self.degree, self.instants.joined(instants)
-        )
-
-    def relaxed(self) -> Program:
-        """Return the elastic variant of the program."""
-        return Program(self.transcription, self.profile, self.degree, self.instants, elastic=True)
 
     def path_bounds(self, instants: Instants) -> tuple[Floats, Floats]:
         """Scaled bounds of the constraints along the path at instants, (rows, N) each."""
@@ -202,7 +186,7 @@ class Program:
         n = self.transcription.size
         q, v, a, duration, length = (unknowns[k:end] for k, end in pairwise(self._places))
         q, v, a = (casadi.reshape(part, n, -1) for part in (q, v, a))
-        start, _ = self.transcription.mirror(q[:, -1], v[:, 0])
+        start = self.transcription.mirror.position(q[:, -1])
         return casadi.horzcat(start, q), v, a, duration, length
 
     def along(self, unknowns: Any, instants: Instants) -> tuple[Any, Any, Any]:
@@ -272,7 +256,7 @@ class Program:
             unknowns=np.array(found["x"]).ravel()[:size],
             objective=float(found["f"]),
             converged=statistics["return_status"] == "Solve_Succeeded",
-            status=str(statistics["return_status"]).replace("_", " ").lower(),
+            ended=str(statistics["return_status"]).replace("_", " ").lower(),
             multipliers=np.array(found["lam_g"]).ravel()[self._gaps :],
         )
 
@@ -326,7 +310,7 @@ class Ipopt:
 
     CasADi looks for signals in the functions that IPOPT evaluates, takes what they raise for a
     failure of the function, and returns; nobody learns that there was a Ctrl-C. So the signal is
-    held back, and the search stopped after the iteration in which it came.
+    held back, and IPOPT stopped after the iteration in which it came.
 
     Parameters
     ----------

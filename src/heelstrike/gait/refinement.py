@@ -6,6 +6,8 @@ exchange method of semi-infinite programming.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,7 +50,7 @@ def held_between_nodes(program: Program, solution: Solution) -> Floats:
         missed = _missed(program, unknowns, fine)
         if not missed.share.size:
             return unknowns
-        program = program.refined(missed)
+        program = replace(program, instants=program.instants.joined(missed))
         solution = program.solve(unknowns)
         if not solution.converged:
             solution = program.solve(nearest_to_feasible(program))
@@ -58,7 +60,7 @@ def held_between_nodes(program: Program, solution: Solution) -> Floats:
     raise InfeasibleGaitError(
         f"robot {request.robot.name!r}: a gait with {request} satisfies the constraints at "
         f"{np.count_nonzero(program.instants.weight)} phases of a step but not between them "
-        f"({solution.status}). Try more intervals, or a slower step."
+        f"({solution.ended}). Try more intervals, or a slower step."
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
-from heelstrike.gait.sole import Sole, reach, sole, standing_height
+from heelstrike.gait.sole import reach, sole, standing_height
+from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.robot import Robot
 
 Floats = NDArray[np.float64]
@@ -30,6 +31,12 @@ MESH = 12
 
 STEP_UNITS = {"step_length": "m", "step_duration": "s", "speed": "m/s"}
 """What may be asked of a step."""
+NUMBERS = {
+    **STEP_UNITS,
+    **dict.fromkeys(("friction", "clearance", "zmp_margin", "force_margin"), ""),
+    "joint_speed_limit": "rad/s",
+}
+"""Numbers that are asked for: the unit of one that must be positive; others are not negative."""
 
 SHORTEST, LONGEST = 0.2, 40.0
 """Step durations that are considered, in units of the pendulum time sqrt(height / gravity)."""
@@ -39,7 +46,7 @@ LEAST_FREE_LENGTH = 0.05
 """Least step length, in standing heights, where the optimiser chooses it."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(eq=False, kw_only=True)
 class Request:
     """A request for a gait, checked: the arguments of :func:`heelstrike.gait.optimize_gait`.
 
@@ -48,6 +55,8 @@ class Request:
 
     Attributes
     ----------
+    mirror : Mirror
+        The robot's exchange of left and right.
     stance, swing : Sole
         The feet in the first step.
     height : float
@@ -82,77 +91,75 @@ class Request:
     impact: bool
     intervals: int
     starts: int
-    stance: Sole = field(init=False)
-    swing: Sole = field(init=False)
-    height: float = field(init=False)
-    lower: Floats = field(init=False)
-    upper: Floats = field(init=False)
-    reach: float = field(init=False)
-    profiles: tuple[ClearanceProfile, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         robot = self.robot
-        _check_robot(robot)
-        lower, upper = ranges_kept(robot, self.joint_ranges)
-        stance, swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
-        self._set(
-            stance=stance,
-            swing=swing,
-            lower=lower,
-            upper=upper,
-            height=standing_height(robot, stance),
-            reach=reach(robot, (stance, swing), lower, upper),
-            profiles=_profiles(self.clearance_profile, self.impact),
-        )
+        self.mirror = _mirror_of(robot)
+        self.lower, self.upper = ranges_kept(robot, self.mirror, self.joint_ranges)
+        self.stance, self.swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
+        self.height = standing_height(robot, self.stance)
+        self.reach = reach(robot, (self.stance, self.swing), self.lower, self.upper)
+        self.profiles = _profiles(self.clearance_profile, self.impact)
+        flat = self.stance.flat
+        if not flat and self.zmp_margin is not None:
+            raise GaitError(
+                f"robot {robot.name!r} has point feet: the zero moment point is where they stand, "
+                "and zmp_margin means nothing. Leave it out."
+            )
+        defaults = {
+            "zmp_margin": 0.2 * self.stance.half_length,
+            "force_margin": 0.1 * robot.weight,
+            "intervals": NODES if flat else MESH,
+        }
+        for name, value in defaults.items():
+            if getattr(self, name) is None:
+                setattr(self, name, value)
+        for name, unit in NUMBERS.items():
+            self._check_number(name, unit)
+        for name, least, most in (("intervals", 10 if flat else 4, 1000), ("starts", 1, 100)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer):
+                raise GaitError(f"{name} must be a whole number, got {value!r}")
+            if not least <= value <= most:
+                raise GaitError(f"{name} must be between {least} and {most}, got {value}")
         self._check_step()
-        self._check_margins()
-        self._fill("intervals", NODES if stance.flat else MESH)
-        self._check_count("intervals", 10 if stance.flat else 4, 1000)
-        self._check_count("starts", 1, 100)
+        if flat and self.zmp_margin >= self.stance.half_length:
+            raise GaitError(
+                f"zmp_margin = {self.zmp_margin:g} m leaves nothing of the sole, which reaches "
+                f"{self.stance.half_length:g} m to each side of its middle."
+            )
+        if self.force_margin >= robot.weight:
+            raise GaitError(
+                f"force_margin = {self.force_margin:g} N is more than the robot's weight, "
+                f"{robot.weight:g} N, which the ground carries on average."
+            )
 
-    def _set(self, **values: Any) -> None:
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
-
-    def _fill(self, name: str, default: float) -> None:
-        if getattr(self, name) is None:
-            self._set(**{name: default})
-
-    def _check_number(self, name: str, *, positive: str = "", infinite: bool = False) -> None:
-        """Make a number a float, once it is one: not negative, or positive, of some unit."""
+    def _check_number(self, name: str, unit: str) -> None:
+        """Make a number a float, once it is one: positive, of some unit, or not negative."""
         value = getattr(self, name)
         if value is None:
             return
         number = isinstance(value, int | float | np.integer | np.floating)
-        fits = number and not isinstance(value, bool) and (infinite or math.isfinite(value))
-        if not fits or not (value > 0.0 if positive else value >= 0.0):
-            what = (
-                f"a positive number ({positive})" if positive else "a number that is not negative"
-            )
+        finite = number and not isinstance(value, bool) and math.isfinite(value)
+        free = name == "joint_speed_limit" and value == math.inf
+        if not (finite or free) or not (value > 0.0 if unit else value >= 0.0):
+            what = f"a positive number ({unit})" if unit else "a number that is not negative"
             raise GaitError(f"{name} must be {what}, got {value!r}")
-        self._set(**{name: float(value)})
-
-    def _check_count(self, name: str, lowest: int, highest: int) -> None:
-        value = getattr(self, name)
-        if isinstance(value, bool) or not isinstance(value, int | np.integer):
-            raise GaitError(f"{name} must be a whole number, got {value!r}")
-        if not lowest <= value <= highest:
-            raise GaitError(f"{name} must be between {lowest} and {highest}, got {value}")
+        setattr(self, name, float(value))
 
     def _check_step(self) -> None:
-        for name, unit in STEP_UNITS.items():
-            self._check_number(name, positive=unit)
+        """Fill in what two of length, duration and speed say of the third, and look at them."""
         length, duration, speed = self.step_length, self.step_duration, self.speed
-        if length is not None and duration is not None and speed is not None:
+        if speed is not None and duration is not None and length is not None:
             raise GaitError(
                 "step_length, step_duration and speed are all given; the speed is the length over "
                 "the duration, so give two of them at most."
             )
         if speed is not None and duration is not None:
-            length, speed = speed * duration, None
+            length, self.speed = speed * duration, None
         elif speed is not None and length is not None:
-            duration, speed = length / speed, None
-        self._set(step_length=length, step_duration=duration, speed=speed)
+            duration, self.speed = length / speed, None
+        self.step_length, self.step_duration = length, duration
         if length is not None and length >= self.reach:
             raise InfeasibleGaitError(
                 f"robot {self.robot.name!r} cannot take a step of {length:g} m: stretched flat "
@@ -164,29 +171,6 @@ class Request:
                 f"a step of {duration:g} s is out of range for robot {self.robot.name!r}: with a "
                 f"trunk {self.height:.3g} m above the ground, steps between {shortest:.2g} s and "
                 f"{longest:.2g} s are considered."
-            )
-
-    def _check_margins(self) -> None:
-        stance, robot = self.stance, self.robot
-        if not stance.flat and self.zmp_margin is not None:
-            raise GaitError(
-                f"robot {robot.name!r} has point feet: the zero moment point is where they stand, "
-                "and zmp_margin means nothing. Leave it out."
-            )
-        self._fill("zmp_margin", 0.2 * stance.half_length)
-        self._fill("force_margin", 0.1 * robot.weight)
-        for name in ("friction", "clearance", "zmp_margin", "force_margin"):
-            self._check_number(name)
-        self._check_number("joint_speed_limit", positive="rad/s", infinite=True)
-        if stance.flat and self.zmp_margin >= stance.half_length:
-            raise GaitError(
-                f"zmp_margin = {self.zmp_margin:g} m leaves nothing of the sole, which reaches "
-                f"{stance.half_length:g} m to each side of its middle."
-            )
-        if self.force_margin >= robot.weight:
-            raise GaitError(
-                f"force_margin = {self.force_margin:g} N is more than the robot's weight, "
-                f"{robot.weight:g} N, which the ground carries on average."
             )
 
     @property
@@ -230,7 +214,8 @@ def _profiles(profile: ClearanceProfile | str | None, impact: bool) -> tuple[Cle
         raise GaitError(f"clearance_profile must be one of {names}, got {profile!r}") from None
 
 
-def _check_robot(robot: Robot) -> None:
+def _mirror_of(robot: Robot) -> Mirror:
+    """Return the mirror image of a robot that can walk, or refuse another."""
     name = f"robot {robot.name!r}"
     if not robot.floating:
         raise GaitError(
@@ -263,9 +248,10 @@ def _check_robot(robot: Robot) -> None:
             f"{name}: gravity is {robot.model.gravity} m/s²; a gait on level ground needs it "
             "to point down."
         )
+    return mirror
 
 
-def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats]:
+def ranges_kept(robot: Robot, mirror: Mirror, asked: JointRanges | None) -> tuple[Floats, Floats]:
     """Lowest and highest position of every coordinate, (nv,) each: the robot's ranges and `asked`.
 
     Every step of a gait mirrors the one before, so that what is asked of a joint holds for its
@@ -274,7 +260,9 @@ def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats
     Parameters
     ----------
     robot : Robot
-        A robot with a mirror map.
+        The robot.
+    mirror : Mirror
+        Its exchange of left and right.
     asked : mapping of str to (float, float), optional
         Ranges by the names of joints (rad, m for a slide); an infinite end leaves the robot's own.
 
@@ -283,26 +271,28 @@ def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats
     GaitError
         If there is no joint of that name, or if a range is none or has no part in the robot's.
     """
-    model, mirror = robot.model, robot.mirror
-    assert mirror is not None
-    lower, upper = model.lower.copy(), model.upper.copy()
+    model = robot.model
+    lower, upper = model.lower, model.upper
     joints = {name: j for j, name in enumerate(robot.joint_names) if j > 2}
-    for name, ends in _named(asked).items():
+    try:
+        named: dict[str, Any] = dict(asked or {})
+    except (TypeError, ValueError):
+        raise GaitError(
+            f"joint_ranges must give ranges by the names of joints, got {asked!r}"
+        ) from None
+    for name, given in named.items():
         if name not in joints:
             raise GaitError(
                 f"joint_ranges: robot {robot.name!r} has no joint {name!r}; its joints are "
                 f"{', '.join(joints)}."
             )
-        j, (low, high) = joints[name], _ends(name, ends)
-        lower[j], upper[j] = max(lower[j], low), min(upper[j], high)
-        # Where its counterpart is when this joint is at either end of what is asked.
-        other = int(np.flatnonzero(mirror.joint == j)[0])
-        seen = sorted(
-            model.reference[other] + mirror.sign[other] * (end - model.reference[j])
-            for end in (low, high)
-        )
-        lower[other], upper[other] = max(lower[other], seen[0]), min(upper[other], seen[1])
-        if lower[j] >= upper[j] or lower[other] >= upper[other]:
+        j, (low, high) = joints[name], _ends(name, given)
+        ends = np.full((2, robot.nv), [[-np.inf], [np.inf]])
+        ends[:, j] = low, high
+        for ranges in (ends, mirror.ranges(*ends)):
+            lower, upper = np.maximum(lower, ranges[0]), np.minimum(upper, ranges[1])
+        pair = [j, mirror.joint[j]]
+        if np.any(lower[pair] >= upper[pair]):
             raise GaitError(
                 f"joint_ranges: {name!r} from {low:g} to {high:g} has no part in the range that "
                 f"robot {robot.name!r} gives it, {model.lower[j]:g} to {model.upper[j]:g}, or in "
@@ -311,18 +301,9 @@ def ranges_kept(robot: Robot, asked: JointRanges | None) -> tuple[Floats, Floats
     return lower, upper
 
 
-def _named(asked: JointRanges | None) -> dict[str, object]:
+def _ends(name: str, ends: Any) -> tuple[float, float]:
     try:
-        return dict(asked or {})
-    except (TypeError, ValueError):
-        raise GaitError(
-            f"joint_ranges must give ranges by the names of joints, got {asked!r}"
-        ) from None
-
-
-def _ends(name: str, ends: object) -> tuple[float, float]:
-    try:
-        low, high = (float(end) for end in ends)  # type: ignore[attr-defined]
+        low, high = (float(end) for end in ends)
     except (TypeError, ValueError):
         low, high = np.nan, np.nan
     if not low < high:

@@ -76,23 +76,21 @@ def sole(robot: Robot, foot: int) -> Sole:
         return Sole(foot, link, 0.0, center, float(disc), 0.0, contacts)
     center = robot.model.contact_position[list(contacts)]
     radius = robot.model.contact_radius[list(contacts)]
-    best: tuple[float, float, float, float] | None = None
+    found: list[tuple[float, float, float, float]] = []
     for i, j in combinations(range(len(contacts)), 2):
         for angle in _tangent_angles(center[i] - center[j], radius[i] - radius[j]):
             x, z = _rotated(center, angle)
             bottom = z - radius
-            if bottom.min() < bottom[i] - TOUCHING:
-                continue
             touching = x[bottom < bottom[i] + TOUCHING]
-            extent = float(np.ptp(touching))
-            if extent > TOUCHING and (best is None or abs(angle) < abs(best[0])):
-                best = (angle, float(touching.min()), float(touching.max()), float(bottom[i]))
-    if best is None:
+            if bottom.min() >= bottom[i] - TOUCHING and np.ptp(touching) > TOUCHING:
+                found.append((angle, touching.min(), touching.max(), bottom[i]))
+    if not found:
         raise GaitError(
             f"robot {robot.name!r}: foot {name!r} cannot rest flat on its contact points; they "
             "lie in one place. Give it a heel and a toe, or a single one for a gait on points."
         )
-    angle, heel, toe, ground = best
+    best = min(found, key=lambda one: abs(one[0]))
+    angle, heel, toe, ground = (float(number) for number in best)
     point = np.array(_rotated(np.array([[0.5 * (heel + toe), ground]]), -angle)).ravel()
     return Sole(foot, link, angle, point, 0.0, 0.5 * (toe - heel), contacts)
 

@@ -64,8 +64,6 @@ def starts(request: Request) -> Iterator[Start]:
     Each goes from the mirror image of a posture with both feet on the ground, through one with the
     swing foot passing the stance foot, to that posture.
     """
-    mirror = request.robot.mirror
-    assert mirror is not None
     length, duration, held = *typical_step(request), request.stance.held
     kinematics = _Kinematics(request)
     bends = (1.0, -1.0) if kinematics.bend_is_free else (1.0,)
@@ -75,7 +73,7 @@ def starts(request: Request) -> Iterator[Start]:
         lift = request.clearance + 0.02 * request.height
         end = kinematics.posture((length, 0.0), (0.5 * length, low, lean), bend)
         middle = kinematics.posture((0.0, lift), (0.0, legs, lean), bend)
-        begin = mirror.position(end)
+        begin = request.mirror.position(end)
         yield Start(begin[held:], middle[held:], end[held:], duration, length)
 
 

@@ -122,8 +122,8 @@ class Transcription:
     motion : casadi.Function
         (q, v, a) to the ground's wrench (x, z and, on a flat foot, moment), the torques and the
         heights of the swing foot's contact points.
-    mirror : casadi.Function
-        (q, v) to their mirror images.
+    mirror : Mirror
+        Exchange of left and right among the free coordinates.
     start : casadi.Function
         (q(T), v(0)) to the whole position and velocity at the beginning of the step, the stance
         foot at the origin.
@@ -139,23 +139,13 @@ class Transcription:
         self.robot = request.robot
         self.held = request.stance.held
         self.size = self.robot.nv - self.held
+        self.mirror = request.mirror.among(range(self.held, self.robot.nv))
         self._build_path()
         self._build_touchdown()
 
-    def _symbol(self, name: str) -> casadi.SX:
-        return casadi.SX.sym(name, self.size)
-
-    def _mirrored(self, q: Symbols, v: Symbols) -> tuple[Symbols, Symbols]:
-        """Mirror images of positions and velocities."""
-        mirror, reference = self.robot.mirror, self.robot.model.reference
-        assert mirror is not None
-        whole_q, whole_v = (np.array([*reference[: self.held], *part]) for part in (q, v))
-        images: Any = (mirror.position(whole_q), mirror.velocity(whole_v))
-        return images[0][self.held :], images[1][self.held :]
-
     def _build_path(self) -> None:
         request, robot = self.request, self.robot
-        arguments = [self._symbol(name) for name in "qva"]
+        arguments = [casadi.SX.sym(name, self.size) for name in "qva"]
         q, v, a = (symbols(part) for part in arguments)
         support = Support(robot, request.stance, q, v, a)
         heights = [support.height(i) for i in request.swing.contacts]
@@ -209,12 +199,9 @@ class Transcription:
 
     def _build_touchdown(self) -> None:
         request, robot = self.request, self.robot
-        q, v, v_start = moving = [self._symbol(name) for name in ("q", "v", "v_start")]
+        q, v, v_start = moving = [casadi.SX.sym(name, self.size) for name in ("q", "v", "v_start")]
         duration, length = casadi.SX.sym("duration"), casadi.SX.sym("length")
-        q_start, after = self._mirrored(symbols(q), symbols(v_start))
-        self.mirror = casadi.Function(
-            "mirror", [q, v_start], [expression(q_start), expression(after)]
-        )
+        q_start, after = self.mirror.position(symbols(q)), self.mirror.velocity(symbols(v_start))
         start = Support(robot, request.stance, q_start, symbols(v_start))
         self.start = casadi.Function(
             "start", [q, v_start], [expression(start.q), expression(start.v)]
@@ -276,20 +263,16 @@ def _add_joint_limits(
     """
     robot, model = request.robot, request.robot.model
     actuator = np.argsort(model.actuator_joint)
-    for k in range(robot.nv - 3):
-        name, j = robot.joint_names[k + 3], k + 3
-        lower, upper = float(request.lower[j]), float(request.upper[j])
-        if np.isfinite([lower, upper]).any():
-            constraints.add(Group.JOINT_RANGE, position[k], subject=name, lower=lower, upper=upper)
-        lower = float(model.torque_lower[actuator[k]])
-        upper = float(model.torque_upper[actuator[k]])
-        finite = [abs(limit) for limit in (lower, upper) if np.isfinite(limit)]
-        if finite:
-            unit = max(finite) or 1.0
-            torque = support.torque[k]
-            constraints.add(Group.TORQUE, torque, subject=name, lower=lower, upper=upper, unit=unit)
-        limit = min(request.joint_speed_limit, float(model.speed_limit[j]))
-        if np.isfinite(limit):
-            constraints.add(
-                Group.JOINT_SPEED, velocity[k], subject=name, lower=-limit, upper=limit, unit=limit
-            )
+    low, high = model.torque_lower[actuator], model.torque_upper[actuator]
+    speeds = np.minimum(request.joint_speed_limit, model.speed_limit)
+    for k, name in enumerate(robot.joint_names[3:]):
+        lower, upper, speed = request.lower[k + 3], request.upper[k + 3], speeds[k + 3]
+        largest = max((abs(limit) for limit in (low[k], high[k]) if np.isfinite(limit)), default=0)
+        for group, value, least, most, unit in (
+            (Group.JOINT_RANGE, position[k], lower, upper, 1.0),
+            (Group.TORQUE, support.torque[k], low[k], high[k], largest or 1.0),
+            (Group.JOINT_SPEED, velocity[k], -speed, speed, speed),
+        ):
+            if np.isfinite([least, most]).any():
+                ends = {"lower": float(least), "upper": float(most), "unit": float(unit)}
+                constraints.add(group, value, subject=name, **ends)

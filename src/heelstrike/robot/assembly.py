@@ -7,19 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.averaging import averaged
 from heelstrike.robot.contact_points import ContactPoint
-from heelstrike.robot.feet import find_feet, name_contacts
 from heelstrike.robot.model import NUMBERS, Floats, Model, label
 from heelstrike.robot.plausibility import unlikely_numbers
-from heelstrike.robot.robot import LockedJoint, Robot
-from heelstrike.robot.symmetry import averaged, find_mirror
+from heelstrike.robot.robot import Foot, LockedJoint, Robot
+from heelstrike.robot.symmetry import find_mirror
 from heelstrike.robot.warning import warn
 
 LARGEST_NUMBER = 1e10
 """Largest length, mass, inertia … of a robot in SI units; MuJoCo's own bound on a state."""
 
 UNLIKELY = "numbers that are unlikely"
-SHOWN = 6  # how many of them a message lists before it counts the rest
+DIFFERENT = "left and right differ"
+SHOWN = 6  # how many findings a message lists before it counts the rest
 
 
 def assembled(
@@ -69,25 +70,79 @@ def assembled(
         model = averaged(model, joint_names, link_names, source)
     origin = link_origins(model)
     _refuse_joints_without_inertia(model, origin, joint_names, source)
-    _warn_of_unlikely_numbers(model, origin, joint_names, link_names, source)
-    points = list(points)
-    center: Floats = model.mass @ (origin + model.center_of_mass) / model.mass.sum()
-    feet = find_feet(model.parent, link_names, points, origin, center)
+    unlikely = [one.message for one in unlikely_numbers(model, origin, joint_names, link_names)]
+    if unlikely:
+        more = f" And {len(unlikely) - SHOWN} more." if len(unlikely) > SHOWN else ""
+        warn(f"{source}: {UNLIKELY}: {' '.join(unlikely[:SHOWN])}{more}")
+    feet = find_feet(model, link_names, origin)
     friction = tuple(point.friction for point in points)
+    mirror, differences = find_mirror(model, joint_names, link_names, feet)
+    if differences:
+        more = f"; and {len(differences) - SHOWN} more" if len(differences) > SHOWN else ""
+        warn(
+            f"{source}: {DIFFERENT}, so the robot has no mirror image: "
+            f"{'; '.join(differences[:SHOWN])}{more}. Gaits whose steps mirror each other need two "
+            'equal legs, as load_robot makes them with mirror="average".'
+        )
     return Robot(
         name=name,
         model=model,
         joint_names=joint_names,
         link_names=link_names,
         actuator_names=actuator_names,
-        contact_names=name_contacts(link_names, points, feet),
+        contact_names=name_contacts(model, link_names, feet),
         feet=feet,
-        mirror=find_mirror(model, joint_names, link_names, feet, source),
+        mirror=mirror,
         floating=_is_floating(model, source),
         contact_friction=friction,
         source=source,
         locked=locked,
     )
+
+
+def find_feet(model: Model, names: tuple[str, ...], origin: Floats) -> tuple[Foot, ...]:
+    """Find the links that end a leg: leaves of the tree with contact points, low on the robot.
+
+    Low means that, in the reference configuration, the lowest contact point of the link is below
+    the middle between the lowest one of the robot and the robot's centre of mass. So hands and the
+    ends of a tail are not feet; the shanks of a robot with point feet are.
+
+    Parameters
+    ----------
+    model : Model
+        The robot's arrays.
+    names : tuple of str
+        Name of every link.
+    origin : (nl, 2) float
+        World position of the link frames in the reference configuration.
+    """
+    if not model.nc:
+        return ()
+    center = model.mass @ (origin + model.center_of_mass) / model.mass.sum()
+    bottom = (origin[model.contact_link] + model.contact_position)[:, 1] - model.contact_radius
+    low = bottom.min() + 0.5 * max(0.0, float(center[1] - bottom.min()))
+    leaves = np.setdiff1d(model.contact_link, model.parent).tolist()
+    contacts = {link: np.flatnonzero(model.contact_link == link) for link in leaves}
+    return tuple(
+        Foot(names[link], link, tuple(contacts[link].tolist()))
+        for link in leaves
+        if bottom[contacts[link]].min() <= low
+    )
+
+
+def name_contacts(model: Model, names: tuple[str, ...], feet: tuple[Foot, ...]) -> tuple[str, ...]:
+    """Call the two ends of a foot heel and toe, and number the points of everything else.
+
+    Contact points are in the order of their links, and of x on a link.
+    """
+    ends = {foot.link: foot.contacts for foot in feet if len(foot.contacts) == 2}
+    result = []
+    for link in np.unique(model.contact_link).tolist():
+        x = model.contact_position[model.contact_link == link, 0]
+        sole = link in ends and x[1] - x[0] > 1e-6
+        endings = ("heel", "toe") if sole else range(len(x))
+        result += [f"{names[link]}_{ending}" for ending in endings]
+    return tuple(result)
 
 
 def link_origins(model: Model) -> Floats:
@@ -109,20 +164,6 @@ def _refuse_impossible_numbers(model: Model, source: str) -> None:
                 f"{source}: the {label(field)} of the robot is not a number below "
                 f"{LARGEST_NUMBER:g}. Look for NaN or a misplaced exponent in the file."
             )
-
-
-def _warn_of_unlikely_numbers(
-    model: Model,
-    origin: Floats,
-    joint_names: tuple[str, ...],
-    link_names: tuple[str, ...],
-    source: str,
-) -> None:
-    """Warn of numbers in units that are not meant, all in one message."""
-    found = [words for _, words in unlikely_numbers(model, origin, joint_names, link_names)]
-    if found:
-        more = f" And {len(found) - SHOWN} more." if len(found) > SHOWN else ""
-        warn(f"{source}: {UNLIKELY}: {' '.join(found[:SHOWN])}{more}")
 
 
 def _refuse_joints_without_inertia(

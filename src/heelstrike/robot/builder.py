@@ -24,9 +24,6 @@ class _Link:
 
     joint: str
     name: str
-    parent: int
-    axis: tuple[float, float, float]
-    at: tuple[float, float]
     numbers: dict[str, Any]
     torque: tuple[float, float] | None
 
@@ -86,9 +83,9 @@ class RobotBuilder:
         if self._links:
             raise self._error(f"the floating base {link!r} must be the first link.")
         x, z = _pair("at", at)
-        self._add("root_x", link, -1, (0.0, 1.0, 0.0), (0.0, 0.0), {"reference": x})
-        self._add("root_z", link, 0, (0.0, 0.0, 1.0), (0.0, 0.0), {"reference": z})
-        return self._add("root_pitch", link, 1, (1.0, 0.0, 0.0), (x, z), properties)
+        self._add("root_x", link, None, (0.0, 1.0, 0.0), (0.0, 0.0), {"reference": x})
+        self._add("root_z", link, link, (0.0, 0.0, 1.0), (0.0, 0.0), {"reference": z})
+        return self._add("root_pitch", link, link, (1.0, 0.0, 0.0), (x, z), properties)
 
     def hinge(
         self,
@@ -130,14 +127,8 @@ class RobotBuilder:
         """
         if sense not in (1, -1):
             raise self._error(f"joint {name!r}: sense is 1 or -1, got {sense!r}.")
-        return self._add(
-            name,
-            link or name,
-            self._parent(name, parent),
-            (float(sense), 0.0, 0.0),
-            _pair("at", at),
-            properties,
-        )
+        axis = (float(sense), 0.0, 0.0)
+        return self._add(name, link or name, parent, axis, _pair("at", at), properties)
 
     def slide(
         self,
@@ -181,8 +172,7 @@ class RobotBuilder:
         if not length > 0.0:
             raise self._error(f"joint {name!r} slides along (0, 0), which is no direction.")
         axis = (0.0, x / length, z / length)
-        parent_link = self._parent(name, parent)
-        return self._add(name, link or name, parent_link, axis, _pair("at", at), properties)
+        return self._add(name, link or name, parent, axis, _pair("at", at), properties)
 
     def contact(self, link: str, at: Pair, *, radius: float = 0.0, friction: float = 1.0) -> None:
         """Add a contact point: a disc fixed to a link, a point if its radius is zero.
@@ -200,7 +190,7 @@ class RobotBuilder:
             compared by it.
         """
         x, z = _pair("at", at)
-        size, roughness = _positive("radius", radius), _positive("friction", friction)
+        size, roughness = _number("radius", radius, 0.0), _number("friction", friction, 0.0)
         self._points.append(ContactPoint(self._index(link), x, z, size, roughness))
 
     def sole(self, link: str, *, heel: Pair, toe: Pair, friction: float = 1.0) -> None:
@@ -240,15 +230,12 @@ class RobotBuilder:
         numbers = {name: [link.numbers[name] for link in links] for name in links[0].numbers}
         model = Model.made(
             **numbers,
-            parent=[link.parent for link in links],
-            axis=[link.axis for link in links],
-            offset=[link.at for link in links],
             gravity=(0.0, -self._gravity),
             **of_model(points),
             actuator_joint=driven,
             torque_lower=torques[0],
             torque_upper=torques[1],
-            pivot=next((i for i, link in enumerate(links) if link.axis[0]), 0),
+            pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(
             self.name,
@@ -264,7 +251,7 @@ class RobotBuilder:
         self,
         joint: str,
         name: str,
-        parent: int,
+        parent: str | None,
         axis: tuple[float, float, float],
         at: tuple[float, float],
         properties: JointProperties,
@@ -280,16 +267,14 @@ class RobotBuilder:
         # The massless links of one base share its name; nothing else does.
         if any(link.name == name for link in self._links) and not joint.startswith("root_"):
             raise self._error(f"there is a link {name!r} already.")
+        place = -1 if parent is None else self._index(parent, f"joint {joint!r} hangs on")
         try:
-            self._links.append(_checked(joint, name, parent, axis, at, properties))
+            numbers, torque = _numbers(properties), _torque(properties.get("torque"))
         except RobotError as error:
             raise self._error(f"joint {joint!r}: {error}") from None
+        numbers |= {"parent": place, "axis": axis, "offset": at}
+        self._links.append(_Link(joint, name, numbers, torque))
         return name
-
-    def _parent(self, joint: str, parent: str | None) -> int:
-        if parent is None:
-            return -1
-        return self._index(parent, f"joint {joint!r} hangs on")
 
     def _index(self, link: str, why: str = "a contact point is on") -> int:
         for i in reversed(range(len(self._links))):
@@ -302,38 +287,29 @@ class RobotBuilder:
         return RobotError(f"{self.name}: {message}")
 
 
-def _checked(
-    joint: str,
-    name: str,
-    parent: int,
-    axis: tuple[float, float, float],
-    at: tuple[float, float],
-    given: JointProperties,
-) -> _Link:
-    numbers = {name: _value(name, given) for name in PROPERTIES}
+def _numbers(given: JointProperties) -> dict[str, Any]:
+    """Check what is given of each number; a joint has defaults of which nobody said them."""
+    values: Any = given  # a key out of a list is not a literal to type checkers
+    numbers: dict[str, Any] = {}
+    for name, number in PROPERTIES.items():
+        key = number.called or name
+        if "axes" in number.shape:
+            numbers[name] = _pair(key, values.get(key, (number.default,) * AXES))
+        else:
+            value = values.get(key, number.default)
+            numbers[name] = _number(key, value, number.least, infinite=number.infinite)
     numbers["lower"], numbers["upper"] = _ordered("limits", given.get("limits", UNLIMITED))
     gear = _number("gear", given.get("gear", 1.0))
-    numbers["armature"] += gear**2 * _positive("motor_inertia", given.get("motor_inertia", 0.0))
-    torque = given.get("torque")
-    limits = None if torque is None else _torque(torque)
-    return _Link(joint, name, parent, axis, at, numbers, limits)
+    numbers["armature"] += gear**2 * _number("motor_inertia", given.get("motor_inertia", 0.0), 0.0)
+    return numbers
 
 
-def _value(name: str, given: JointProperties) -> Any:
-    """Check what is given of a number, or return what a joint has of which nobody said it."""
-    values: Any = given  # a key out of a list is not a literal to type checkers
-    number = PROPERTIES[name]
-    key = number.called or name
-    if "axes" in number.shape:
-        return _pair(key, values.get(key, (number.default,) * AXES))
-    check = _positive if number.least == 0.0 else _number
-    return check(key, values.get(key, number.default), infinite=number.infinite)
-
-
-def _torque(given: Limits) -> tuple[float, float]:
+def _torque(given: Limits | None) -> tuple[float, float] | None:
+    if given is None:
+        return None
     if isinstance(given, Sequence | np.ndarray):
         return _ordered("torque", given)
-    size = _positive("torque", given, infinite=True)
+    size = _number("torque", given, 0.0, infinite=True)
     return _ordered("torque", (-size, size))
 
 
@@ -352,18 +328,13 @@ def _pair(what: str, given: Pair, *, infinite: bool = False) -> tuple[float, flo
     return _number(what, first, infinite=infinite), _number(what, second, infinite=infinite)
 
 
-def _positive(what: str, given: float, *, infinite: bool = False) -> float:
-    number = _number(what, given, infinite=infinite)
-    if number < 0.0:
-        raise RobotError(f"{what} must not be negative, got {number:g}.")
-    return number
-
-
-def _number(what: str, given: float, *, infinite: bool = False) -> float:
+def _number(what: str, given: float, least: float = -math.inf, *, infinite: bool = False) -> float:
     try:
         number = float(given)
     except (TypeError, ValueError):
         raise RobotError(f"{what} must be a number, got {given!r}.") from None
     if math.isnan(number) or (math.isinf(number) and not infinite):
         raise RobotError(f"{what} must be finite, got {number:g}.")
+    if number < least:
+        raise RobotError(f"{what} must not be negative, got {number:g}.")
     return number

@@ -111,21 +111,16 @@ def human(
         inertia=(1.0 - legs) * mass * (segments["trunk"].gyration * length) ** 2,
         center_of_mass=(0.0, segments["trunk"].center * length),
     )
+    middle = (segments["foot"].center * _FOOT - _HEEL) * height
+    joints = (
+        ("hip", "thigh", thigh, (0.0, -segments["thigh"].center * thigh)),
+        ("knee", "shank", shank, (0.0, -segments["shank"].center * shank)),
+        ("ankle", "foot", _FOOT * height, (middle, -0.5 * ankle)),
+    )
     for side in ("right", "left"):
-        upper = trunk
-        place = (0.0, 0.0)
-        for joint, name, length, center in (
-            ("hip", "thigh", thigh, (0.0, -segments["thigh"].center * thigh)),
-            ("knee", "shank", shank, (0.0, -segments["shank"].center * shank)),
-            (
-                "ankle",
-                "foot",
-                _FOOT * height,
-                ((segments["foot"].center * _FOOT - _HEEL) * height, -0.5 * ankle),
-            ),
-        ):
-            segment = segments[name]
-            low, high = _LIMITS[joint]
+        upper, place = trunk, (0.0, 0.0)
+        for joint, name, length, center in joints:
+            segment, (low, high) = segments[name], _LIMITS[joint]
             upper = body.hinge(
                 f"{side}_{joint}",
                 upper,

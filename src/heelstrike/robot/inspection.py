@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import enum
+import math
 import os
 import warnings
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.assembly import UNLIKELY, link_origins
+from heelstrike.robot.assembly import DIFFERENT, UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions, Options
@@ -21,7 +21,12 @@ from heelstrike.robot.files.saving import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
-from heelstrike.robot.plausibility import Unlikely, is_possible, unlikely_numbers
+from heelstrike.robot.plausibility import (
+    Finding,
+    FindingKind,
+    is_possible,
+    unlikely_numbers,
+)
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.symmetry import find_mirror
 from heelstrike.robot.warning import RobotWarning
@@ -31,39 +36,6 @@ SAME_HEIGHT = 1e-4
 
 ROUND_OFF = 1e-12
 """Metres, of sums along a leg."""
-
-
-class FindingKind(enum.Enum):
-    """What is wrong with a robot."""
-
-    ASYMMETRY = "left and right differ"
-    INERTIA = "impossible inertia"
-    MASS = "mass missing"
-    FRICTION = "feet of different friction"
-    CONTACT = "contact points above the sole"
-    FOOT = "feet"
-    LIMIT = "limits"
-    UNIT = "units"
-    FILE = "said by the reader"
-
-
-@dataclass(frozen=True)
-class Finding:
-    """One thing that looks wrong.
-
-    Attributes
-    ----------
-    kind : FindingKind
-        What it is about.
-    message : str
-        What was found, where, with the numbers.
-    """
-
-    kind: FindingKind
-    message: str
-
-    def __str__(self) -> str:
-        return f"{self.kind.value}: {self.message}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,38 +114,35 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
     if isinstance(robot, Robot):
         Options(**how)  # which says what is wrong with them
         return Inspection(robot.source or robot.name, robot, tuple(_of_robot(robot)))
-    findings: list[Finding] = []
     path = _file(robot)
-    loadable = True
+    findings: list[Finding] = []
+    refused: RobotError | None = None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", RobotWarning)
-        found: Robot | None = None
         try:
-            found = load_robot(robot, **how)
+            found: Robot | None = load_robot(robot, **how)
         except RobotError as error:
             if path is None:
                 raise
-            loadable = False
+            refused, found = error, None
+        if path is not None:
             findings += _of_inertias(path)
+        if refused is not None and path is not None:
             try:
                 found = read_mjcf(path, lenient=True, **how)
             except RobotError as still:
                 findings.append(Finding(FindingKind.FILE, str(still)))
             if not findings:
-                raise error from None
-        else:
-            if path is not None:
-                findings += _of_inertias(path)
+                raise refused
     said = dict.fromkeys(str(one.message) for one in caught if one.category is RobotWarning)
-    told_below = ("left and right differ", UNLIKELY)
     findings += [
         Finding(FindingKind.FILE, words)
         for words in said
-        if not any(phrase in words for phrase in told_below)
+        if not any(told in words for told in (DIFFERENT, UNLIKELY))  # told below
     ]
     if found is not None:
         findings += _of_robot(found)
-    return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), loadable)
+    return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), refused is None)
 
 
 def _file(robot: str | os.PathLike[str]) -> Path | None:
@@ -204,23 +173,14 @@ def _of_inertias(path: Path) -> Iterator[Finding]:
 
 
 def _of_robot(robot: Robot) -> Iterator[Finding]:
-    yield from _asymmetries(robot)
+    names = robot.joint_names, robot.link_names
+    _, differences = find_mirror(robot.model, *names, robot.feet)
+    yield from (Finding(FindingKind.ASYMMETRY, difference) for difference in differences)
     yield from _missing_masses(robot)
-    yield from _numbers(robot)
+    yield from unlikely_numbers(robot.model, link_origins(robot.model), *names)
     yield from _ranges(robot)
     yield from _frictions(robot)
     yield from _soles(robot)
-
-
-def _asymmetries(robot: Robot) -> Iterator[Finding]:
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", RobotWarning)
-        find_mirror(robot.model, robot.joint_names, robot.link_names, robot.feet, robot.name)
-    for one in caught:
-        _, _, words = str(one.message).partition("no mirror image: ")
-        differences, _, _ = words.partition(". Gaits")
-        for difference in differences.split("; "):
-            yield Finding(FindingKind.ASYMMETRY, difference)
 
 
 def _missing_masses(robot: Robot) -> Iterator[Finding]:
@@ -287,21 +247,6 @@ def _bottoms(robot: Robot) -> Floats:
     points[:, 1] -= model.contact_radius
     points[np.abs(points) < ROUND_OFF] = 0.0
     return points
-
-
-_ABOUT = {
-    Unlikely.INERTIA: FindingKind.INERTIA,
-    Unlikely.LIMIT: FindingKind.LIMIT,
-    Unlikely.UNIT: FindingKind.UNIT,
-}
-
-
-def _numbers(robot: Robot) -> Iterator[Finding]:
-    found = unlikely_numbers(
-        robot.model, link_origins(robot.model), robot.joint_names, robot.link_names
-    )
-    for about, words in found:
-        yield Finding(_ABOUT[about], words)
 
 
 def _ranges(robot: Robot) -> Iterator[Finding]:
@@ -388,14 +333,11 @@ def _tree(robot: Robot) -> Iterator[tuple[int, str]]:
         joint, lead, below = stack.pop()
         yield joint, lead
         own = children.get(joint, [])
-        for place, child in reversed(list(enumerate(own))):
+        for child in reversed(own):
+            branch, line = ("└ ", "  ") if child == own[-1] else ("├ ", "│ ")
             if len(own) == 1:
-                stack.append((child, below, below))  # a chain needs no lines
-            else:
-                last = place == len(own) - 1
-                stack.append(
-                    (child, below + ("└ " if last else "├ "), below + ("  " if last else "│ "))
-                )
+                branch = line = ""  # a chain needs no lines
+            stack.append((child, below + branch, below + line))
 
 
 _MORE = {"stiffness": "spring", "speed_limit": "speed"}
@@ -453,32 +395,26 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         return result
     model = robot.model
 
-    def numbers(values: Floats) -> list[Any]:
-        plain = np.where(np.isfinite(values), values, np.nan).tolist()
-        return [None if value != value else value for value in plain]
-
     of_joints = {
-        name: numbers(getattr(model, name))
+        name: [value if math.isfinite(value) else None for value in getattr(model, name).tolist()]
         for name, number in NUMBERS.items()
         if number.shape in (("nq",), ("nv",), ("nu",)) and number.kind is float
     }
-    return (
-        result
-        | {
-            "name": robot.name,
-            "mass_kg": robot.total_mass,
-            "floating": robot.floating,
-            "symmetric": robot.mirror is not None,
-            "coordinates": list(robot.joint_names),
-            "links": list(robot.link_names),
-            "parent": model.parent.tolist(),
-            "link_mass_kg": model.mass.tolist(),
-            "link_inertia_kg_m2": model.inertia.tolist(),
-            "link_center_of_mass_m": model.center_of_mass.tolist(),
-            "actuators": list(robot.actuator_names),
-            "contact_points": list(robot.contact_names),
-            "feet": [foot.name for foot in robot.feet],
-            "locked": [asdict(one) for one in robot.locked],
-        }
-        | of_joints
-    )
+    return {
+        **result,
+        "name": robot.name,
+        "mass_kg": robot.total_mass,
+        "floating": robot.floating,
+        "symmetric": robot.mirror is not None,
+        "coordinates": list(robot.joint_names),
+        "links": list(robot.link_names),
+        "parent": model.parent.tolist(),
+        "link_mass_kg": model.mass.tolist(),
+        "link_inertia_kg_m2": model.inertia.tolist(),
+        "link_center_of_mass_m": model.center_of_mass.tolist(),
+        "actuators": list(robot.actuator_names),
+        "contact_points": list(robot.contact_names),
+        "feet": [foot.name for foot in robot.feet],
+        "locked": [asdict(one) for one in robot.locked],
+        **of_joints,
+    }

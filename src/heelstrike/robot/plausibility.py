@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,12 +24,37 @@ FEW_TURNS = (4.0 * np.pi, 720.0)
 """Limits of a hinge that look like degrees where radians are meant."""
 
 
-class Unlikely(enum.Enum):
-    """What an unlikely number is about."""
+class FindingKind(enum.Enum):
+    """What is wrong with a robot."""
 
-    INERTIA = "inertia"
-    LIMIT = "limit"
-    UNIT = "unit"
+    ASYMMETRY = "left and right differ"
+    INERTIA = "impossible inertia"
+    MASS = "mass missing"
+    FRICTION = "feet of different friction"
+    CONTACT = "contact points above the sole"
+    FOOT = "feet"
+    LIMIT = "limits"
+    UNIT = "units"
+    FILE = "said by the reader"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that looks wrong.
+
+    Attributes
+    ----------
+    kind : FindingKind
+        What it is about.
+    message : str
+        What was found, where, with the numbers.
+    """
+
+    kind: FindingKind
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.kind.value}: {self.message}"
 
 
 def is_possible(tensor: Floats) -> bool:
@@ -41,7 +67,7 @@ def is_possible(tensor: Floats) -> bool:
 
 def unlikely_numbers(
     model: Model, origin: Floats, joint_names: Sequence[str], link_names: Sequence[str]
-) -> Iterator[tuple[Unlikely, str]]:
+) -> Iterator[Finding]:
     """Find numbers that no robot is likely to have.
 
     Parameters
@@ -72,47 +98,45 @@ def _extent(model: Model, origin: Floats) -> float:
     return float(np.ptp(points, axis=0).max()) if len(points) else 0.0
 
 
-def _units(model: Model, origin: Floats) -> Iterator[tuple[Unlikely, str]]:
+def _units(model: Model, origin: Floats) -> Iterator[Finding]:
     size = _extent(model, origin)
     mass = float(model.mass.sum())
     gravity = float(np.hypot(*model.gravity))
     if size > LARGEST_EXTENT:
-        yield Unlikely.UNIT, f"the robot measures {size:.4g} m. Millimetres for metres?"
+        yield Finding(FindingKind.UNIT, f"the robot measures {size:.4g} m. Millimetres for metres?")
     # Links reach beyond their centres of mass, so that the robot may be twice as large.
     if np.count_nonzero(model.mass) > 2 and 0.0 < (2.0 * size) ** 3 * LARGEST_DENSITY < mass:
-        yield (
-            Unlikely.UNIT,
+        yield Finding(
+            FindingKind.UNIT,
             f"the robot weighs {mass:.4g} kg and measures {size:.3g} m, more than a cube of water "
             "of twice that size. Grams for kilograms?",
         )
     if gravity > LARGEST_GRAVITY:
-        yield Unlikely.UNIT, f"gravity is {gravity:.4g} m/s². Which unit?"
+        yield Finding(FindingKind.UNIT, f"gravity is {gravity:.4g} m/s². Which unit?")
 
 
-def _inertias(
-    model: Model, origin: Floats, link_names: Sequence[str]
-) -> Iterator[tuple[Unlikely, str]]:
+def _inertias(model: Model, origin: Floats, link_names: Sequence[str]) -> Iterator[Finding]:
     size = _extent(model, origin)
     if size == 0.0:
         return
     for link in np.flatnonzero(model.mass > 0.0):
         gyration = math.sqrt(model.inertia[link] / model.mass[link])
         if gyration > 2.0 * size:
-            yield (
-                Unlikely.INERTIA,
+            yield Finding(
+                FindingKind.INERTIA,
                 f"link {link_names[int(link)]!r} has the radius of gyration {gyration:.3g} m, more "
                 f"than twice the robot's extent of {size:.3g} m. Is its inertia in kg m²?",
             )
 
 
-def _limits(model: Model, joint_names: Sequence[str]) -> Iterator[tuple[Unlikely, str]]:
+def _limits(model: Model, joint_names: Sequence[str]) -> Iterator[Finding]:
     for joint, name in enumerate(joint_names):
         farthest = max(
             (abs(end) for end in (model.lower[joint], model.upper[joint]) if np.isfinite(end)),
             default=0.0,
         )
         if model.axis[joint, 0] and FEW_TURNS[0] < farthest < FEW_TURNS[1]:
-            yield (
-                Unlikely.LIMIT,
+            yield Finding(
+                FindingKind.LIMIT,
                 f"{name} may turn {farthest / (2 * np.pi):.3g} times around. Degrees for radians?",
             )

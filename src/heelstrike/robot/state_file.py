@@ -6,18 +6,14 @@ is what was saved, bit by bit, on every machine.
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from heelstrike.errors import RobotError, WriteError
-from heelstrike.json_checksum import read_json, require_unchanged, shown, with_checksum
+from heelstrike.json_checksum import json_text, reading_json, shown
 from heelstrike.robot.coordinates import checked
-from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
 
@@ -32,49 +28,27 @@ _VECTORS = ("position_rad_or_m", "velocity_rad_or_m_per_s")
 def save_state(robot: Robot, state: State, path: str | os.PathLike[str]) -> Path:
     """Write a state to a JSON file; see :meth:`Robot.save_state`."""
     state = checked(robot, state)
-    data = {
-        "format": "heelstrike state",
-        "version": VERSION,
+    entries = {
         "robot": robot.name,
         "joints": list(robot.joint_names),
         _VECTORS[0]: state.q.tolist(),
         _VECTORS[1]: state.v.tolist(),
     }
     try:
-        text = json.dumps(with_checksum(data), indent=2, ensure_ascii=False)
-        return write_whole(path, text + "\n")
+        return write_whole(path, json_text("state", VERSION, entries))
     except WriteError as error:
         raise RobotError(str(error)) from error
 
 
 def load_state(robot: Robot, path: str | os.PathLike[str]) -> State:
     """Read a state from a JSON file; see :meth:`Robot.load_state`."""
-    data = read_json(path, "state", (VERSION,), RobotError)
-    joints = data.get("joints")
-    if not isinstance(joints, list) or not all(isinstance(name, str) for name in joints):
-        raise RobotError(f'{path}: "joints" must be a list of names, got {shown(joints)}.')
-    if sorted(joints) != sorted(robot.joint_names):
-        raise RobotError(
-            f"{path}: this is a state of robot {shown(data.get('robot'))} with the joints "
-            f"{', '.join(joints)[:300]}; robot {robot.name!r} has {', '.join(robot.joint_names)}."
-        )
-    order = [joints.index(name) for name in robot.joint_names]
-    q, v = (_numbers(path, data, key, len(joints))[order] for key in _VECTORS)
-    require_unchanged(path, data, RobotError)
-    return State(q, v)
-
-
-def _numbers(path: str | os.PathLike[str], data: dict[str, Any], key: str, size: int) -> Floats:
-    values = data.get(key)
-    if (
-        not isinstance(values, list)
-        or len(values) != size
-        or not all(
-            isinstance(value, int | float)
-            and not isinstance(value, bool)
-            and abs(value) <= sys.float_info.max  # also of whole numbers, and no NaN
-            for value in values
-        )
-    ):
-        raise RobotError(f'{path}: "{key}" must be a list of {size} finite numbers.')
-    return np.array(values, dtype=np.float64)
+    with reading_json(path, "state", (VERSION,), sys.float_info.max, RobotError) as entries:
+        joints = entries.names("joints")
+        if sorted(joints) != sorted(robot.joint_names):
+            raise RobotError(
+                f"this is a state of robot {shown(entries.data.get('robot'))} with the joints "
+                f"{', '.join(joints)[:300]}; robot {robot.name!r} has "
+                f"{', '.join(robot.joint_names)}."
+            )
+        order = [joints.index(name) for name in robot.joint_names]
+        return State(*(entries.numbers(key, len(joints))[order] for key in _VECTORS))

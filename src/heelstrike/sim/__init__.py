@@ -28,6 +28,7 @@ from heelstrike.sim.frame import DIVERGED as DIVERGED
 from heelstrike.sim.frame import DONE as DONE
 from heelstrike.sim.frame import SOLVER_FAILED as SOLVER_FAILED
 from heelstrike.sim.frame import Kernels
+from heelstrike.sim.frame import Scene as Scene
 from heelstrike.sim.memory import Memory as Memory
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push

@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, field
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,23 +28,24 @@ from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.frame import compiled_loop
-from heelstrike.sim.memory import Memory, allocate_memory
+from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push, pushes_on
-from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.size import check_runs
-from heelstrike.sim.run import Run, Timing
+from heelstrike.sim.run import COUNTS, WORST, Run, Timing
 from heelstrike.sim.setting import Setting, checked_setting
-from heelstrike.sim.simulation import check_duration, checked_method, simulation_to_the_end
+from heelstrike.sim.simulation import (
+    Ending,
+    check_duration,
+    checked_method,
+    simulation_to_the_end,
+)
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 NO_ROWS = 2**62
 """Steps between two rows of runs that are not recorded: more than any run has."""
-
-
-NOT_BEGUN = "interrupted before it began"
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,76 +233,86 @@ def simulate_batch(
     workers = (os.cpu_count() or 1) if threads is None else threads
     if workers < 1:
         raise SimulationError(f"threads must be at least 1, got {threads}")
-    entries = {
-        "robot": _listed(robot),
-        "controller": _listed(controller),
-        "state": _states(state),
-        "duration": _durations(duration),
-        "parameters": _parameters(parameters),
-        "pushes": _pushes(pushes),
-        "ground": _listed(ground),
-    }
-    count = _number_of_runs(entries)
-    every = {name: _Entries(values) for name, values in entries.items()}
-    _check_robots(entries["robot"])
+    asked = _one_a_run(
+        robot=_listed(robot),
+        controller=_listed(controller),
+        state=_states(state),
+        duration=_durations(duration),
+        parameters=_parameters(parameters),
+        pushes=_pushes(pushes),
+        ground=_listed(ground),
+    )
+    _check_robots([each["robot"] for each in asked])
     method = checked_method(method)
-
-    def setting_of(index: int) -> Setting:
-        with _naming(index, count):
-            setting = checked_setting(
-                every["robot"][index],
-                every["state"][index],
-                ground=every["ground"][index],
-                control_period=control_period,
-                record_every=NO_ROWS if record_every is None else record_every,
-                stop_when_fallen=stop_when_fallen,
-                pushes=every["pushes"][index],
-            )
-            check_duration(every["duration"][index])
-            method.check(setting)
-            method.check_span(setting, every["duration"][index])
-            method.set_clock(setting, Clock())
-            return setting
-
-    laws = _Entries([_law(each) for each in entries["controller"]])
-
-    def law_at(index: int) -> Law:
-        law: Law = laws[index]
-        numbers = every["parameters"][index]
-        with _naming(index, count):
-            if isinstance(numbers, Mapping):
-                try:
-                    numbers = law.parameters.replaced(**numbers)
-                except TypeError as error:
-                    raise SimulationError(f"parameters: {error}") from error
-            law = law if numbers is None else law.with_parameters(numbers)
-            law.numbers(every["robot"][index])
-        return law
-
-    settings = [setting_of(index) for index in range(count)]
-    durations = [every["duration"][index] for index in range(count)]
-    chosen = [law_at(index) for index in range(count)]
+    setup: dict[str, Any] = {
+        "control_period": control_period,
+        "record_every": NO_ROWS if record_every is None else record_every,
+        "stop_when_fallen": stop_when_fallen,
+    }
+    laws = {id(each): _law(each) for each in _listed(controller)}
+    tasks = []
+    for index, each in enumerate(asked):
+        with _naming(index, len(asked)):
+            tasks.append(_task(method, laws[id(each["controller"])], setup, **each))
     if record_every is not None:
-        rows = sum(method.rows_in(duration, record_every) for duration in durations)
-        check_runs(entries["robot"][0], rows, count, record_every)
+        rows = sum(method.rows_in(task.duration, record_every) for task in tasks)
+        check_runs(tasks[0].setting.robot, rows, len(tasks), record_every)
     _, compile_s = compiled_loop(method.kernels, method.work)
-    for law in chosen:
-        law.function.finish()
-    crew = _Crew(settings, durations, method, chosen, recorded=record_every is not None)
-    with _shown(progress, count) as show:
-        crew.work(min(workers, count), show)
-    timing = Timing(compile_s, perf_counter() - begin - compile_s)
-    return crew.batch(min(workers, count), timing)
+    for task in tasks:
+        task.law.function.finish()
+    crew = _Crew(tasks, method, recorded=record_every is not None)
+    threads = min(workers, len(tasks))
+    with _shown(progress, len(tasks)) as show:
+        crew.work(threads, show)
+    return crew.batch(threads, Timing(compile_s, perf_counter() - begin - compile_s))
 
 
-class _Entries:
-    """The entries of an argument: as many as there are runs, or one for all."""
+class _Task(NamedTuple):
+    """One run of a batch."""
 
-    def __init__(self, values: Sequence[Any]) -> None:
-        self._values = values
+    setting: Setting
+    law: Law
+    duration: float
 
-    def __getitem__(self, index: int) -> Any:
-        return self._values[index if len(self._values) > 1 else 0]
+
+def _task(
+    method: Method, law: Law, setup: dict[str, Any], *, robot: Robot, state: State, duration: float,
+    parameters: Any, **about: Any,
+) -> _Task:  # fmt: skip
+    """Check what one run is to be."""
+    about.pop("controller")
+    setting = checked_setting(robot, state, **setup, **about)
+    check_duration(duration)
+    method.check(setting)
+    method.check_span(setting, duration)
+    method.set_clock(setting, Clock())
+    if isinstance(parameters, Mapping):
+        try:
+            parameters = law.parameters.replaced(**parameters)
+        except TypeError as error:
+            raise SimulationError(f"parameters: {error}") from error
+    law = law if parameters is None else law.with_parameters(parameters)
+    law.numbers(robot)
+    return _Task(setting, law, duration)
+
+
+def _one_a_run(**entries: Sequence[Any]) -> list[dict[str, Any]]:
+    """Return the arguments of each run, where those with one entry are for all."""
+    sizes = {name: len(values) for name, values in entries.items()}
+    for name, size in sizes.items():
+        if size == 0:
+            raise SimulationError(f"{name} is empty: there is nothing to simulate")
+    several = {name: size for name, size in sizes.items() if size > 1}
+    if len(set(several.values())) > 1:
+        described = ", ".join(f"{name} for {size}" for name, size in several.items())
+        raise SimulationError(
+            f"the arguments are for different numbers of runs: {described}. Each must have one "
+            "entry for all runs, or as many as the others"
+        )
+    return [
+        {name: values[index % len(values)] for name, values in entries.items()}
+        for index in range(max(sizes.values()))
+    ]
 
 
 def _listed(value: Any) -> Sequence[Any]:
@@ -375,21 +386,6 @@ def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
     )
 
 
-def _number_of_runs(entries: dict[str, Sequence[Any]]) -> int:
-    sizes = {name: len(values) for name, values in entries.items()}
-    for name, size in sizes.items():
-        if size == 0:
-            raise SimulationError(f"{name} is empty: there is nothing to simulate")
-    several = {name: size for name, size in sizes.items() if size > 1}
-    if len(set(several.values())) > 1:
-        described = ", ".join(f"{name} for {size}" for name, size in several.items())
-        raise SimulationError(
-            f"the arguments are for different numbers of runs: {described}. Each must have one "
-            "entry for all runs, or as many as the others"
-        )
-    return max(several.values(), default=1)
-
-
 def _check_robots(robots: Sequence[Any]) -> None:
     for index, robot in enumerate(robots):
         if not isinstance(robot, Robot):
@@ -450,36 +446,14 @@ def _shown(
 class _Crew:
     """Threads that take one run after the other."""
 
-    def __init__(
-        self,
-        settings: list[Setting],
-        durations: Sequence[float],
-        method: Method,
-        laws: Sequence[Law],
-        *,
-        recorded: bool,
-    ) -> None:
-        self._settings, self._durations, self._method = settings, durations, method
-        self._laws = laws
-        self._recorded = recorded
+    def __init__(self, tasks: Sequence[_Task], method: Method, *, recorded: bool) -> None:
+        self._tasks, self._method, self._recorded = tasks, method, recorded
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._why = ""
         self._next = 0
         self._done = 0
-        count = len(settings)
-        robot = settings[0].robot
-        self._count = count
-        self._runs: list[Run | None] = [None] * count
-        self._q = np.array([setting.state.q for setting in settings]).reshape(count, robot.nq)
-        self._v = np.array([setting.state.v for setting in settings]).reshape(count, robot.nv)
-        self._time = np.zeros(count)
-        self._status = [RunStatus.INTERRUPTED] * count
-        self._message = [NOT_BEGUN] * count
-        self._tally = np.zeros((count, 2), dtype=np.int64)
-        self._events = np.zeros((count, len(EventKind)), dtype=np.int64)
-        self._extreme = np.zeros((count, 4))
-        self._counters = np.zeros((count, 4), dtype=np.int64)
+        self._endings = [_not_begun(task.setting.state) for task in tasks]
 
     def work(self, threads: int, show: Callable[[int, int], None]) -> None:
         """Simulate everything; Ctrl-C ends the runs at work and leaves the others."""
@@ -499,7 +473,7 @@ class _Crew:
     def _show(self, show: Callable[[int, int], None]) -> None:
         """Show how far it is; what that raises ends all runs, unless all have ended."""
         try:
-            show(self._done, self._count)
+            show(self._done, len(self._tasks))
         except KeyboardInterrupt:
             raise
         except BaseException as error:
@@ -508,14 +482,14 @@ class _Crew:
 
     def _take_runs(self) -> None:
         """Work of one thread, which allocates memory once for all of its runs, if they allow it."""
-        memory = fresh = robot = record = None
+        memory = fresh = robot = None
         while not self._stop.is_set():
             with self._lock:
                 index = self._next
                 self._next += 1
-            if index >= self._count:
+            if index >= len(self._tasks):
                 return
-            setting = self._settings[index]
+            setting, law, duration = self._tasks[index]
             # Straight-line code, dry joints and sizes of the memory are those of its robot.
             if (
                 memory is None
@@ -526,65 +500,46 @@ class _Crew:
                 robot = setting.robot
                 memory = allocate_memory(robot, setting.pushes)
                 fresh = deepcopy(memory)
-                record = None
             else:
                 memory.become(fresh)
                 memory.pushes.become(pushes_on(robot, setting.pushes))
-            record = self._simulate(index, setting, memory, record)
+            self._endings[index] = simulation_to_the_end(
+                setting, self._method, law, duration,
+                memory=memory, keep_rows=self._recorded, stopped=self._stop.is_set,
+            )  # fmt: skip
             with self._lock:
                 self._done += 1
 
-    def _simulate(
-        self, index: int, setting: Setting, memory: Memory, record: Record | None
-    ) -> Record | None:
-        """Simulate one run; return its record if the next may use it."""
-        ending = simulation_to_the_end(
-            setting, self._method, self._laws[index], self._durations[index],
-            memory=memory, record=record, keep_rows=self._recorded, stopped=self._stop.is_set,
-        )  # fmt: skip
-        self._q[index] = ending.state.q
-        self._v[index] = ending.state.v
-        self._time[index] = ending.time
-        self._status[index] = ending.status
-        self._message[index] = ending.message
-        if ending.status is RunStatus.INTERRUPTED:
-            self._message[index] += self._why
-        tally, solver = memory.tally, memory.solver.tally
-        self._tally[index] = tally.steps, tally.saturations
-        self._extreme[index] = (
-            tally.penetration, tally.complementarity, tally.cone, tally.non_penetration,
-        )  # fmt: skip
-        self._counters[index] = (
-            solver.solves, solver.shortcuts, solver.fallbacks, solver.failures,
-        )  # fmt: skip
-        self._runs[index] = ending.run
-        self._events[index] = ending.events
-        return ending.record
-
     def batch(self, threads: int, timing: Timing) -> Batch:
         """Return what came out."""
-        if self._why and RunStatus.INTERRUPTED not in self._status:
+        endings = self._endings
+        interrupted = [ending.status is RunStatus.INTERRUPTED for ending in endings]
+        if self._why and not any(interrupted):
             warnings.warn(f"all runs ended{self._why}", stacklevel=3)
+        count = len(endings)
+        columns = {
+            name: np.array([ending.counts[name] for ending in endings])
+            for name in endings[0].counts
+        }
         return Batch(
-            position=self._q,
-            velocity=self._v,
-            time=self._time,
-            status=tuple(self._status),
+            position=np.array([ending.state.q for ending in endings]).reshape(count, -1),
+            velocity=np.array([ending.state.v for ending in endings]).reshape(count, -1),
+            time=np.array([ending.time for ending in endings]),
+            status=tuple(ending.status for ending in endings),
             message=tuple(
-                text + self._why if text == NOT_BEGUN else text for text in self._message
+                ending.message + (self._why if stopped else "")
+                for ending, stopped in zip(endings, interrupted, strict=True)
             ),
-            steps=self._tally[:, 0].copy(),
-            saturations=self._tally[:, 1].copy(),
-            events=self._events,
-            penetration=self._extreme[:, 0].copy(),
-            complementarity=self._extreme[:, 1].copy(),
-            cone=self._extreme[:, 2].copy(),
-            non_penetration=self._extreme[:, 3].copy(),
-            solves=self._counters[:, 0].copy(),
-            shortcuts=self._counters[:, 1].copy(),
-            fallbacks=self._counters[:, 2].copy(),
-            failures=self._counters[:, 3].copy(),
+            events=np.array([ending.events for ending in endings]),
+            **columns,
             threads=threads,
             timing=timing,
-            _runs=tuple(self._runs) if self._recorded else None,
+            _runs=tuple(ending.run for ending in endings) if self._recorded else None,
         )
+
+
+def _not_begun(state: State) -> Ending:
+    counts = dict.fromkeys(COUNTS, 0) | dict.fromkeys(WORST, 0.0)
+    events = np.zeros(len(EventKind), dtype=np.int64)
+    message = "interrupted before it began"
+    return Ending(RunStatus.INTERRUPTED, message, state, 0.0, events, counts, None)

@@ -20,11 +20,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba import types
 
-from heelstrike.compiler.compilation import loop_for
+from heelstrike.compiler.compilation import dissolved_kernel, loop_for
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.solvers.certified_solve import try_solvers
 from heelstrike.robot.model import Model
@@ -66,6 +66,22 @@ BAD_CONTROLLER = int(Outcome.BAD_CONTROLLER)
 FORK = int(Outcome.FORK)
 
 
+class Scene(NamedTuple):
+    """What a motion hangs on and no method changes: who decides the torques, robot and ground.
+
+    Attributes
+    ----------
+    controller : function
+        To be asked by :func:`~heelstrike.sim.controller.asking.ask`.
+    model : Model
+    ground : GroundModel
+    """
+
+    controller: Any
+    model: Model
+    ground: GroundModel
+
+
 @dataclass(frozen=True)
 class Kernels:
     """What a method supplies to the frame; ``work`` is the bundle of the method.
@@ -79,13 +95,13 @@ class Kernels:
         ``prepare(model, ground, memory, work)``: find kinematics, velocities and contacts of the
         state in ``memory.q`` and ``memory.v``.
     decide : kernel
-        ``decide(controller, control, model, ground, memory, work, record, clock)``: decide what
+        ``decide(scene, control, memory, work, record, clock)``: decide what
         acts from now on; returns ``DONE`` or what is in the way.
     report : kernel
-        ``report(controller, control, model, ground, memory, work, record, clock)``: append to the
+        ``report(scene, control, memory, work, record, clock)``: append to the
         record what is due of this instant.
     move : kernel
-        ``move(controller, control, model, ground, memory, work, record, clock)``: bring state and
+        ``move(scene, control, memory, work, record, clock)``: bring state and
         ``clock.time`` to the next instant; returns ``DONE`` or what is in the way. After
         ``RECORD_FULL`` or ``FORK`` it is called again.
     """
@@ -97,6 +113,21 @@ class Kernels:
     move: Callable[..., int]
 
 
+@dissolved_kernel
+def is_full(record: Record, clock: Clock) -> bool:
+    """Whether there may be no room for what an instant adds to the record."""
+    rows = record.rows + clock.row_margin > record.time.shape[0]
+    return bool(rows or record.events + clock.event_margin > record.event_time.shape[0])
+
+
+@dissolved_kernel
+def is_due(clock: Clock) -> bool:
+    """Whether the controller is to be asked."""
+    if clock.control_every > 0:
+        return bool(clock.calls == 0 or clock.index % clock.control_every == 0)
+    return bool(clock.time >= clock.calls * clock.control_period)
+
+
 def frame(kernels: Kernels) -> Callable[..., int]:
     """Return the loop of a method."""
     begin, prepare, decide = kernels.begin, kernels.prepare, kernels.decide
@@ -104,20 +135,18 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 
     def advance(
         controller: Any,
-        control: Control,
         model: Model,
         ground: GroundModel,
+        control: Control,
         memory: Memory,
         work: Any,
         record: Record,
         clock: Clock,
     ) -> int:
         """Advance a simulation until its time is up or something stops it; return what."""
+        scene = Scene(controller, model, ground)
         while True:
-            if (
-                record.rows + clock.row_margin > record.time.shape[0]
-                or record.events + clock.event_margin > record.event_time.shape[0]
-            ):
+            if is_full(record, clock):
                 return RECORD_FULL
             if clock.begun == 0:
                 code = begin(model, ground, memory, work, record)
@@ -133,32 +162,27 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 if not sound(memory):
                     return DIVERGED
                 prepare(model, ground, memory, work)
-                due = clock.time >= clock.calls * clock.control_period
-                if clock.control_every > 0:
-                    due = clock.calls == 0 or clock.index % clock.control_every == 0
-                if due:
+                if is_due(clock):
                     if control.in_python == 0:
-                        ask(
-                            controller, control, clock.time, memory.q, memory.v, model, memory,
-                            memory.torque,
-                        )  # fmt: skip
+                        q, v, torque = memory.q, memory.v, memory.torque
+                        ask(controller, clock.time, q, v, model, memory, control, torque)
                     elif clock.answered == 0:
                         return ASKING
                     clock.answered = 0
                     clock.calls += 1
                     if not limit_torque(model, memory):
                         return BAD_CONTROLLER
-                code = decide(controller, control, model, ground, memory, work, record, clock)
+                code = decide(scene, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
-                    report(controller, control, model, ground, memory, work, record, clock)
+                    report(scene, control, memory, work, record, clock)
                 if code != DONE:
                     return code
-                if center_height(model, ground, memory) < clock.fallen_height:
+                if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
                     return FELL
                 if clock.finishing == 1:
                     return DONE
                 clock.moving = 1
-            code = move(controller, control, model, ground, memory, work, record, clock)
+            code = move(scene, control, memory, work, record, clock)
             if code != DONE:
                 return code
             clock.moving = 0
@@ -171,7 +195,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
 def compiled_loop(kernels: Kernels, work: Any) -> tuple[Any, float]:
     """Compile the loop of a method, or load it; return it with the seconds that took."""
     begin = perf_counter()
-    kinds = (Control, Model, GroundModel, Memory, work, Record, Clock)
+    kinds = (Model, GroundModel, Control, Memory, work, Record, Clock)
     signature = types.int64(CONTROLLER_TYPE, *(kind.compiled_type() for kind in kinds))
     try_solvers.begin()
     compiled = loop_for(signature, frame(kernels))

@@ -49,8 +49,167 @@ class Tally(Bundle):
     non_penetration: float = cell(float)
 
 
+class Equations(Bundle):
+    """The equations of motion of a state, and what their mass matrix is solved with.
+
+    A short robot's programs leave a factor of the mass matrix behind, a long one's loops
+    articulated bodies; see :mod:`heelstrike.sim.contacts.straight_line`.
+
+    Attributes
+    ----------
+    tree : Workspace
+        Kinematics.
+    bias : (nv,) float
+        Bias force H.
+    mass_matrix, factor : (nv, nv) float
+        Mass matrix and its factor.
+    added : (nv,) float
+        What an implicit scheme adds to the diagonal of the mass matrix.
+    bodies : ArticulatedBodies
+        What the loops solve with instead of the factor.
+    programs : (5,) int
+        Addresses of straight-line code, zero for none.
+    force, rate : (nv,) float
+        Generalised force without contact, and what it comes to; scratch.
+    """
+
+    tree: Workspace = part(Workspace)
+    bias: Floats = array("nv")
+    mass_matrix: Floats = array("nv", "nv")
+    factor: Floats = array("nv", "nv")
+    added: Floats = array("nv")
+    bodies: ArticulatedBodies = part(ArticulatedBodies)
+    programs: Integers = array("programs", of=int, address=True)
+    force: Floats = array("nv")
+    rate: Floats = array("nv")
+
+
+class Surface(Bundle):
+    """What the ground is like under each contact.
+
+    Attributes
+    ----------
+    friction, restitution : (capacity,) float
+        Of contact points; zero for the joint stops after them, and friction 1 for the dry joints
+        after these.
+    """
+
+    friction: Floats = array("capacity")
+    restitution: Floats = array("capacity")
+
+
+class Assembly(Bundle):
+    """The contact problem of an instant, how it is put together, and its answer.
+
+    Attributes
+    ----------
+    candidate : (capacity,) int
+        Contact points that take part; after them joint stops, numbered on from nc: twice the joint,
+        plus one for its upper end; last dry joints. The capacity has room for all.
+    jacobian : (2 capacity, nv) float
+        Contact Jacobian of the candidates.
+    leaf : (capacity,) int
+        Link that each candidate acts on: only its joint and those before have a part in its rows.
+    root : (nv,) float
+    half : (nv, 2 capacity) float
+        D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
+    problem : ContactProblem
+        The contact problem of the candidates.
+    answer : ContactAnswer
+        Its solution.
+    solver : ContactWorkspace
+        Memory of the contact solvers.
+    """
+
+    candidate: Integers = array("capacity", of=int)
+    jacobian: Floats = array("2 capacity", "nv")
+    leaf: Integers = array("capacity", of=int)
+    root: Floats = array("nv")
+    half: Floats = array("nv", "2 capacity")
+    problem: ContactProblem = part(ContactProblem)
+    answer: ContactAnswer = part(ContactAnswer)
+    solver: ContactWorkspace = part(ContactWorkspace)
+
+
+class UsualPoints(Bundle):
+    """The contact points that straight-line programs are for, and what these work on.
+
+    Attributes
+    ----------
+    usual_problem : ContactProblem
+        The contact problem with the matrix of these points.
+    usual_points : (k,) int
+        Which they are.
+    usual_place : (nc,) int
+        Place of each contact point among them, -1 for none.
+    every_point : (nc,) int
+        All contact points.
+    point_rows : (2 k, nv) float
+        Scratch of the Delassus matrix.
+    point_velocity, point_impulse : (nc, 2) float
+        Velocities and impulses of contact points.
+    programs : (5,) int
+        Addresses of straight-line code, those of the equations of motion.
+    """
+
+    usual_problem: ContactProblem = part(ContactProblem)
+    usual_points: Integers = array("points", of=int)
+    usual_place: Integers = array("nc", of=int)
+    every_point: Integers = array("nc", of=int)
+    point_rows: Floats = array("2 points", "nv")
+    point_velocity: Floats = array("nc", "components")
+    point_impulse: Floats = array("nc", "components")
+    programs: Integers = array("programs", of=int, address=True)
+
+
+class Reaction(Bundle):
+    """What contacts and joints did in the last solve, beside the contact forces.
+
+    Attributes
+    ----------
+    slip : (nc,) float
+        Tangential velocity of each contact point at the end of the step.
+    mode : (capacity,) int
+        Contact mode, the guess of the next solve.
+    stop_torque, friction_torque : (nv,) float
+        Generalised forces of joint stops and of dry joint friction.
+    stop_mode : (nv, 2) int
+        Contact mode of each joint's lower and upper stop.
+    dry_mode : (nd,) int
+        Contact mode of each dry joint.
+    """
+
+    slip: Floats = array("nc")
+    mode: Integers = array("capacity", of=int)
+    stop_torque: Floats = array("nv")
+    friction_torque: Floats = array("nv")
+    stop_mode: Integers = array("nv", 2, of=int)
+    dry_mode: Integers = array("nd", of=int)
+
+
+class Reported(Bundle):
+    """The contact modes that events have told of.
+
+    Attributes
+    ----------
+    closed, slipping : (capacity,) int
+        Whether each contact point is on the ground, and whether it slips.
+    stopped : (nv,) int
+        Whether each joint pressed against a stop.
+    resting : (nd,) int
+        Whether each dry joint was at rest, -1 before the first report.
+    """
+
+    closed: Integers = array("capacity", of=int)
+    slipping: Integers = array("capacity", of=int)
+    stopped: Integers = array("nv", of=int)
+    resting: Integers = array("nd", of=int)
+
+
 class Memory(Bundle):
-    """State of a simulation and the scratch of its step.
+    """State of a simulation and all that its kernels write to, in the bundles that they receive.
+
+    Flat parts are stored under the names of their members: files do not know of the bundles.
 
     Attributes
     ----------
@@ -60,72 +219,25 @@ class Memory(Bundle):
         Velocity at the end of the step.
     torque : (nu,) float
         Joint torques of this step, within their limits.
-    force, rate, bias : (nv,) float
-        Generalised force without contact; scratch; bias force H.
     stiffness, damping : (nv,) float
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
-    mass_matrix, factor : (nv, nv) float
-        Mass matrix and its factor, for straight-line programs and compliant contact.
-    added : (nv,) float
-        What an implicit scheme adds to the diagonal of the mass matrix.
-    bodies : ArticulatedBodies
-        What the loops solve with instead of the factor; see
-        :mod:`heelstrike.sim.contacts.straight_line`.
-    tree : Workspace
-        Kinematics of the state now.
-    contacts : Contacts
-        Contact points now; their forces are those of the last solve.
-    friction, restitution : (capacity,) float
-        Coefficients of the ground under each contact point; zero for the joint stops after them,
-        and friction 1 for the dry joints after these.
-    slip : (nc,) float
-        Tangential velocity of each contact point at the end of the step.
-    mode : (capacity,) int
-        Contact mode found by the last solve, the guess of the next.
-    closed, slipping : (capacity,) int
-        Whether each contact point is on the ground, and whether it slips.
-    stop_torque : (nv,) float
-        Generalised force of the joint stops in the last solve.
-    stop_mode : (nv, 2) int
-        Contact mode of each joint's lower and upper stop in the last solve.
-    stopped : (nv,) int
-        Whether each joint pressed against a stop.
     dry_joint : (nd,) int
         Joints with dry friction.
-    friction_torque : (nv,) float
-        Generalised force of dry joint friction in the last solve.
-    dry_mode, resting : (nd,) int
-        Contact mode of each dry joint in the last solve; whether it was reported at rest, -1
-        before the first report.
-    candidate : (capacity,) int
-        Contact points in the contact problem of this step; after them the joint stops, numbered
-        on from nc: twice the joint, plus one for its upper end; last the dry joints. The capacity
-        has room for all.
-    jacobian : (2 capacity, nv) float
-        Contact Jacobian of the candidates.
-    leaf : (capacity,) int
-        Link that each candidate acts on: only its joint and those before have a part in its rows.
-    root : (nv,) float
-    half : (nv, 2 capacity) float
-        D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
-    problem, usual_problem : ContactProblem
-        The contact problem of the candidates, and with the matrix of the usual points.
-    answer : ContactAnswer
-        Its solution.
-    programs : (5,) int
-        Addresses of straight-line code, zero for none; see
-        :mod:`heelstrike.sim.contacts.straight_line`.
-    every_point, usual_points : (nc,), (k,) int
-        All contact points, and those that the programs are for.
-    usual_place : (nc,) int
-        Place of each contact point in `usual_points`, -1 for none.
-    point_rows : (2 k, nv) float
-        Scratch of the Delassus matrix of the usual points.
-    point_velocity, point_impulse : (nc, 2) float
-        Velocities and impulses of contact points.
-    solver : ContactWorkspace
-        Memory of the contact solvers.
+    equations : Equations
+        Equations of motion of the state now.
+    contacts : Contacts
+        Contact points now; their forces are those of the last solve.
+    surface : Surface
+        The ground under them.
+    assembly : Assembly
+        The contact problem.
+    usual : UsualPoints
+        What straight-line programs make it of.
+    reaction : Reaction
+        What else came of it.
+    reported : Reported
+        What events have told of it.
     pushes : Pushes
         Forces from outside.
     tally : Tally
@@ -136,80 +248,68 @@ class Memory(Bundle):
     v: Floats = array("nv")
     next_v: Floats = array("nv")
     torque: Floats = array("nu")
-    force: Floats = array("nv")
-    rate: Floats = array("nv")
-    bias: Floats = array("nv")
     stiffness: Floats = array("nv")
     damping: Floats = array("nv")
-    mass_matrix: Floats = array("nv", "nv")
-    factor: Floats = array("nv", "nv")
-    added: Floats = array("nv")
-    bodies: ArticulatedBodies = part(ArticulatedBodies)
-    tree: Workspace = part(Workspace)
-    contacts: Contacts = part(Contacts)
-    friction: Floats = array("capacity")
-    restitution: Floats = array("capacity")
-    slip: Floats = array("nc")
-    mode: Integers = array("capacity", of=int)
-    closed: Integers = array("capacity", of=int)
-    slipping: Integers = array("capacity", of=int)
-    stop_torque: Floats = array("nv")
-    stop_mode: Integers = array("nv", 2, of=int)
-    stopped: Integers = array("nv", of=int)
     dry_joint: Integers = array("nd", of=int)
-    friction_torque: Floats = array("nv")
-    dry_mode: Integers = array("nd", of=int)
-    resting: Integers = array("nd", of=int)
-    candidate: Integers = array("capacity", of=int)
-    jacobian: Floats = array("2 capacity", "nv")
-    leaf: Integers = array("capacity", of=int)
-    root: Floats = array("nv")
-    half: Floats = array("nv", "2 capacity")
-    programs: Integers = array("programs", of=int, address=True)
-    every_point: Integers = array("nc", of=int)
-    problem: ContactProblem = part(ContactProblem)
-    usual_problem: ContactProblem = part(ContactProblem)
-    answer: ContactAnswer = part(ContactAnswer)
-    usual_points: Integers = array("usual", of=int)
-    usual_place: Integers = array("nc", of=int)
-    point_rows: Floats = array("2 usual", "nv")
-    point_velocity: Floats = array("nc", "components")
-    point_impulse: Floats = array("nc", "components")
-    solver: ContactWorkspace = part(ContactWorkspace)
+    equations: Equations = part(Equations, flat=True)
+    contacts: Contacts = part(Contacts)
+    surface: Surface = part(Surface, flat=True)
+    assembly: Assembly = part(Assembly, flat=True)
+    usual: UsualPoints = part(UsualPoints, flat=True)
+    reaction: Reaction = part(Reaction, flat=True)
+    reported: Reported = part(Reported, flat=True)
     pushes: Pushes = part(Pushes)
     tally: Tally = part(Tally)
 
 
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
-    nv, nu, nc = robot.nv, robot.nu, robot.nc
-    stops = np.isfinite(robot.model.lower).sum() + np.isfinite(robot.model.upper).sum()
-    dry = np.flatnonzero(robot.model.dry_friction > 0.0)
-    capacity = nc + int(stops) + len(dry)
-    usual = usual_points(robot)
+    nc, model = robot.nc, robot.model
+    dry = np.flatnonzero(model.dry_friction > 0.0)
+    capacity = contact_capacity(robot)
+    points = usual_points(robot)
     place = np.full(nc, -1)
-    place[usual] = np.arange(len(usual))
-    problem = ContactProblem.allocate(nc=capacity)
-    usual_problem = ContactProblem.allocate(
-        nc=len(usual),
-        free=problem.free[: 2 * len(usual)],
-        friction=problem.friction[: len(usual)],
-    )
-    answer = ContactAnswer.allocate(nc=capacity)
-    return Memory.allocate(
-        nl=nv, nq=robot.nq, nv=nv, nu=nu, nc=nc, nd=len(dry), capacity=capacity, usual=len(usual),
-        axes=2, components=2,
-        torque=guarded(np.zeros(nu)),
-        friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0),
-        dry_joint=dry.astype(np.int64),
-        resting=np.full(len(dry), -1, dtype=np.int64),
-        problem=problem,
-        usual_problem=usual_problem,
-        answer=answer,
-        programs=straight_line_programs(robot.model, usual),
-        every_point=np.arange(nc),
-        usual_points=usual,
-        usual_place=place,
+    place[points] = np.arange(len(points))
+    extents = {
+        **model.extents, "nd": len(dry), "capacity": capacity,
+        "points": len(points), "components": 2,
+    }  # fmt: skip
+    programs = straight_line_programs(model, points)
+    assembly = Assembly.allocate(
+        extents,
+        problem=ContactProblem.allocate(nc=capacity),
+        answer=ContactAnswer.allocate(nc=capacity),
         solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
+    )
+    problem = assembly.problem
+    return Memory.allocate(
+        extents,
+        torque=guarded(np.zeros(robot.nu)),
+        dry_joint=dry.astype(np.int64),
+        equations=Equations.allocate(extents, programs=programs),
+        surface=Surface.allocate(
+            extents, friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0)
+        ),
+        assembly=assembly,
+        usual=UsualPoints.allocate(
+            extents,
+            usual_problem=ContactProblem.allocate(
+                nc=len(points),
+                free=problem.free[: 2 * len(points)],
+                friction=problem.friction[: len(points)],
+            ),
+            usual_points=points,
+            programs=programs,
+            usual_place=place,
+            every_point=np.arange(nc),
+        ),
+        reported=Reported.allocate(extents, resting=np.full(len(dry), -1, dtype=np.int64)),
         pushes=pushes_on(robot, pushes),
-    )  # fmt: skip
+    )
+
+
+def contact_capacity(robot: Robot) -> int:
+    """Return how many contacts there may be: points, joint stops and joints with dry friction."""
+    model = robot.model
+    stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
+    return robot.nc + int(stops) + int((model.dry_friction > 0.0).sum())

@@ -41,11 +41,11 @@ class Method(ABC):
     The frame sees to the controller, the limits of torques, the record and when to stop. The
     kernels of the method see to
 
-    - ``prepare``: ``memory.tree`` and ``memory.contacts`` of the state in ``memory.q``,
+    - ``prepare``: ``memory.equations.tree`` and ``memory.contacts`` of the state in ``memory.q``,
       ``memory.v``;
     - ``decide``: what follows from these and from ``memory.torque``: forces in
-      ``memory.contacts.force`` (N), ``memory.stop_torque``, ``memory.friction_torque``, slip in
-      ``memory.slip``, residuals; pushes in ``memory.pushes``; worst values and events;
+      ``memory.contacts.force`` (N), torques of stops and dry friction and slip in
+      ``memory.reaction``, residuals; pushes in ``memory.pushes``; worst values and events;
     - ``report``: a row when one is due;
     - ``move``: ``memory.q``, ``memory.v`` and ``clock.time`` of the next instant, not beyond
       ``clock.until`` if steps have no length of their own, and one more in ``memory.tally.steps``.

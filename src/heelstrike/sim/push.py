@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -165,23 +166,16 @@ class Pushes(Bundle):
 
 def pushes_on(robot: Robot, pushes: Sequence[Push]) -> Pushes:
     """Return the arrays of some pushes on a robot."""
-    places = [push.place(robot) for push in pushes]
-    return Pushes(
-        link=np.array([link for link, _ in places], dtype=np.int64),
-        point=np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
-        position=np.zeros((len(places), 2)),
-        force=np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
-        start=np.array([push.start for push in pushes], dtype=np.float64),
-        end=np.array([push.end for push in pushes], dtype=np.float64),
-        share=np.zeros(len(places)),
-    )
+    numbers = numbers_of_pushes(robot, pushes)
+    start, duration = numbers.pop("window").T.copy()
+    return Pushes.allocate(np=len(start), axes=2, start=start, end=start + duration, **numbers)
 
 
-def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Floats]:
+def numbers_of_pushes(robot: Robot, pushes: Sequence[Push]) -> dict[str, Any]:
     """Return some pushes on a robot as arrays that :func:`pushes_of_numbers` makes them of."""
     places = [push.place(robot) for push in pushes]
     return {
-        "link": np.array([link for link, _ in places], dtype=np.float64),
+        "link": np.array([link for link, _ in places], dtype=np.int64),
         "point": np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
         "force": np.array([push.force for push in pushes], dtype=np.float64).reshape(-1, 2),
         "window": np.array([(p.start, p.duration) for p in pushes], dtype=np.float64).reshape(
@@ -201,7 +195,7 @@ def pushes_of_numbers(numbers: Mapping[str, Floats]) -> tuple[Push, ...]:
 
 
 @kernel
-def share_over_step(pushes: Pushes, time: float, step: float) -> bool:
+def share_over_step(time: float, step: float, pushes: Pushes) -> bool:
     """Find how much of each push acts in the step from `time` on; return whether any does."""
     any_acts = False
     for i in range(pushes.link.shape[0]):
@@ -212,7 +206,7 @@ def share_over_step(pushes: Pushes, time: float, step: float) -> bool:
 
 
 @kernel
-def switch_at(pushes: Pushes, time: float) -> tuple[bool, float]:
+def switch_at(time: float, pushes: Pushes) -> tuple[bool, float]:
     """Let the pushes act that do so from `time` on.
 
     Returns whether anything changed, and when it next will.

@@ -1,10 +1,17 @@
-"""What a simulation leaves behind, whatever its end."""
+"""What a simulation leaves behind, whatever its end.
+
+A quantity that is recorded is declared here, once, as a field of :class:`Run`: its shape, where
+in the memory of a simulation it is, its unit and what it is called. The arrays that the loops fill,
+the dataset, the files and the figures follow.
+"""
+
+# ruff: noqa: RUF009 - a call declares a field
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +24,6 @@ from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.push import Push
-from heelstrike.sim.record.record import Record
 from heelstrike.sim.snapshot import Snapshot
 
 if TYPE_CHECKING:
@@ -26,8 +32,38 @@ if TYPE_CHECKING:
 
     from heelstrike.analysis.summary import Summary
     from heelstrike.sim.method import Method, UnknownMethod
+    from heelstrike.sim.record.record import Record
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What is recorded of every row.
+
+    Attributes
+    ----------
+    shape : tuple of str
+        Extents of the array of a row, by their names in :class:`~heelstrike.sim.memory.Memory`.
+    of : str
+        Where in the memory it is when a row is written.
+    unit : str
+    label : str
+        What datasets and figures call it.
+    later : bool
+        Whether there are files that are older than it, and mean zero.
+    """
+
+    shape: tuple[str, ...]
+    of: str
+    unit: str
+    label: str
+    later: bool = False
+
+
+def recorded(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
+    """Declare a recorded quantity; see :class:`Quantity`."""
+    return field(metadata={"quantity": Quantity(shape, of, unit, label, later)})
 
 
 @dataclass(frozen=True)
@@ -116,7 +152,7 @@ class Timing:
     wall_s: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
     """Record of a simulation.
 
@@ -184,17 +220,43 @@ class Run:
     status: RunStatus
     message: str
     time: Floats
-    position: Floats
-    velocity: Floats
-    torque: Floats
-    stop_torque: Floats
-    friction_torque: Floats
-    contact_point: Floats
-    contact_normal: Floats
-    gap: Floats
-    contact_force: Floats
-    slip_velocity: Floats
-    residual: Floats
+    position: Floats = recorded("nq", of="q", unit="m or rad", label="generalised positions")
+    velocity: Floats = recorded("nv", of="v", unit="m/s or rad/s", label="generalised velocities")
+    torque: Floats = recorded(
+        "nu", of="torque", unit="N m", label="joint torques within their limits"
+    )
+    stop_torque: Floats = recorded(
+        "nv",
+        of="reaction.stop_torque",
+        unit="N m or N",
+        label="force of the joint stops on the robot",
+    )
+    friction_torque: Floats = recorded(
+        "nv", of="reaction.friction_torque", unit="N m or N", later=True,
+        label="dry friction of the joints on the robot",
+    )  # fmt: skip
+    contact_point: Floats = recorded(
+        "nc", "axes", of="contacts.position", unit="m",
+        label="world position of the contact points",
+    )  # fmt: skip
+    contact_normal: Floats = recorded(
+        "nc", "axes", of="contacts.normal", unit="1", label="ground normal under the contact points"
+    )
+    gap: Floats = recorded(
+        "nc", of="contacts.gap", unit="m", label="distance of the contact points to the ground"
+    )
+    contact_force: Floats = recorded(
+        "nc", "components", of="contacts.force", unit="N",
+        label="force on the robot at the contact points, mean over the step that follows",
+    )  # fmt: skip
+    slip_velocity: Floats = recorded(
+        "nc", of="reaction.slip", unit="m/s",
+        label="tangential velocity of the contact points at the end of the step",
+    )  # fmt: skip
+    residual: Floats = recorded(
+        "conditions", of="assembly.answer.residual", unit="1",
+        label="relative residuals of the contact problem",
+    )  # fmt: skip
     events: tuple[Event, ...]
     certificates: Certificates
     solver: SolverCount
@@ -308,67 +370,56 @@ class Run:
         return save(self, path)
 
 
-def recorded(records: Sequence[Record], since: float) -> dict[str, Any]:
+QUANTITIES: dict[str, Quantity] = {
+    each.name: each.metadata["quantity"] for each in fields(Run) if "quantity" in each.metadata
+}
+"""What is recorded, by its name, in the order of rows."""
+
+
+def joined(records: Sequence[Record], since: float) -> dict[str, Any]:
     """Return the rows and events of consecutive records, from a time on, as fields of a run."""
 
-    def join(member: str, counts: Sequence[int]) -> Any:
-        used = [getattr(part, member)[:n] for part, n in zip(records, counts, strict=True)]
-        return np.concatenate(used)
+    def join(member: str, used: str) -> Any:
+        return np.concatenate([getattr(part, member)[: getattr(part, used)] for part in records])
 
-    counts = [part.rows for part in records]
-    first = int(np.searchsorted(join("time", counts), since))
-    fields = {name: join(member, counts)[first:] for name, member in _MEMBERS.items()}
-    counts = [part.events for part in records]
-    time, kind, contact, impulse = (
-        join(f"event_{name}", counts) for name in ("time", "kind", "contact", "impulse")
+    first = int(np.searchsorted(join("time", "rows"), since))
+    rows = {name: join(name, "rows")[first:] for name in ("time", *QUANTITIES)}
+    arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
+    order = np.argsort(arrays["time"], kind="stable")
+    order = order[arrays["time"][order] >= since]
+    return rows | {"events": events_of(*(values[order] for values in arrays.values()))}
+
+
+EVENT_MEMBERS = ("time", "kind", "contact", "impulse")
+
+
+def events_of(time: Floats, kind: Any, contact: Any, impulse: Floats) -> tuple[Event, ...]:
+    """Return the events of some arrays, one entry an event."""
+    lists = (values.tolist() for values in (time, kind, contact, impulse))
+    return tuple(
+        Event(t, EventKind(int(k)), int(c), (normal, tangent))
+        for t, k, c, (normal, tangent) in zip(*lists, strict=True)
     )
-    events = tuple(
-        Event(
-            time=float(time[i]),
-            kind=EventKind(int(kind[i])),
-            contact=int(contact[i]),
-            impulse=(float(impulse[i, 0]), float(impulse[i, 1])),
-        )
-        for i in np.argsort(time, kind="stable")
-        if time[i] >= since
-    )
-    return fields | {"events": events}
 
 
-_MEMBERS = {
-    "time": "time",
-    "position": "q",
-    "velocity": "v",
-    "torque": "torque",
-    "stop_torque": "stop_torque",
-    "friction_torque": "friction_torque",
-    "contact_point": "point",
-    "contact_normal": "normal",
-    "gap": "gap",
-    "contact_force": "force",
-    "slip_velocity": "slip",
-    "residual": "residual",
-}
-"""Which member of the record each field of a run is."""
+WORST = tuple(each.name for each in fields(Certificates))
+SOLVED = tuple(each.name for each in fields(SolverCount))[1:]
+COUNTS = ("steps", "saturations", *SOLVED)
+"""What is counted of every simulation, and what the worst is kept of."""
+
+
+def counted(memory: Memory) -> dict[str, Any]:
+    """Return counts and worst values of a simulation."""
+    tally, solver = memory.tally, memory.assembly.solver.tally
+    return {name: getattr(solver if name in SOLVED else tally, name) for name in COUNTS + WORST}
 
 
 def tallied(memory: Memory, solves_with: str) -> dict[str, Any]:
     """Return counts and worst values of a simulation, as fields of a run."""
-    tally, solver = memory.tally, memory.solver.tally
+    found = counted(memory)
     return {
-        "certificates": Certificates(
-            penetration=tally.penetration,
-            complementarity=tally.complementarity,
-            cone=tally.cone,
-            non_penetration=tally.non_penetration,
-        ),
-        "solver": SolverCount(
-            name=solves_with,
-            solves=solver.solves,
-            shortcuts=solver.shortcuts,
-            fallbacks=solver.fallbacks,
-            failures=solver.failures,
-        ),
-        "steps": tally.steps,
-        "saturations": tally.saturations,
+        "certificates": Certificates(*(found[name] for name in WORST)),
+        "solver": SolverCount(solves_with, *(found[name] for name in SOLVED)),
+        "steps": found["steps"],
+        "saturations": found["saturations"],
     }

@@ -6,12 +6,14 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Required, TypedDict
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
+from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
 
 # The loops count in 64 bits.
 MOST_EVERY = 2**62
+
+FLAT = Ground()
 
 # A walking robot has fallen when its centre of mass is below this fraction of its first height.
 FALL_FRACTION = 0.5
@@ -93,7 +97,7 @@ def checked_setting(
         raise SimulationError(
             f"robot must be a Robot, got {robot!r}; load_robot gives one by its name or file"
         )
-    ground = Ground() if ground is None else ground
+    ground = FLAT if ground is None else ground
     if not isinstance(ground, Ground):
         raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
     _check_state(robot, state)
@@ -132,16 +136,26 @@ def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, .
 
 def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, str]:
     """Say what a snapshot is one of: a simulation that is the same in this can take it up."""
-    digest = hashlib.sha256()
-    for name, value in setting.robot.model.members().items():
-        digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
     return {
-        "robot": f"{setting.robot.name} {digest.hexdigest()[:16]}",
+        "robot": f"{setting.robot.name} {_digest(setting.robot.model)}",
         "method": repr(method),
         "controller": controller + (", checked" if setting.checked else ""),
         "control_period": str(setting.control_period),
         "record_every": str(setting.record_every),
     }
+
+
+_DIGESTS: WeakKeyDictionary[Model, str] = WeakKeyDictionary()
+
+
+def _digest(model: Model) -> str:
+    """Return what tells the numbers of a robot from those of others."""
+    if model not in _DIGESTS:
+        digest = hashlib.sha256()
+        for name, value in model.members().items():
+            digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
+        _DIGESTS[model] = digest.hexdigest()[:16]
+    return _DIGESTS[model]
 
 
 def _check_state(robot: Robot, state: State) -> None:

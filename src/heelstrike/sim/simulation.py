@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 import time as clock_time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NoReturn, Unpack
 
 import numpy as np
@@ -29,7 +31,7 @@ from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.method import Method, UnknownMethod
 from heelstrike.sim.push import Push, numbers_of_pushes, pushes_of_numbers, pushes_on
 from heelstrike.sim.record.record import Record, allocate_record
-from heelstrike.sim.run import Run, Timing, recorded, tallied
+from heelstrike.sim.run import Run, Timing, counted, joined, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
@@ -96,7 +98,7 @@ class Simulation:
     message : str
         The same in a person's words.
     error : BaseException or None
-        What a controller or `progress` raised.
+        What a controller or `progress` raised, or that there was no memory.
 
     Raises
     ------
@@ -162,9 +164,8 @@ class Simulation:
         )
 
     def _begin(
-        self, setting: Setting, method: Method, memory: Memory | None = None,
-        record: Record | None = None, *, keep_rows: bool = True,
-    ) -> None:  # fmt: skip
+        self, setting: Setting, method: Method, memory: Memory | None = None, keep_rows: bool = True
+    ) -> None:
         """Allocate everything, compile, and check what only the method can.
 
         Parameters
@@ -173,8 +174,6 @@ class Simulation:
             What to simulate, and how.
         memory : Memory, optional
             Memory to use, as `allocate_memory` makes it for this robot and these pushes.
-        record : Record, optional
-            Record of an earlier simulation of this robot, to be used again.
         keep_rows : bool
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
@@ -196,7 +195,7 @@ class Simulation:
         self._loop, compile_s = compiled_loop(method.kernels, method.work)
         self._timing = Timing(compile_s, 0.0)
         self._fork: Snapshot | None = None
-        self._records: list[Record] = [] if record is None else [record]
+        self._records: list[Record] = []
         self._keeps_rows = keep_rows
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
@@ -396,25 +395,26 @@ class Simulation:
             self._new_record()
         while True:
             try:
-                code = self._loop(
-                    self._kernel, self._control, self.robot.model, self._ground.model(),
-                    self._memory, self._work, self._records[-1], self._clock,
+                outcome = Outcome(
+                    self._loop(
+                        self._kernel, self.robot.model, self._ground.model(), self._control,
+                        self._memory, self._work, self._records[-1], self._clock,
+                    )
                 )  # fmt: skip
+                wrong = self._ask() if outcome is Outcome.ASKING else ""
             except KeyboardInterrupt:
                 raise
-            except BaseException as error:  # of a compiled controller: loops raise nothing
+            except BaseException as error:  # of the controller: loops raise nothing
                 self.error = error
                 return Outcome.RAISED
-            outcome = Outcome(code)
+            if wrong:
+                return RunStatus.CONTROLLER_FAILED, wrong
             if outcome is Outcome.RECORD_FULL:
-                self._new_record()
+                if full := self._new_record():
+                    return RunStatus.INTERRUPTED, full
             elif outcome is Outcome.FORK:
                 self._fork = self.snapshot() if self._can_be_kept else None
-            elif outcome is Outcome.ASKING:
-                ending = self._ask()
-                if ending is not None:
-                    return ending
-            else:
+            elif outcome is not Outcome.ASKING:
                 return outcome
 
     def _report(self, progress: Callable[[float], None] | None) -> None:
@@ -429,33 +429,20 @@ class Simulation:
             self.error = error if self.error is None else self.error
             self._complaint = f"progress raised {_raised(error)}"
 
-    def _ask(self) -> tuple[RunStatus, str] | None:
-        """Ask a controller in Python for torques; return how it ended the run, if it did."""
-        controller = self._python
-        try:
-            torque = np.asarray(
-                controller.torque(self.time, self.state, self._shown),
-                dtype=np.float64,
-            )
-        except KeyboardInterrupt:
-            raise
-        except BaseException as error:
-            self.error = error
-            if isinstance(controller, AskedLaw) and isinstance(error, ControllerError):
-                return RunStatus.CONTROLLER_FAILED, f"{error} (at {self._now})"
-            return RunStatus.CONTROLLER_FAILED, (
-                f"{self._name} raised {_raised(error)} at {self._now} (the exception is in "
-                "run.error)"
-            )
+    def _ask(self) -> str:
+        """Ask a controller in Python for torques; return what is wrong with them."""
+        torque = np.asarray(
+            self._python.torque(self.time, self.state, self._shown), dtype=np.float64
+        )
         if torque.shape != (self.robot.nu,):
-            return RunStatus.CONTROLLER_FAILED, (
+            return (
                 f"{self._name} returned shape {torque.shape} at {self._now}; robot "
                 f"{self.robot.name!r} needs ({self.robot.nu},): "
                 f"{', '.join(self.robot.actuator_names)}"
             )
         self._memory.torque[:] = torque
         self._clock.answered = 1
-        return None
+        return ""
 
     @property
     def _now(self) -> str:
@@ -470,10 +457,13 @@ class Simulation:
             )
         if outcome is Outcome.RAISED:
             assert self.error is not None
-            more = "; simulate(..., checked=True) names the array and the index"
+            if isinstance(self._python, AskedLaw) and isinstance(self.error, ControllerError):
+                return RunStatus.CONTROLLER_FAILED, f"{self.error} (at {self._now})"
+            beyond = isinstance(self.error, IndexError) and not self._python
+            more = "; simulate(..., checked=True) names the array and the index" if beyond else ""
             return RunStatus.CONTROLLER_FAILED, (
                 f"{self._name} raised {_raised(self.error)} at {self._now} (the exception is in "
-                f"run.error){more if isinstance(self.error, IndexError) else ''}"
+                f"run.error){more}"
             )
         tally = self._memory.tally
         if outcome is Outcome.DIVERGED and tally.bad_trial > 0:
@@ -489,7 +479,7 @@ class Simulation:
         if outcome is Outcome.SOLVER_FAILED:
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
@@ -499,19 +489,29 @@ class Simulation:
             f"{self.robot.actuator_names[actuator]!r}"
         )
 
-    def _new_record(self) -> None:
+    def _new_record(self) -> str:
+        """Make room for more rows and events; say what is wrong where there is none."""
         if self._records and not self._keeps_rows:
-            self._count_events()
-            return
+            self._count_events(self._records[-1])
+            return ""
         clock = self._clock
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
         rows = min(CHUNK, rows + clock.row_margin)
-        events = 256 + 2 * clock.event_margin
-        self._records.append(allocate_record(self.robot, rows, events))
+        try:
+            record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin)
+        except MemoryError as error:
+            if not self._records:
+                raise SimulationError("there is no memory left to record anything in") from error
+            self.error = error
+            return (
+                f"stopped at {self._now}: there is no memory left to record more; what was "
+                "recorded until then is kept. A larger record_every takes less"
+            )
+        self._records.append(record)
+        return ""
 
-    def _count_events(self) -> None:
-        """Count the events of the record and forget it."""
-        record = self._records[-1]
+    def _count_events(self, record: Record) -> None:
+        """Count the events of a record and forget it."""
         kinds = record.event_kind[: record.events]
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
         record.rows = record.events = 0
@@ -525,11 +525,12 @@ class Simulation:
             in_python = setting.checked or not law.function.compiles
             python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
         compiled = Law(no_torque) if law is None or python is not None else law
-        ready = ReadyLaw(robot, compiled, memory.tree, memory.contacts)
+        ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts)
         self._kernel = compiled.function.finish()
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
         self._name = f"{type(controller).__name__}.torque"
+        self._decides = _place(type(controller) if law is None else law.function.python)
         self._shown = read_only(memory.contacts)
         memory.stiffness[:] = robot.model.stiffness
         memory.damping[:] = robot.model.damping
@@ -560,13 +561,14 @@ class Simulation:
             If a controller in Python does not take part: it needs methods ``snapshot()``, which
             returns an array of numbers, and ``restore(numbers)``.
         """
+        pushes = numbers_of_pushes(self.robot, self._pushes)
         arrays: dict[str, Any] = {
             "time": np.array(self.time),
-            **_named("ground", self._ground.numbers()),
-            **_named("push", numbers_of_pushes(self.robot, self._pushes)),
+            **{f"ground.{name}": values for name, values in self._ground.numbers().items()},
+            **{f"push.{name}": values for name, values in pushes.items()},
         }
         for name, bundle in self._bundles(self._memory):
-            arrays |= _named(name, bundle.contents())
+            arrays |= bundle.contents(name)
         if self._python is not None:
             arrays["controller"] = np.array(_partaking(self._python, self._name).snapshot())
         return Snapshot(arrays, self._identity())
@@ -595,11 +597,8 @@ class Simulation:
         self._recorded_until = snapshot.time
         self._records.clear()
         self._fork = None
-        self.status, self.message, self.error = (
-            RunStatus.COMPLETED,
-            f"restored at {self._now}",
-            None,
-        )
+        self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
+        self.error = None
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
@@ -612,7 +611,7 @@ class Simulation:
             bundles = self._bundles(memory)
             before = [(bundle, bundle.contents()) for _, bundle in bundles]
             for name, bundle in bundles:
-                bundle.fill(snapshot.part(name))
+                bundle.fill(snapshot.arrays, name)
             if self._python is not None:
                 _partaking(self._python, self._name).restore(snapshot.arrays["controller"].copy())
         except BaseException as error:
@@ -624,16 +623,16 @@ class Simulation:
         self._memory, self._pushes, self._ground = memory, pushes, ground
 
     def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
-        """Name the bundles that change as a simulation goes on."""
+        """Name the bundles that change as a simulation goes on, with the dot of their arrays."""
         return (
-            ("clock", self._clock),
-            ("memory", memory),
-            ("work", self._work),
-            ("control", self._control),
+            ("clock.", self._clock),
+            ("memory.", memory),
+            ("work.", self._work),
+            ("control.", self._control),
         )
 
     def _identity(self) -> dict[str, str]:
-        return identity_of(self._setting, self.method, self._name)
+        return identity_of(self._setting, self.method, self._decides)
 
     @property
     def record(self) -> Run:
@@ -679,7 +678,8 @@ class Simulation:
         if not self._can_be_kept:
             return None
         final = self.snapshot() if self._fork is None else self._fork
-        return Snapshot(final.arrays | {"time": np.array(self.time)}, final.identity)
+        final.arrays["time"] = np.array(self.time)
+        return final
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
@@ -689,7 +689,7 @@ class Simulation:
             method=self.method,
             status=status,
             message=message,
-            **recorded(self._records, self._recorded_until),
+            **joined(self._records, self._recorded_until),
             **tallied(self._memory, self.method.solves_with),
             timing=self._timing,
             error=self.error,
@@ -759,10 +759,10 @@ class Ending:
         Where the robot was, and when.
     events : (kinds,) int
         Events of each kind.
+    counts : dict
+        What was counted, and the worst values, by name.
     run : Run or None
         The record, if rows were kept.
-    record : Record or None
-        What the next simulation may record in, if they were not.
     """
 
     status: RunStatus
@@ -770,8 +770,8 @@ class Ending:
     state: State
     time: float
     events: Integers
+    counts: dict[str, Any]
     run: Run | None
-    record: Record | None
 
 
 def simulation_to_the_end(
@@ -781,30 +781,27 @@ def simulation_to_the_end(
     duration: float,
     *,
     memory: Memory,
-    record: Record | None,
     keep_rows: bool,
     stopped: Callable[[], bool],
 ) -> Ending:
     """Simulate as :func:`simulate` does, in memory that is given, until `stopped` says so."""
     simulation = Simulation.__new__(Simulation)
-    simulation._begin(setting, method, memory, record, keep_rows=keep_rows)
+    simulation._begin(setting, method, memory, keep_rows)
     simulation._control_with(law)
-    until = method.instant(simulation._clock, duration)
-    simulation._advance(until, NEVER, stopped=stopped)
+    simulation._advance(method.instant(simulation._clock, duration), NEVER, stopped=stopped)
     final = simulation._final() if keep_rows else None
     status, message = simulation._decide_last()
     last = simulation._records[-1]
-    state = simulation.state
-    row = last.rows - 1
+    state, row = simulation.state, last.rows - 1
     if row >= 0 and last.time[row] == simulation.time:  # event-driven rows lie on the constraints
-        state = State(last.q[row], last.v[row])
-    if not keep_rows:
-        simulation._count_events()
-        events = simulation._event_counts
-        return Ending(status, message, state, simulation.time, events, None, last)
-    run = simulation._run(status, message, final)
-    events = np.bincount([event.kind for event in run.events], minlength=len(EventKind))
-    return Ending(status, message, state, simulation.time, events, run, None)
+        state = State(last.position[row], last.velocity[row])
+    run = simulation._run(status, message, final) if keep_rows else None
+    for each in simulation._records:
+        simulation._count_events(each)
+    return Ending(
+        status, message, state, simulation.time, simulation._event_counts,
+        counted(memory), run,
+    )  # fmt: skip
 
 
 def check_duration(duration: float) -> None:
@@ -837,8 +834,12 @@ def _ground_of(snapshot: Snapshot) -> Ground:
         raise SimulationError(f"the snapshot is damaged: {error}") from error
 
 
-def _named(prefix: str, arrays: Mapping[str, Any]) -> dict[str, Any]:
-    return {f"{prefix}.{name}": values for name, values in arrays.items()}
+def _place(thing: Any) -> str:
+    """Say where a class or function is defined: the same in any process."""
+    module = thing.__module__
+    if module == "__main__":  # a script, which others may import
+        module = Path(getattr(sys.modules[module], "__file__", None) or module).stem
+    return f"{module}.{thing.__qualname__}"
 
 
 def _partaking(controller: Any, name: str) -> Partaking:

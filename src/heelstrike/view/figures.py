@@ -11,9 +11,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
 from heelstrike.view.panels import Excerpt
+from heelstrike.view.quantity_figure import draw_quantity
 from heelstrike.view.style import save_figure, styled
 
 if TYPE_CHECKING:
@@ -52,7 +53,8 @@ def plot(
     what : str
         One of :data:`FIGURES`: ``"tracking"``, ``"velocities"``, ``"zmp"`` and ``"friction"`` are
         the paper's Figures 3 to 6; ``"forces"``, ``"torque"``, ``"gaps"``, ``"energy"``,
-        ``"snapshots"``.
+        ``"snapshots"``. Or the name of an array of the run, such as ``"slip_velocity"``, which is
+        drawn as it is.
     gait : Gait, optional
         The gait that the run followed; without it no references are drawn.
     path : str or path, optional
@@ -73,11 +75,12 @@ def plot(
     GaitError
         If the gait does not fit the robot of the run.
     """
-    if what not in _DRAWINGS:
+    if what not in _DRAWINGS and what not in QUANTITIES:
         raise ViewError(_unknown(what))
     excerpt = Excerpt(run, _rows(run, span), gait)
     with styled():
-        figure = _DRAWINGS[what](excerpt)
+        drawing = _DRAWINGS.get(what)
+        figure = draw_quantity(excerpt, what) if drawing is None else drawing(excerpt)
     if path is not None:
         save_figure(figure, path)
     return figure
@@ -103,7 +106,10 @@ def _rows(run: Run, span: tuple[float, float] | None) -> slice:
 
 
 def _unknown(what: str) -> str:
-    near = difflib.get_close_matches(str(what).lower(), FIGURES, n=1)
+    near = difflib.get_close_matches(str(what).lower(), (*FIGURES, *QUANTITIES), n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
     names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
-    return f"there is no figure called {what!r}.{guess} There are: {names}"
+    return (
+        f"there is no figure called {what!r}.{guess} There are: {names} And what is recorded: "
+        f"{', '.join(QUANTITIES)}."
+    )

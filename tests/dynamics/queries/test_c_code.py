@@ -18,7 +18,7 @@ from heelstrike import load_robot
 from heelstrike.compiler.c_text import c_text
 from heelstrike.compiler.recording import Program, Recording
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import Robot
 
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -46,13 +46,13 @@ def called(function: Callable[..., Any], *arrays: np.ndarray) -> None:
 
 def by_kernels(robot: Robot, q: Any, v: Any, force: Any) -> dict[str, Any]:
     n = robot.nv
-    work = workspace(n)
+    work = Workspace.allocate(robot.model.extents)
     matrix, factor = np.zeros((n, n)), np.zeros((n, n))
     bias, acceleration = np.zeros(n), np.zeros(n)
     kernels.forward_kinematics(robot.model, q, work)
     kernels.link_velocities(robot.model, v, work)
     kernels.bias_force(robot.model, work, bias)
-    kernels.forward_dynamics(robot.model, matrix, factor, force, work, acceleration)
+    kernels.forward_dynamics(robot.model, force, work, matrix, factor, acceleration)
     return {
         "angle": work.angle, "origin": work.origin, "matrix": matrix, "bias": bias,
         "acceleration": acceleration,

@@ -31,6 +31,7 @@ def test_functions_equal_queries(case: RobotCase) -> None:
 
     of_q = ("mass_matrix", "gravity_force", "center_of_mass", "center_of_mass_jacobian")
     of_state = ("bias_force", "coriolis_force", "passive_force", "momentum", "kinetic_energy")
+    of_state += ("angular_momentum", "center_of_mass_velocity", "energy")
     for q, v in case.states(2):
         a = np.cos(np.arange(robot.nv))
         torque = np.sin(np.arange(robot.nu))
@@ -48,7 +49,10 @@ def test_functions_equal_queries(case: RobotCase) -> None:
         check(origin, dynamics.link_poses(robot, q).origin)
         check(angle, dynamics.link_poses(robot, q).angle)
         check(functions.inverse_dynamics()(q, v, a), dynamics.inverse_dynamics(robot, q, v, a))
+        check(functions.integrate(0.3)(q, v), dynamics.integrate(robot, q, v, 0.3))
+        check(functions.difference()(q, v), dynamics.difference(robot, q, v))
         force = dynamics.applied_force(robot, q, v, torque)
+        check(functions.applied_force()(q, v, torque), force)
         acceleration = dynamics.forward_dynamics(robot, q, v, force)
         check(functions.forward_dynamics()(q, v, force), acceleration)
         state = np.concatenate([q, v])
@@ -63,6 +67,7 @@ def test_functions_equal_queries(case: RobotCase) -> None:
             rows = dynamics.contact_jacobian(robot, q).reshape(-1, robot.nv)
             drift = dynamics.contact_bias_acceleration(robot, q, v).ravel()
             check(functions.contact_jacobian()(q), rows)
+            check(functions.contact_positions()(q), dynamics.contact_positions(robot, q))
             check(functions.contact_bias_acceleration()(q, v), drift)
             push = np.cos(np.arange(2 * robot.nc))
             residual = functions.contact_equations(contacts)(q, v, a, push, torque)

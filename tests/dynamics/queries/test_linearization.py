@@ -18,7 +18,7 @@ from robot_cases import NAMED, RANDOM, RobotCase
 from heelstrike import dynamics
 from heelstrike.compiler.compilation import uncompiled
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import RobotError
 from heelstrike.robot import Robot
 
@@ -35,7 +35,7 @@ def free_acceleration(
         uncompiled(kernel, replace=functions)(*arguments)
 
     n = robot.nv
-    work = workspace(n, dtype=dtype)
+    work = Workspace.allocate(robot.model.extents, dtype=dtype)
     force, acceleration = np.zeros(n, dtype=dtype), np.zeros(n, dtype=dtype)
     run(kernels.forward_kinematics, robot.model, q, work)
     run(kernels.link_velocities, robot.model, v, work)
@@ -108,7 +108,7 @@ def test_held_contacts_equal_complex_step(
 
     def acceleration(x: np.ndarray) -> Any:
         position, velocity, gamma = np.split(x, [n, 2 * n])
-        work = workspace(n, dtype=np.complex128)
+        work = Workspace.allocate(model.extents, dtype=np.complex128)
         run(kernels.forward_kinematics, model, position, work)
         run(kernels.link_velocities, model, velocity, work)
         matrix = np.zeros((n, n), dtype=complex)

@@ -45,28 +45,30 @@ def test_delassus_matrix_and_what_impulses_do(
     robot = load_robot(name)
     draw = np.random.default_rng(5)
     memory = allocate_memory(robot)
-    assert straight == bool(memory.programs[programs.EQUATIONS])
+    equations, assembly = memory.equations, memory.assembly
+    tree = equations.tree
+    assert straight == bool(equations.programs[programs.EQUATIONS])
     for _ in range(5):
         memory.q[:] = draw.normal(size=robot.nv)
-        evaluate_equations(robot.model, memory.q, memory.v, memory)
-        locate_contacts(robot.model, Ground().model(), memory)
+        evaluate_equations(robot.model, memory.q, memory.v, equations)
+        locate_contacts(robot.model, Ground().model(), tree, memory.contacts, memory.surface)
         for contact in range(robot.nc):
-            contact_rows(robot.model, memory, contact, contact)
+            contact_rows(robot.model, tree, memory.contacts, contact, contact, assembly)
         for place in range(2):  # a stop and a dry joint
             row = 2 * (robot.nc + place) + place
-            write_unit_row(memory, int(draw.integers(robot.nv)), row, -1.0)
+            write_unit_row(int(draw.integers(robot.nv)), row, -1.0, assembly)
         count = robot.nc + 2
-        assemble_delassus(robot.model, memory, count)
-        jacobian = memory.jacobian[: 2 * count]
+        assemble_delassus(robot.model, equations, count, assembly)
+        jacobian = assembly.jacobian[: 2 * count]
         inverse = np.linalg.inv(dynamics.mass_matrix(robot, memory.q))
         expected = jacobian @ inverse @ jacobian.T
-        found = memory.problem.delassus[: 2 * count, : 2 * count]
+        found = assembly.problem.delassus[: 2 * count, : 2 * count]
         np.testing.assert_allclose(found, expected, atol=ROUNDING * np.abs(expected).max())
-        memory.answer.impulse[: 2 * count] = draw.normal(size=2 * count)
-        change = inverse @ jacobian.T @ memory.answer.impulse[: 2 * count]
+        assembly.answer.impulse[: 2 * count] = draw.normal(size=2 * count)
+        change = inverse @ jacobian.T @ assembly.answer.impulse[: 2 * count]
         v = draw.normal(size=robot.nv)
         after = v.copy()
-        add_impulse(robot.model, memory, count, after)
+        add_impulse(robot.model, assembly, count, equations, after)
         np.testing.assert_allclose(after - v, change, atol=ROUNDING * np.abs(change).max())
 
 

@@ -295,7 +295,7 @@ def test_parameters_must_be_those_of_the_function_and_fit_the_robot(outside: Any
         simulation(outside.stand)
     with pytest.raises(hs.ControllerError, match="memory of controller 'stand' has no steps"):
         outside.stand(gains(outside), memory={"steps": 1})
-    with pytest.raises(hs.ControllerError, match=r"damping must be one number or 6"):
+    with pytest.raises(hs.ControllerError, match=r"damping must be one finite number or 6"):
         simulation(outside.stand(gains(outside), damping=np.ones(2)))
     with pytest.raises(hs.ControllerError, match="does not know its robot"):
         outside.stand(gains(outside)).torque(0.0, walking.bravo7().reference_state(), None)

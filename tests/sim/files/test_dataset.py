@@ -269,7 +269,7 @@ def _last_set(value: float) -> Any:
         ("robot", _replaced("parent", lambda v: v[::-1].copy()), "parent points outside"),
         ("robot", _replaced("contact_link", _last_set(-5)), "contact_link points outside"),
         ("robot", _replaced("actuator_joint", _last_set(9)), "actuator_joint points outside"),
-        ("robot", _replaced("mass", _last_set(np.nan)), "mass is not finite"),
+        ("robot", _replaced("mass", _last_set(np.nan)), "'mass' is not finite"),
         ("robot", _replaced("mass", _last_set(-1.0)), "not negative"),
         ("robot", _replaced("mirror_joint", _last_set(0)), "exchange of left and right"),
         ("robot", _replaced("foot_link", _last_set(12)), "foot_link points outside"),

@@ -36,7 +36,7 @@ def test_worst_values_are_the_worst_of_all_steps_each_for_itself() -> None:
     ]
     for gap, residual in steps:
         memory.contacts.gap[:] = gap
-        memory.answer.residual[:] = residual
+        memory.assembly.answer.residual[:] = residual
         note(robot.model, memory)
     assert worst(memory) == (8e-4, 5e-12, 9e-12, 3e-12)
 

@@ -85,6 +85,6 @@ def contact_kinematics(
         bias[i] = into_frame(normal[i], tuple(acceleration[:axes]))
         bias[i, 1] -= radius * acceleration[axes]
         position[i] = center - radius * normal[i]
-        write_point_rows(model, at.work, link, position[i], normal[i], jacobian[i], 0)
+        write_point_rows(model, at.work, link, position[i], normal[i], 0, jacobian[i])
     velocity = jacobian @ at.v
     return ContactKinematics(position, normal, gap, friction, jacobian, velocity, bias)

@@ -73,7 +73,7 @@ def pivot_to_solution(pairs: int, tie: float, tally: Tally, dictionary: Dictiona
         tally.iterations += 1
         entering = column_label[column]
         leaving = row_label[row]
-        pivot(tableau, pairs, pairs + 2, row, column)
+        pivot(pairs, pairs + 2, row, column, tableau)
         row_label[row] = entering
         place[entering] = row
         column_label[column] = leaving

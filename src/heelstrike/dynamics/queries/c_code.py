@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import textwrap
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -54,41 +54,34 @@ def _bias_force(model: Model, q: Floats, v: Floats, tree: Workspace, bias: Float
 
 
 def _solve(
-    model: Model, q: Floats, v: Floats, force: Floats, tree: Workspace, matrix: Floats,
+    model: Model, q: Floats, v: Floats, force: Floats, tree: Workspace, square: Floats,
     factor: Floats, acceleration: Floats,
 ) -> None:  # fmt: skip
     """Acceleration a under a generalised force: a = A(q)^-1 (force - H(q, v))."""
     forward_kinematics(model, q, tree)
     link_velocities(model, v, tree)
-    forward_dynamics(model, matrix, factor, force, tree, acceleration)
+    forward_dynamics(model, force, tree, square, factor, acceleration)
 
 
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
     """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
-    tree = Workspace.allocate(**model.extents)
+    tree = Workspace.allocate(model.extents)
     square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
-    scratch = (*(f"tree.{member}" for member in tree.members()), "factor")
-    poses = {"angle": np.zeros(model.nl), "origin": np.zeros((model.nl, model.axes))}
-    q, state = {"model": model, "q": vector}, {"model": model, "q": vector, "v": vector}
-    given: list[tuple[Callable[..., None], dict[str, Any], tuple[str, ...]]] = [
-        (_kinematics, q | {"tree": tree} | poses, scratch),
-        (_mass_matrix, q | {"tree": tree, "matrix": square}, scratch),
-        (_bias_force, state | {"tree": tree, "bias": vector}, scratch),
-        (
-            _solve,
-            state
-            | {"force": vector, "tree": tree, "matrix": square, "factor": square}
-            | {"acceleration": vector},
-            (*scratch, "matrix"),
-        ),
-    ]
-    known = {"tree.zero": vector}
+    arrays: dict[str, Any] = {
+        "model": model, "tree": tree,
+        "angle": np.zeros(model.nl), "origin": np.zeros((model.nl, model.axes)),
+        **dict.fromkeys(("q", "v", "force", "bias", "acceleration"), vector),
+        **dict.fromkeys(("matrix", "square", "factor"), square),
+    }  # fmt: skip
+    scratch = (*(f"tree.{member}" for member in tree.members()), "square", "factor")
+    recordings = []
+    for kernel in (_kinematics, _mass_matrix, _bias_force, _solve):
+        given = {name: arrays[name] for name in inspect.signature(kernel).parameters}
+        program = Program(kernel, given, scratch, kernel.__name__[1:])
+        recordings.append(Recording(program, {"tree.zero": vector}))
     return c_text(
-        [
-            Recording(Program(kernel, arguments, unread, kernel.__name__[1:]), known)
-            for kernel, arguments, unread in given
-        ],
-        [str(kernel.__doc__) for kernel, _, _ in given],
+        recordings,
+        [str(recording.program.kernel.__doc__) for recording in recordings],
         prefix=re.sub(r"\W|^(?=\d)", "_", name, flags=re.ASCII),
         head=_HEAD.format(name=name, joints=textwrap.fill(", ".join(joints), 96)),
     )

@@ -4,33 +4,27 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
-from typing import Any, Concatenate, ParamSpec
+from typing import TYPE_CHECKING, Any
 
 import casadi
 import numpy as np
-from numpy.typing import ArrayLike
 
 from heelstrike import dynamics
 from heelstrike.dynamics.queries.evaluation import contact_indices
-from heelstrike.dynamics.queries.query import VECTORS, Query, docstring
+from heelstrike.dynamics.queries.query import VECTORS, docstring
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
 from heelstrike.robot.robot import Robot
 
-P = ParamSpec("P")
 
-
-def _function_of(
-    query: Query[P, Any],
-) -> Callable[Concatenate[CasadiDynamics, P], casadi.Function]:
+def _function_of(asked: Any) -> Callable[..., casadi.Function]:
     """Make the method that returns a query as a function of symbols; it takes the other arguments.
 
     Points and frames that the query tells apart become rows below each other.
     """
-    asked: Any = query
     names = [name for name in inspect.signature(asked).parameters if name in VECTORS]
 
     def method(self: CasadiDynamics, /, *others: Any, **named: Any) -> casadi.Function:
-        inputs = {name: self._symbol(name) for name in names}
+        inputs = {name: self._state.get(name, self._symbol(name)) for name in names}
         more = [symbols(value) for name, value in inputs.items() if name not in ("q", "v")]
         value = asked.at(self._traced, *more, *others, **named)
         return self._function(asked.__name__, inputs, _sx(value))
@@ -46,15 +40,6 @@ def _function_of(
     meaning = f"Of ({', '.join(names)}), it is a {asked.returns}"
     method.__doc__ = docstring(summary, others, "casadi.Function", meaning)
     return method
-
-
-def _function_with(
-    query: Query[[ArrayLike], Any],
-) -> Callable[[CasadiDynamics], casadi.Function]:
-    """Do the same with a query whose other argument is a vector, and so an input."""
-    method: Any = _function_of(query)
-    made: Callable[[CasadiDynamics], casadi.Function] = method
-    return made
 
 
 class CasadiDynamics:
@@ -81,32 +66,12 @@ class CasadiDynamics:
 
     def __init__(self, robot: Robot) -> None:
         self.robot = robot
-        self._q, self._v = self._symbol("q"), self._symbol("v")
-        self._traced = TracedDynamics(robot, symbols(self._q), symbols(self._v))
+        self._state = {name: self._symbol(name) for name in ("q", "v")}
+        self._traced = TracedDynamics(robot, *map(symbols, self._state.values()))
 
-    mass_matrix = _function_of(dynamics.mass_matrix)
-    bias_force = _function_of(dynamics.bias_force)
-    gravity_force = _function_of(dynamics.gravity_force)
-    coriolis_force = _function_of(dynamics.coriolis_force)
-    passive_force = _function_of(dynamics.passive_force)
-    applied_force = _function_with(dynamics.applied_force)
-    inverse_dynamics = _function_with(dynamics.inverse_dynamics)
-    forward_dynamics = _function_with(dynamics.forward_dynamics)
-    point_position = _function_of(dynamics.point_position)
-    point_velocity = _function_of(dynamics.point_velocity)
-    point_jacobian = _function_of(dynamics.point_jacobian)
-    point_bias_acceleration = _function_of(dynamics.point_bias_acceleration)
-    center_of_mass = _function_of(dynamics.center_of_mass)
-    center_of_mass_jacobian = _function_of(dynamics.center_of_mass_jacobian)
-    center_of_mass_velocity = _function_of(dynamics.center_of_mass_velocity)
-    center_of_mass_bias_acceleration = _function_of(dynamics.center_of_mass_bias_acceleration)
-    momentum = _function_of(dynamics.momentum)
-    angular_momentum = _function_of(dynamics.angular_momentum)
-    momentum_matrix = _function_of(dynamics.momentum_matrix)
-    kinetic_energy = _function_of(dynamics.kinetic_energy)
-    potential_energy = _function_of(dynamics.potential_energy)
-    contact_jacobian = _function_of(dynamics.contact_jacobian)
-    contact_bias_acceleration = _function_of(dynamics.contact_bias_acceleration)
+    if TYPE_CHECKING:  # every query is a method, see below
+
+        def __getattr__(self, name: str) -> Callable[..., casadi.Function]: ...
 
     def state_derivative(self) -> casadi.Function:
         """Return (state, torque) → d/dt (q, v) without contact, (nq + nv,).
@@ -114,14 +79,11 @@ class CasadiDynamics:
         The state is (q; v) in one column; motors, dampers and springs act.
         """
         torque = self._symbol("torque")
-        force = self._traced.applied_force(symbols(torque))
-        rate = casadi.vertcat(self._v, expression(self._traced.forward_dynamics(force)))
-        state = casadi.vertcat(self._q, self._v)
-        x = casadi.SX.sym("state", state.numel())
-        rate = casadi.substitute(rate, state, x)
-        return casadi.Function(
-            "state_derivative", [x, torque], [rate], ["state", "torque"], ["state_derivative"]
-        )
+        x = casadi.SX.sym("state", self.robot.nq + self.robot.nv)
+        at = TracedDynamics(self.robot, symbols(x[: self.robot.nq]), symbols(x[self.robot.nq :]))
+        force = at.applied_force(symbols(torque))
+        rate = casadi.vertcat(expression(at.v), expression(at.forward_dynamics(force)))
+        return self._function("state_derivative", {"state": x, "torque": torque}, rate)
 
     def linearization(self) -> casadi.Function:
         """Return (state, torque) → (A, B), the derivatives of :meth:`state_derivative`."""
@@ -136,7 +98,7 @@ class CasadiDynamics:
         work: Any = self._traced.work
         return casadi.Function(
             "link_poses",
-            [self._q],
+            [self._state["q"]],
             [casadi.SX(expression(work.origin)), casadi.SX(expression(work.angle))],
             ["q"],
             ["origin", "angle"],
@@ -160,12 +122,18 @@ class CasadiDynamics:
         casadi.Function
             Of the inputs above, (nv + 2k,).
         """
-        held = self._contacts(contacts)
-        inputs = {name: self._symbol(name) for name in ("q", "v", "acceleration")}
-        inputs["contact_force"] = casadi.SX.sym("contact_force", 2 * len(held))
-        inputs["torque"] = self._symbol("torque")
-        residual = contact_equations(self.robot, held, *inputs.values())
-        return self._function("contact_equations", inputs, residual, output="residual")
+        robot, at = self.robot, self._traced
+        held = contact_indices(robot, contacts)
+        sizes = {"acceleration": robot.nv, "contact_force": 2 * len(held), "torque": robot.nu}
+        more = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
+        acceleration, push, torque = map(symbols, more.values())
+        force = at.inverse_dynamics(acceleration) - at.passive_force()
+        force[robot.model.actuator_joint] -= torque
+        jacobian = at.contact_jacobian(held).reshape(-1, robot.nv)
+        force = force - jacobian.T @ push
+        rates = jacobian @ acceleration + at.contact_bias_acceleration(held).ravel()
+        residual = expression(np.concatenate([force, rates]))
+        return self._function("contact_equations", self._state | more, residual, "residual")
 
     def contact_forward_dynamics(
         self, contacts: Iterable[int | str] | None = None
@@ -185,38 +153,27 @@ class CasadiDynamics:
         casadi.Function
             Of the inputs above, (nv,) and (2k,).
         """
-        held = self._contacts(contacts)
-        n, k = self.robot.nv, 2 * len(held)
-        unknown = casadi.SX.sym("unknown", n + k)
-        torque = self._symbol("torque")
-        residual = contact_equations(
-            self.robot, held, self._q, self._v, unknown[:n], unknown[n:], torque
+        equations = self.contact_equations(contacts)
+        n, k = self.robot.nv, equations.size1_in("contact_force")
+        q, v, torque = (
+            casadi.MX.sym(name, getattr(self.robot, VECTORS[name])) for name in ("q", "v", "torque")
         )
-        matrix = casadi.jacobian(residual, unknown)
-        constant = casadi.substitute(residual, unknown, casadi.SX.zeros(n + k))
-        parts = casadi.Function("parts", [self._q, self._v, torque], [matrix, constant])
-        q, v, tau = (
-            casadi.MX.sym(name, size)
-            for name, size in (("q", n), ("v", n), ("torque", self.robot.nu))
+        unknown = casadi.MX.sym("unknown", n + k)
+        residual = equations(q, v, unknown[:n], unknown[n:], torque)
+        system, right = casadi.substitute(
+            [casadi.jacobian(residual, unknown), -residual], [unknown], [casadi.DM.zeros(n + k)]
         )
-        system, right = parts(q, v, tau)
-        solution = casadi.solve(system, -right)
+        solution = casadi.solve(system, right)
         return casadi.Function(
             "contact_forward_dynamics",
-            [q, v, tau],
+            [q, v, torque],
             [solution[:n], solution[n:]],
             ["q", "v", "torque"],
             ["acceleration", "contact_force"],
         )
 
-    def _contacts(self, contacts: Iterable[int | str] | None) -> tuple[int, ...]:
-        every = range(self.robot.nc)
-        return contact_indices(self.robot, every if contacts is None else contacts)
-
     def _symbol(self, name: str) -> casadi.SX:
-        """Return the symbol of an input: always the same one of the state."""
-        known = {"q": self._q, "v": self._v} if hasattr(self, "_v") else {}
-        return known.get(name, casadi.SX.sym(name, getattr(self.robot, VECTORS[name])))
+        return casadi.SX.sym(name, getattr(self.robot, VECTORS[name]))
 
     def _function(
         self, name: str, inputs: dict[str, Any], value: Any, output: str = ""
@@ -224,30 +181,14 @@ class CasadiDynamics:
         return casadi.Function(name, [*inputs.values()], [value], [*inputs], [output or name])
 
 
-def contact_equations(
-    robot: Robot,
-    contacts: tuple[int, ...],
-    q: casadi.SX,
-    v: casadi.SX,
-    acceleration: casadi.SX,
-    contact_force: casadi.SX,
-    torque: casadi.SX,
-) -> casadi.SX:
-    """Residual of the equations of motion and of the contact points that the ground holds."""
-    at = TracedDynamics(robot, symbols(q), symbols(v))
-    force = at.inverse_dynamics(symbols(acceleration)) - at.passive_force()
-    force[robot.model.actuator_joint] -= symbols(torque)
-    if not contacts:
-        return casadi.SX(expression(force))
-    jacobian = at.contact_jacobian(contacts).reshape(-1, robot.nv)
-    force = force - jacobian.T @ symbols(contact_force)
-    held = jacobian @ symbols(acceleration) + at.contact_bias_acceleration(contacts).ravel()
-    return casadi.vertcat(expression(force), expression(held))
-
-
 def _sx(value: Any) -> casadi.SX:
     """CasADi expression of an object array or a scalar; structural zeros stay sparse."""
     if not isinstance(value, np.ndarray):
-        return casadi.SX(value)
+        return casadi.vertcat(*value) if isinstance(value, tuple) else casadi.SX(value)
     rows = value.reshape(-1, value.shape[-1]) if value.ndim == 3 else value
     return casadi.SX(expression(rows))
+
+
+for _name, _query in list(vars(dynamics).items()):
+    if "float" in getattr(_query, "returns", ""):
+        setattr(CasadiDynamics, _name, _function_of(_query))

@@ -87,4 +87,4 @@ def forward_dynamics(at: Evaluation, force: ArrayLike) -> Floats:
     """
     total, size = at.vector("force", force), at.model.nv
     scratch = at.zeros(size, size), at.zeros(size, size)
-    return at.filled((size,), kernels.forward_dynamics, at.model, *scratch, total, at.work)
+    return at.filled((size,), kernels.forward_dynamics, at.model, total, at.work, *scratch)

@@ -43,7 +43,7 @@ class Evaluation:
     def work(self) -> Workspace:
         """Kinematics and velocities of the state, for the kernels that follow."""
         dtype = object if self.symbolic else None
-        made = Workspace.allocate(dtype=dtype, **self.model.extents)
+        made = Workspace.allocate(self.model.extents, dtype=dtype)
         self.run(kernels.forward_kinematics, self.model, self.q, made)
         self.run(kernels.link_velocities, self.model, self.v, made)
         return made
@@ -75,8 +75,7 @@ class Evaluation:
     def vector(self, name: str, value: ArrayLike) -> Floats:
         """Check a vector over the coordinates, or the actuators if it is "torque"; symbols pass."""
         symbolic: Any = value
-        entries = self.robot.actuator_names if name == "torque" else self.robot.joint_names
-        return symbolic if self.symbolic else _vector(self.robot, name, value, entries)
+        return symbolic if self.symbolic else joint_vector(self.robot, name, value)
 
     def point(self, link: int | str, local: ArrayLike) -> tuple[int, Floats]:
         """Return the index of a link and the world position of a point of it."""
@@ -94,25 +93,22 @@ class Evaluation:
 
     def contact_centers(self, contacts: Any) -> list[tuple[int, int, Floats]]:
         """Return index, link and centre of contact points, of all if None are named."""
-        every = range(self.robot.nc) if contacts is None else contacts
         model = self.model
         return [
             (i, *self.point(int(model.contact_link[i]), model.contact_position[i]))
-            for i in contact_indices(self.robot, every)
+            for i in contact_indices(self.robot, contacts)
         ]
 
 
 def joint_vector(robot: Robot, name: str, value: ArrayLike) -> Floats:
-    """Return a vector over the coordinates, (nv,), or raise a `RobotError` that names them."""
-    return _vector(robot, name, value, robot.joint_names)
+    """Return a vector over the coordinates, or the actuators if it is "torque".
 
-
-def torque_vector(robot: Robot, value: ArrayLike) -> Floats:
-    """Return a vector over the actuators, (nu,), or raise a `RobotError` that names them."""
-    return _vector(robot, "torque", value, robot.actuator_names)
-
-
-def _vector(robot: Robot, name: str, value: ArrayLike, entries: tuple[str, ...]) -> Floats:
+    Raises
+    ------
+    RobotError
+        That names them, if it has another length.
+    """
+    entries = robot.actuator_names if name == "torque" else robot.joint_names
     vector = np.ascontiguousarray(value, dtype=np.float64)
     if vector.shape != (len(entries),):
         raise RobotError(
@@ -147,13 +143,14 @@ def link_index(robot: Robot, link: int | str) -> int:
 
 
 def contact_indices(robot: Robot, contacts: Any) -> tuple[int, ...]:
-    """Return indices of contact points given by index or name, in the order given.
+    """Return indices of contact points given by index or name, in the order given; all of None.
 
     Raises
     ------
     RobotError
         If the robot has no such contact point.
     """
-    given: Any = (contacts,) if isinstance(contacts, str | int | np.integer) else contacts
     names = robot.contact_names
+    given: Any = range(robot.nc) if contacts is None else contacts
+    given = (given,) if isinstance(given, str | int | np.integer) else given
     return tuple(dict.fromkeys(index_of(robot, "contact point", names, one) for one in given))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector, torque_vector
+from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 
@@ -85,7 +85,7 @@ def linearize(
     """
     held = contact_indices(robot, contacts)
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
-    gamma = torque_vector(robot, torque)
+    gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, 2 * len(held)
     equations, derivatives = _equations(robot, held)
     nothing = np.zeros(n + k)
@@ -127,18 +127,17 @@ def _equations(robot: Robot, contacts: tuple[int, ...]) -> tuple[casadi.Function
     """
     import casadi
 
-    from heelstrike.dynamics.queries.casadi_functions import contact_equations
+    from heelstrike.dynamics.queries.casadi_functions import CasadiDynamics
 
-    n = robot.nv
-    q, v = casadi.SX.sym("q", n), casadi.SX.sym("v", n)
-    unknown = casadi.SX.sym("unknown", n + 2 * len(contacts))
-    torque = casadi.SX.sym("torque", robot.nu)
-    residual = contact_equations(robot, contacts, q, v, unknown[:n], unknown[n:], torque)
+    sizes = {"q": robot.nq, "v": robot.nv, "unknown": robot.nv + 2 * len(contacts)}
+    arguments = [casadi.SX.sym(name, size) for name, size in (sizes | {"torque": robot.nu}).items()]
+    q, v, unknown, torque = arguments
+    equations = CasadiDynamics(robot).contact_equations(contacts)
+    residual = equations(q, v, unknown[: robot.nv], unknown[robot.nv :], torque)
     jacobians = [
         casadi.densify(casadi.jacobian(residual, x))
         for x in (unknown, casadi.vertcat(q, v), torque)
     ]
-    arguments = [q, v, unknown, torque]
     return (
         casadi.Function("equations", arguments, [residual]),
         casadi.Function("derivatives", arguments, jacobians),

@@ -1,4 +1,4 @@
-"""Centre of mass and momentum of the whole robot, in world axes."""
+"""Centre of mass, momentum and energy of the whole robot, in world axes."""
 
 from __future__ import annotations
 
@@ -57,3 +57,21 @@ def angular_momentum(at: Evaluation) -> float:
 def momentum_matrix(at: Evaluation) -> Floats:
     """Centroidal momentum matrix: times v it gives :func:`momentum`."""
     return at.filled((3, at.model.nv), kernels.momentum_matrix, at.model, at.work)
+
+
+@of_state("float: In J.")
+def kinetic_energy(at: Evaluation) -> float:
+    """Kinetic energy of links and rotors."""
+    return at.number(kernels.kinetic_energy, at.model, at.v, at.work)
+
+
+@of_position("float: In J, zero at the world's origin with all springs slack.")
+def potential_energy(at: Evaluation) -> float:
+    """Energy in the gravity field and of the joint springs."""
+    return at.number(kernels.potential_energy, at.model, at.q, at.work)
+
+
+@of_state("tuple of float: Both in J.")
+def energy(at: Evaluation) -> tuple[float, float]:
+    """Kinetic and potential energy; the potential includes joint springs."""
+    return kinetic_energy.at(at), potential_energy.at(at)

@@ -63,7 +63,7 @@ def contact_jacobian(at: Evaluation, contacts: Iterable[int | str] | None = None
     result = at.zeros(len(found), at.model.axes, at.model.nv)
     for rows, (i, link, lowest) in zip(result, found, strict=True):
         lowest[-1] -= at.model.contact_radius[i]
-        at.run(write_point_rows, at.model, at.work, link, lowest, UP, rows, 0)
+        at.run(write_point_rows, at.model, at.work, link, lowest, UP, 0, rows)
     return result
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heelstrike.robot.files.flattening import BALL
 from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.files.posture import BALL
 from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.warning import warn

@@ -7,7 +7,6 @@ free one, joints that leave the plane locked where the user wants them.
 from __future__ import annotations
 
 import copy
-import difflib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -19,21 +18,26 @@ from numpy.typing import NDArray
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.options import FORWARD, Options
+from heelstrike.robot.files.posture import (
+    BALL,
+    FREE,
+    HINGE,
+    LONGEST_TRAIN,
+    SLIDE,
+    followers,
+    joint_name,
+    positions,
+    turn,
+)
 from heelstrike.robot.files.snapping import IN_PLANE, snap
+from heelstrike.robot.files.spatial import asymmetry, refuse_spatial_joints
 from heelstrike.robot.robot import LockedJoint
-from heelstrike.robot.symmetry import counterparts
 
 Floats = NDArray[np.float64]
 
-FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 KINDS = ("free", "ball", "slide", "hinge")
 MANY = 12  # joints that are named in a remark
 SHOWN = 4  # how many culprits a message lists before it counts the rest
-LATERAL = (1e-2, 5e-2)
-"""Asymmetry (share of the robot's size or moment of inertia) from which a projection is doubtful,
-and up to which it is made at all. Cables and connectors of a symmetric design make a few parts in a
-thousand."""
-
 ROOT = ("root_x", "root_z", "root_pitch")
 _PLANAR = ("_TX", "_TY", "_RZ")  # what MuJoCo makes of URDF's planar joint
 X, Y, Z = np.eye(3)
@@ -146,8 +150,8 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
 
     model = copy.copy(model)
     pose = mujoco.MjData(model)
-    pose.qpos[:] = _positions(model, options, label)
-    _turn(model, pose, FORWARD[forward])
+    pose.qpos[:] = positions(model, options, label)
+    turn(model, pose, FORWARD[forward])
     mujoco.mj_kinematics(model, pose)
     snapped = snap(model, pose)
     mujoco.mj_kinematics(model, pose)
@@ -158,15 +162,15 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
         for joint in range(model.njnt)
         if not keeps[joint] and model.jnt_bodyid[joint] not in floating
     ]
-    followers = list(_followers(model))
+    coupled = list(followers(model))
     why = dict.fromkeys(spatial, "leaves the plane")
-    for _ in followers:
-        for follower, leader, _ in followers:
+    for _ in coupled[:LONGEST_TRAIN]:
+        for follower, leader, _ in coupled:
             if keeps[follower] and (leader < 0 or not keeps[leader]):
                 keeps[follower] = False
-                why[follower] = f"follows {_name(model, leader)}" if leader >= 0 else "is held"
+                why[follower] = f"follows {joint_name(model, leader)}" if leader >= 0 else "is held"
     if not options.projected:
-        _refuse_spatial_joints(model, pose, spatial, label)
+        refuse_spatial_joints(model, pose, spatial, label)
     found = tuple(_coordinates(model, pose, keeps, floating))
     coordinates = _in_order(found, model)
     if options.projected and (spatial or any(_is_free(model, body) for body in floating)):
@@ -175,7 +179,11 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
                 f"{label}: no joint of this robot moves in the x–z plane, so there is nothing to "
                 "project. Turn it so that it walks along x, with its pitch joints about y."
             )
-        lateral = _asymmetry(model, pose, coordinates, label)
+        # The joints that stay mark the middle: those of one side have twins on the other.
+        joints = [one for one in coordinates if one.joint >= 0] or coordinates
+        places = [float(one.anchor[1]) for one in joints]
+        middle = 0.5 * (min(places) + max(places))
+        lateral = asymmetry(model, pose, [one.body for one in coordinates], middle, label)
     else:
         lateral = []
     locked = tuple(_locked(model, pose, joint, why[joint]) for joint in sorted(why))
@@ -193,7 +201,7 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
 def _of_snapped(model: Any, snapped: dict[int, float]) -> Iterator[str]:
     if snapped:
         shown = list(snapped)[:MANY]
-        names = ", ".join(f"{_name(model, joint)} by {snapped[joint]:.2g}" for joint in shown)
+        names = ", ".join(f"{joint_name(model, joint)} by {snapped[joint]:.2g}" for joint in shown)
         more = f" and {len(snapped) - MANY} more" if len(snapped) > MANY else ""
         yield f"axes that miss the x–z plane by rounding are turned into it (rad): {names}{more}."
 
@@ -221,93 +229,15 @@ def _of_locked(locked: tuple[LockedJoint, ...], options: Options) -> Iterator[st
         return
     words = ", ".join(joint.name for joint in locked[:SHOWN])
     more = f" and {len(locked) - SHOWN} more" if len(locked) > SHOWN else ""
+    number = f"{len(locked)} joints are" if len(locked) > 1 else "1 joint is"
     if options.projected:
         yield (
-            f"projected onto the x–z plane; {len(locked)} joints are locked: {words}{more}. "
+            f"projected onto the x–z plane; {number} locked: {words}{more}. "
             "Robot.locked is their table. What the robot does out of this plane (roll, yaw, side "
             "steps) is left out."
         )
     else:
         yield f"{words}{more} cannot move, for equality constraints hold them: they are locked."
-
-
-# Where the joints are
-
-
-def _positions(model: Any, options: Options, label: str) -> Floats:
-    """Positions of all joints: those of the file, the pose asked for, and what follows from it."""
-    q = np.array(model.qpos0, dtype=np.float64)
-    names = {_name(model, joint): joint for joint in range(model.njnt)}
-    pose = options.pose or {}
-    for name, value in pose.items():
-        if name not in names:
-            near = difflib.get_close_matches(name, names, n=1)
-            guess = f" Did you mean {near[0]!r}?" if near else ""
-            raise RobotError(f"{label}: pose names {name!r}, and there is no such joint.{guess}")
-        joint = names[name]
-        if model.jnt_type[joint] not in (SLIDE, HINGE):
-            raise RobotError(f"{label}: pose names {name!r}, a joint that no one number moves.")
-        low, high = model.jnt_range[joint] if model.jnt_limited[joint] else (-np.inf, np.inf)
-        if not low - IN_PLANE <= value <= high + IN_PLANE:
-            raise RobotError(
-                f"{label}: pose puts joint {name!r} at {value:g}, outside its range {low:.4g} … "
-                f"{high:.4g} (rad, m)."
-            )
-        q[model.jnt_qposadr[joint]] = value
-    followers = list(_followers(model))
-    for _ in followers:  # one may follow another
-        for joint, leader, factors in followers:
-            if _name(model, joint) not in pose:
-                place = model.jnt_qposadr[joint]
-                there = 0.0
-                if leader >= 0:
-                    address = model.jnt_qposadr[leader]
-                    there = float(q[address] - model.qpos0[address])
-                q[place] = model.qpos0[place] + sum(c * there**k for k, c in enumerate(factors))
-    return q
-
-
-def _followers(model: Any) -> Iterator[tuple[int, int, Floats]]:
-    """Joints that the file couples to others (-1: to nothing), with polynomials of their motion."""
-    import mujoco
-
-    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_EQUALITY):
-        return
-    for one in range(model.neq):
-        joint = int(model.eq_obj1id[one])
-        if (
-            model.eq_type[one] == mujoco.mjtEq.mjEQ_JOINT
-            and model.eq_active0[one]
-            and model.jnt_type[joint] in (SLIDE, HINGE)
-        ):
-            yield joint, int(model.eq_obj2id[one]), np.array(model.eq_data[one, :5])
-
-
-def _turn(model: Any, pose: Any, quarters: int) -> None:
-    """Turn everything that hangs on the world by quarters of a turn, so that it looks along x."""
-    import mujoco
-
-    if quarters == 0:
-        return
-    angle = -0.5 * np.pi * quarters
-    c, s = round(np.cos(angle)), round(np.sin(angle))
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    quaternion = np.array([np.cos(0.5 * angle), 0.0, 0.0, np.sin(0.5 * angle)])
-
-    def turned(before: Floats) -> Floats:
-        after = np.zeros(4)
-        mujoco.mju_mulQuat(after, quaternion, np.asarray(before, dtype=np.float64))
-        return after
-
-    for body in np.flatnonzero(model.body_parentid == 0)[1:]:
-        model.body_pos[body] = turn @ model.body_pos[body]
-        model.body_quat[body] = turned(model.body_quat[body])
-        joint = model.body_jntadr[body]
-        if joint >= 0 and model.jnt_type[joint] == FREE:
-            place = model.jnt_qposadr[joint]
-            pose.qpos[place : place + 3] = turn @ pose.qpos[place : place + 3]
-            pose.qpos[place + 3 : place + 7] = turned(pose.qpos[place + 3 : place + 7])
-    model.opt.gravity[:] = turn @ model.opt.gravity
 
 
 # What moves in the plane
@@ -371,7 +301,7 @@ def _coordinates(
             if not keeps[joint] and kind != BALL:
                 continue
             yield Coordinate(
-                _name(model, joint),
+                joint_name(model, joint),
                 body,
                 kind != SLIDE,
                 Y if kind == BALL else np.array(pose.xaxis[joint]),
@@ -422,126 +352,13 @@ def _locked(model: Any, pose: Any, joint: int, why: str) -> LockedJoint:
     kind = int(model.jnt_type[joint])
     x, y, z = (float(value) for value in np.round(pose.xaxis[joint], 12) + 0.0)
     return LockedJoint(
-        name=_name(model, joint),
+        name=joint_name(model, joint),
         link=model.body(model.jnt_bodyid[joint]).name,
         kind=KINDS[kind],
         axis=(0.0, 0.0, 0.0) if kind in (FREE, BALL) else (x, y, z),
         position=0.0 if kind in (FREE, BALL) else float(pose.qpos[model.jnt_qposadr[joint]]),
         reason="keeps its pitch only" if kind == BALL else why,
     )
-
-
-def _name(model: Any, joint: int) -> str:
-    """Name of a joint; a nameless one is called after the body that it moves."""
-    given: str = model.joint(joint).name
-    if given:
-        return given
-    body = model.jnt_bodyid[joint]
-    several = model.body_jntnum[body] > 1
-    ending = f"_{joint - model.body_jntadr[body]}" if several else ""
-    return (model.body(body).name or f"body {body}") + ending
-
-
-# What cannot be flattened
-
-
-def _refuse_spatial_joints(model: Any, pose: Any, spatial: list[int], label: str) -> None:
-    """Raise an error that names the joints which leave the plane, if there are any."""
-    axes = pose.xaxis
-    said = []
-    for joint in spatial:
-        kind = model.jnt_type[joint]
-        name = model.joint(joint).name or f"joint {joint}"
-        body = model.body(model.jnt_bodyid[joint]).name or f"body {model.jnt_bodyid[joint]}"
-        direction = "({:.3g}, {:.3g}, {:.3g})".format(*(axes[joint] + 0.0))
-        if kind == FREE:
-            raise RobotError(
-                f"{label}: {name!r} of body {body!r} is a free joint, which moves in three "
-                "dimensions. For a robot in the x–z plane give the body three joints instead: "
-                "slide along x, slide along z, hinge about y, in this order; or load it with "
-                "floating=True, which does so, or with projected=True, which also locks all joints "
-                "that leave the plane."
-            )
-        if kind == BALL:
-            said.append(f"{name!r} of body {body!r} is a ball joint")
-        elif kind == HINGE:
-            said.append(f"{name!r} of body {body!r} turns about {direction}")
-        else:
-            said.append(f"{name!r} of body {body!r} slides along {direction}")
-    if not said:
-        return
-    shown = "; ".join(f"joint {one}" for one in said[:SHOWN])
-    more = f"; and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
-    hinges = axes[model.jnt_type == HINGE]
-    parallel = (
-        len(hinges) > 0
-        and BALL not in model.jnt_type
-        and np.abs(np.cross(hinges, hinges[0])).max() < IN_PLANE
-    )
-    mend = (
-        "All its hinges are parallel: turn the robot so that they point along y."
-        if parallel
-        else "Remove these joints (or weld them) to keep the motion in the plane, or load the "
-        "robot with projected=True, which locks them."
-    )
-    raise RobotError(
-        f"{label}: this robot leaves the x–z plane; heelstrike simulates planar robots, whose "
-        "hinges turn about y and whose slides stay in x–z. In its reference configuration, "
-        f"{shown}{more}. {mend}"
-    )
-
-
-def _asymmetry(model: Any, pose: Any, coordinates: tuple[Coordinate, ...], label: str) -> list[str]:
-    """Refuse a robot whose mass lies to one side: moving in the plane would turn it out of it.
-
-    Return what to say of a small asymmetry.
-    """
-    moving = np.isin(model.body_rootid, [model.body_rootid[one.body] for one in coordinates])
-    names = [model.body(body).name for body in np.flatnonzero(moving)]
-    mass = model.body_mass[moving]
-    if not mass.sum() > 0.0:
-        return []  # which the reader says better
-    place = pose.xipos[moving]
-    apart = np.abs(place - place[counterparts(names)]).sum(axis=0)
-    if apart[0] > apart[1]:
-        raise RobotError(
-            f"{label}: it cannot be projected onto the x–z plane, because its left and right lie "
-            'one behind the other there. Does it walk along y? forward="y" turns it.'
-        )
-    center = mass @ place / mass.sum()
-    arm = place - center
-    turn = pose.ximat[moving].reshape(-1, 3, 3)
-    inertia = np.einsum("bij,bj,bkj->ik", turn, model.body_inertia[moving], turn)
-    inertia += np.einsum("b,bi,bi->", mass, arm, arm) * np.eye(3) - np.einsum(
-        "b,bi,bj->ij", mass, arm, arm
-    )
-    size = float(np.sqrt(inertia[1, 1] / mass.sum()))
-    # The joints that stay mark the middle: what is on one side has its counterpart on the other.
-    joints = [one for one in coordinates if one.joint >= 0] or coordinates
-    anchors = [one.anchor[1] for one in joints]
-    aside = float(center[1] - 0.5 * (min(anchors) + max(anchors)))
-    product = float(np.abs(inertia[1, ::2]).max())
-    found = [
-        (
-            abs(aside) / size,
-            f"its centre of mass is {aside:.3g} m to the side of its middle: left and right weigh "
-            "differently",
-        ),
-        (
-            product / float(inertia[1, 1]),
-            f"its products of inertia with y ({product:.3g} kg m² against {inertia[1, 1]:.3g} kg "
-            "m²) turn it out of that plane as soon as it pitches: left and right are not mirror "
-            "images in this posture",
-        ),
-    ]
-    for share, words in found:
-        if share > LATERAL[1]:
-            raise RobotError(
-                f"{label}: it cannot be projected onto the x–z plane, because {words}."
-            )
-    return [
-        f"the projection is rough, because {words}." for share, words in found if share > LATERAL[0]
-    ]
 
 
 def _is_free(model: Any, body: int) -> bool:

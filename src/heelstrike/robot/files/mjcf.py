@@ -10,11 +10,11 @@ import numpy as np
 from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
 from heelstrike.robot.contact_points import of_model, read_contact_points
 from heelstrike.robot.files.actuators import read_actuators
-from heelstrike.robot.files.flattening import BALL
 from heelstrike.robot.files.joint_numbers import read_joint_numbers
 from heelstrike.robot.files.links import read_links
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
 from heelstrike.robot.files.options import AVERAGE, LoadOptions, Options
+from heelstrike.robot.files.posture import BALL
 from heelstrike.robot.files.unmodelled import warn_of_unmodelled
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot

@@ -26,6 +26,7 @@ from heelstrike.robot.files.urdf import (
     let_massless_links_pass,
     let_thin_meshes_pass,
     missing_moments,
+    translate_dialects,
     urdf_text,
 )
 from heelstrike.robot.plausibility import is_possible
@@ -132,6 +133,8 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     try:
         with _warnings_into(remarks):
             urdf = xml.tag == "robot"
+            if urdf:
+                translate_dialects(xml)
             if urdf and not options.lenient:
                 check_urdf(xml, label)
             missing = missing_moments(xml)
@@ -222,6 +225,7 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     text = file.text
     urdf = file.xml.tag == "robot"
     if urdf:
+        translate_dialects(file.xml)
         directory = source.parent if isinstance(source, Path) else Path()
         text = urdf_text(file.xml, directory, packages, label)
         check_urdf_tree(file.xml, label)

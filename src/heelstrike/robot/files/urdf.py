@@ -15,6 +15,9 @@ from heelstrike.robot.warning import warn
 
 WORLD = "world"
 _SMALLEST = 2e-15  # what MuJoCo takes for a massless link, just above its own limit
+_TAGS = {"drake:joint": "joint", "drake:capsule": "capsule"}
+_JOINTS = {"planaraxis": "planar", "ball": "spherical"}
+_SHAPES = {"box", "sphere", "cylinder", "capsule", "mesh"}
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -77,6 +80,15 @@ def missing_moments(root: Element) -> dict[str, list[str]]:
     return found
 
 
+def translate_dialects(root: Node) -> None:
+    """Give what Drake and Dojo add to URDF the names that others know."""
+    for element in root.iter():
+        element.tag = _TAGS.get(element.tag, element.tag)
+        if element.tag == "joint":
+            kind = element.get("type", "")
+            element.set("type", _JOINTS.get(kind, kind))
+
+
 def let_massless_links_pass(spec: Any) -> None:
     """Give massless links the least mass that MuJoCo takes, far below any that is meant."""
     spec.compiler.boundmass = max(spec.compiler.boundmass, _SMALLEST)
@@ -86,35 +98,49 @@ def let_massless_links_pass(spec: Any) -> None:
 def _mend_world(root: Node) -> None:
     """Have a link ``world`` where joints hang on it, without mass, and nowhere below others.
 
-    Parsers know the world by this name: it need not be written down, and it cannot be moved.
+    Parsers know the world by this name: it need not be written down, and it cannot be moved. What
+    carries a free robot, and weighs nothing, is the world too.
     """
     links = {link.get("name", ""): link for link in root.iterfind("link")}
     parents = list(root.iterfind("joint/parent"))
-    children = [child for child in root.iterfind("joint/child") if child.get("link") == WORLD]
+    below = {child.get("link") for child in root.iterfind("joint/child")}
+    for joint in root.iterfind("joint"):
+        base = joint.find("parent")
+        name = "" if base is None else base.get("link", "")
+        link = links.get(name)
+        bare = link is not None and link.find("inertial") is None and name not in below
+        if bare and joint.get("type") == "floating" and WORLD not in links:
+            links[WORLD] = links.pop(name)
+            _rename(links[WORLD], WORLD, parents)
     if WORLD not in links:
         if any(parent.get("link") == WORLD for parent in parents):
             link = Node("link", {"name": WORLD})
             link.line = root.line
             root.insert(0, link)
         return
-    if not children:
+    if WORLD not in below:
         for inertial in links[WORLD].findall("inertial"):
             links[WORLD].remove(inertial)
         return
     other = WORLD
     while other in links:
         other += "_"
-    links[WORLD].set("name", other)
-    for end in (*children, *(parent for parent in parents if parent.get("link") == WORLD)):
-        end.set("link", other)
+    _rename(links[WORLD], other, [*parents, *root.iterfind("joint/child")])
+
+
+def _rename(link: Element, name: str, ends: Sequence[Element]) -> None:
+    """Give a link another name, at the ends of joints too."""
+    old = link.get("name")
+    link.set("name", name)
+    for end in ends:
+        if end.get("link") == old:
+            end.set("link", name)
 
 
 def _take_the_first(root: Node, label: str) -> None:
     """Of two ``<dynamics>`` of a joint the first counts, as for the parsers of ROS."""
     several = []
     for joint in root.iterfind("joint"):
-        if joint.get("type") == "planaraxis":  # what Dojo calls a planar joint
-            joint.set("type", "planar")
         for more in joint.findall("dynamics")[1:]:
             joint.remove(more)
             several.append(joint.get("name", ""))
@@ -158,7 +184,14 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
     """
     missing: dict[str, str] = {}
     weighed: list[str] = []
+    strange: list[str] = []
     size = 0
+    ornaments = {
+        child.get("link", "")
+        for joint in root.iterfind("joint")
+        if joint.get("type") == "fixed"
+        for child in joint.findall("child")
+    }
     for link in root.iterfind("link"):
         name = link.get("name", "")
         for visual in link.findall("visual"):
@@ -169,13 +202,16 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
             if mesh is None:
+                if not any(shape.tag in _SHAPES for shape in collision.iterfind("geometry/*")):
+                    link.remove(collision)
+                    strange.append(name)
                 continue
             address = mesh.get("filename", "")
             file = find_file(address, directory, packages)
             if file is not None and is_mesh(file):
                 mesh.set("filename", str(file))
                 size += file.stat().st_size
-            elif has_inertia:
+            elif has_inertia or name in ornaments:
                 link.remove(collision)
                 missing.setdefault(name, address)
             else:
@@ -195,6 +231,12 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
             f"and toe; or name the folder of its package: package_path=…. The first is "
             f"{next(iter(missing.values()))[:200]!r}."
         )
+    if strange:
+        warn(
+            f"{label}: {', '.join(strange)} have collision shapes that are none, or of a kind that "
+            "heelstrike does not know; they are left out."
+        )
+    weighed = [name for name in weighed if name not in missing]
     if weighed:
         warn(
             f"{label}: {', '.join(weighed)} have no <inertial>; their masses are those of their "

@@ -223,8 +223,8 @@ def compliant_workspace(
 @kernel
 def command(controller: Any, control: Control, time: float, model: Model, memory: Memory) -> None:
     """Ask the controller for its torques at the state now, within their limits."""
-    ask(controller, control, time, memory.q, memory.v, model, memory, memory.torque)
-    try_torque(model, memory.q, memory.v, memory.torque, memory)
+    ask(controller, time, memory.q, memory.v, model, memory, control, memory.torque)
+    try_torque(model, memory.q, memory.v, memory.tally, memory.torque)
 
 
 @kernel
@@ -232,8 +232,8 @@ def try_command(
     controller: Any, control: Control, time: float, model: Model, memory: Memory, torque: Floats
 ) -> None:
     """Torques that a controller would ask for, were this its next call; it remembers nothing."""
-    consult(controller, control, time, memory.q, memory.v, model, memory, torque)
-    try_torque(model, memory.q, memory.v, torque, memory)
+    consult(controller, time, memory.q, memory.v, model, memory, control, torque)
+    try_torque(model, memory.q, memory.v, memory.tally, torque)
 
 
 @kernel
@@ -245,8 +245,8 @@ def find_gains(
     for j in range(model.parent.shape[0]):
         memory.q[j] = work.base_q[j]
         memory.v[j] = work.base_v[j]
-    forward_kinematics(model, memory.q, memory.tree)
-    link_velocities(model, memory.v, memory.tree)
+    forward_kinematics(model, memory.q, memory.equations.tree)
+    link_velocities(model, memory.v, memory.equations.tree)
     try_command(controller, control, time, model, memory, memory.torque)
     for j in range(model.parent.shape[0]):
         difference(
@@ -281,8 +281,8 @@ def difference(
     for side in range(2):
         change = PERTURBATION if side == 0 else -PERTURBATION
         varied[j] = kept + change
-        forward_kinematics(model, memory.q, memory.tree)
-        link_velocities(model, memory.v, memory.tree)
+        forward_kinematics(model, memory.q, memory.equations.tree)
+        link_velocities(model, memory.v, memory.equations.tree)
         try_command(controller, control, time, model, memory, trial)
         for i in range(trial.shape[0]):
             slope = (trial[i] - memory.torque[i]) / change
@@ -308,7 +308,7 @@ def evaluate(
     would do (``TRIED``), for good (``DECIDED``), or for good with the contact forces of this very
     state, which is ``ACCEPTED``.
     """
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
     push_contacts(model, work.laws, memory, work)
     push_stops(model, work.laws, memory, work)
     rub_joints(model, work.laws.numbers[JOINT_SCALE], memory, work)
@@ -321,48 +321,55 @@ def evaluate(
             try_command(controller, control, time, model, memory, memory.torque)
         else:
             command(controller, control, time, model, memory)
-    mass_matrix(model, memory.tree, memory.mass_matrix)
-    factorize(model, memory.mass_matrix, memory.factor)
-    bias_force(model, memory.tree, memory.rate)
-    passive_force(model, memory.q, memory.v, memory.force)
-    add_pushes(model, memory.tree, memory.pushes, memory.force)
+    mass_matrix(model, memory.equations.tree, memory.equations.mass_matrix)
+    factorize(model, memory.equations.mass_matrix, memory.equations.factor)
+    bias_force(model, memory.equations.tree, memory.equations.rate)
+    passive_force(model, memory.q, memory.v, memory.equations.force)
+    add_pushes(model, memory.equations.tree, memory.pushes, memory.equations.force)
     for i in range(model.actuator_joint.shape[0]):
-        memory.force[model.actuator_joint[i]] += memory.torque[i]
+        memory.equations.force[model.actuator_joint[i]] += memory.torque[i]
     rate = work.acceleration
     nv = model.parent.shape[0]
     for j in range(nv):
-        rate[j] = memory.force[j] - memory.rate[j] + work.stop_force[j] + work.dry_force[j]
+        rate[j] = (
+            memory.equations.force[j]
+            - memory.equations.rate[j]
+            + work.stop_force[j]
+            + work.dry_force[j]
+        )
     for contact in range(model.contact_link.shape[0]):
         normal = work.force[contact, 0]
         tangent = work.force[contact, 1]
         if normal > 0.0:
             for j in range(nv):
                 rate[j] += (
-                    memory.jacobian[2 * contact, j] * normal
-                    + memory.jacobian[2 * contact + 1, j] * tangent
+                    memory.assembly.jacobian[2 * contact, j] * normal
+                    + memory.assembly.jacobian[2 * contact + 1, j] * tangent
                 )
-    solve_factorized(model, memory.factor, rate)
+    solve_factorized(model, memory.equations.factor, rate)
 
 
 @kernel
 def push_contacts(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
     """Forces of the contacts and rates of the bristles at the state now."""
+    jacobian = memory.assembly.jacobian
     for contact in range(model.contact_link.shape[0]):
         partial = work.partial[contact]
         gap = memory.contacts.gap[contact]
         normal = 0.0
-        memory.slip[contact] = 0.0
+        memory.reaction.slip[contact] = 0.0
         if gap < 0.0:
-            contact_rows(model, memory, contact, contact)
-            memory.slip[contact] = row_product(memory, 2 * contact + 1, memory.v)
-            normal_speed = row_product(memory, 2 * contact, memory.v)
+            tree = memory.equations.tree
+            contact_rows(model, tree, memory.contacts, contact, contact, memory.assembly)
+            memory.reaction.slip[contact] = row_product(jacobian, 2 * contact + 1, memory.v)
+            normal_speed = row_product(jacobian, 2 * contact, memory.v)
             normal = normal_force(laws.normal, laws.numbers, gap, normal_speed, partial)
         tangent, bristle_rate = friction_force(
             laws.friction,
             laws.numbers,
-            memory.friction[contact],
+            memory.surface.friction[contact],
             normal,
-            memory.slip[contact],
+            memory.reaction.slip[contact],
             work.bristle[contact],
             partial,
         )
@@ -412,7 +419,7 @@ def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
         for k in range(2):
             work.base_stop_partial[i, k] = work.stop_partial[i, k]
         for j in range(nv):
-            work.base_matrix[i, j] = memory.mass_matrix[i, j]
+            work.base_matrix[i, j] = memory.equations.mass_matrix[i, j]
     for contact in range(model.contact_link.shape[0]):
         work.base_bristle[contact] = work.bristle[contact]
         work.base_rate[contact] = work.bristle_rate[contact]
@@ -420,7 +427,7 @@ def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
         for k in range(2):
             work.base_force[contact, k] = work.force[contact, k]
             for j in range(nv):
-                work.base_rows[2 * contact + k, j] = memory.jacobian[2 * contact + k, j]
+                work.base_rows[2 * contact + k, j] = memory.assembly.jacobian[2 * contact + k, j]
         for k in range(PARTIALS):
             work.base_partial[contact, k] = work.partial[contact, k]
 

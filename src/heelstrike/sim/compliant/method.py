@@ -7,6 +7,8 @@ shorten them while a foot stands; they end where a contact point meets the groun
 where the force really changes fast, after an impact.
 """
 
+# ruff: noqa: ARG001 - the kernels of all methods have the same arguments
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -46,7 +48,7 @@ from heelstrike.sim.compliant.dynamics import (
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels
+from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import share_over_step
@@ -59,6 +61,7 @@ from heelstrike.sim.record.recording import (
     STICK,
     TOUCHDOWN,
     limit_torque,
+    log_event,
     note_event,
     note_row_when_due,
 )
@@ -202,18 +205,18 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
         gap = memory.contacts.gap[contact]
         before = work.base_gap[contact]
         memory.tally.penetration = max(memory.tally.penetration, -gap)
-        if memory.closed[contact] == 0 and gap < 0.0:
-            memory.closed[contact] = 1
+        if memory.reported.closed[contact] == 0 and gap < 0.0:
+            memory.reported.closed[contact] = 1
             share = before / (before - gap) if before > 0.0 else 0.0
             work.touched[contact] = since + share * h
-        elif memory.closed[contact] == 1 and gap > LIFTOFF_GAP:
-            memory.closed[contact] = 0
+        elif memory.reported.closed[contact] == 1 and gap > LIFTOFF_GAP:
+            memory.reported.closed[contact] = 0
             share = before / (before - gap) if before < 0.0 else 0.0
             work.left[contact] = since + share * h
 
 
 @kernel
-def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace) -> float:
+def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspace) -> float:
     """Part of the step after which the first contact point that fell into the ground met it.
 
     One, if none began the step above the ground and ended it deeper than `depth`. The stages of a
@@ -221,7 +224,7 @@ def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace
     """
     first = 1.0
     for contact in range(model.contact_link.shape[0]):
-        gap = memory.contacts.gap[contact]
+        gap = gap_now[contact]
         before = work.base_gap[contact]
         if before > depth and gap < -depth:
             first = min(first, before / (before - gap))
@@ -229,13 +232,13 @@ def landing(model: Model, depth: float, memory: Memory, work: CompliantWorkspace
 
 
 @kernel
-def cone_residual(model: Model, memory: Memory, work: CompliantWorkspace) -> float:
+def cone_residual(model: Model, friction: Floats, work: CompliantWorkspace) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
     for contact in range(model.contact_link.shape[0]):
         normal = work.force[contact, 0]
         tangent = abs(work.force[contact, 1])
-        excess = max(-normal, tangent - memory.friction[contact] * normal)
+        excess = max(-normal, tangent - friction[contact] * normal)
         if excess > 0.0:
             worst = max(worst, excess / (abs(normal) + tangent))
     return worst
@@ -258,7 +261,7 @@ def sample(
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] = 0.0
         work.dry_impulse[joint] = 0.0
-    memory.answer.residual[1] = cone_residual(model, memory, work)
+    memory.assembly.answer.residual[1] = cone_residual(model, memory.surface.friction, work)
     span = work.step
     elapsed = 0.0
     h = work.proposed
@@ -289,8 +292,8 @@ def sample(
             h = max(taken * factor, SHORTEST)
             rejected = True
             continue
-        observe(model, ground, memory)
-        met = landing(model, work.atol, memory, work)
+        observe(model, ground, memory.q, memory.v, memory)
+        met = landing(model, work.atol, memory.contacts.gap, work)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
@@ -298,8 +301,8 @@ def sample(
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
-        memory.answer.residual[1] = max(
-            memory.answer.residual[1], cone_residual(model, memory, work)
+        memory.assembly.answer.residual[1] = max(
+            memory.assembly.answer.residual[1], cone_residual(model, memory.surface.friction, work)
         )
         memory.tally.steps += 1
         work.age += 1
@@ -318,86 +321,78 @@ def sample(
         for k in range(2):
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
     for joint in range(model.parent.shape[0]):
-        memory.stop_torque[joint] = work.stop_impulse[joint] / span
-        memory.friction_torque[joint] = work.dry_impulse[joint] / span
-    memory.tally.cone = max(memory.tally.cone, memory.answer.residual[1])
+        memory.reaction.stop_torque[joint] = work.stop_impulse[joint] / span
+        memory.reaction.friction_torque[joint] = work.dry_impulse[joint] / span
+    memory.tally.cone = max(memory.tally.cone, memory.assembly.answer.residual[1])
     return DONE
 
 
 @kernel
 def note_events(
-    model: Model, record: Record, time: float, memory: Memory, work: CompliantWorkspace
+    model: Model, time: float, work: CompliantWorkspace, memory: Memory, record: Record
 ) -> None:
     """Note what happened since the last sample; `time` is now.
 
     Touchdown and lift-off are timed where the gap passes zero, stick and slip to the sample.
     """
+    force = memory.contacts.force
     for contact in range(model.contact_link.shape[0]):
         touched = work.touched[contact]
         left = work.left[contact]
         if touched >= 0.0 or left >= 0.0:
-            memory.slipping[contact] = 0
+            memory.reported.slipping[contact] = 0
         if left >= 0.0 and left < touched:
-            note_event(record, left, LIFTOFF, contact, memory)
+            note_event(left, LIFTOFF, contact, work.step, force, record)
         if touched >= 0.0:
-            note_event(record, touched, TOUCHDOWN, contact, memory)
+            note_event(touched, TOUCHDOWN, contact, work.step, force, record)
         if left >= 0.0 and left >= touched:
-            note_event(record, left, LIFTOFF, contact, memory)
+            note_event(left, LIFTOFF, contact, work.step, force, record)
         if left >= 0.0 or work.force[contact, 0] <= 0.0:
             continue
         sliding = slips(
             work.laws.friction,
             work.laws.numbers,
-            memory.friction[contact] * work.force[contact, 0],
-            memory.slip[contact],
+            memory.surface.friction[contact] * work.force[contact, 0],
+            memory.reaction.slip[contact],
             work.bristle[contact],
         )
-        if sliding and memory.slipping[contact] == 0:
-            memory.slipping[contact] = 1
-            note_event(record, time, SLIP, contact, memory)
-        elif not sliding and memory.slipping[contact] == 1:
-            memory.slipping[contact] = 0
-            note_event(record, time, STICK, contact, memory)
+        if sliding and memory.reported.slipping[contact] == 0:
+            memory.reported.slipping[contact] = 1
+            note_event(time, SLIP, contact, work.step, force, record)
+        elif not sliding and memory.reported.slipping[contact] == 1:
+            memory.reported.slipping[contact] = 0
+            note_event(time, STICK, contact, work.step, force, record)
     for joint in range(model.parent.shape[0]):
-        pressed = memory.stop_torque[joint] != 0.0
-        if pressed and memory.stopped[joint] == 0:
-            place = record.events
-            record.event_time[place] = time
-            record.event_kind[place] = JOINT_STOP
-            record.event_contact[place] = joint
-            record.event_impulse[place, 0] = abs(memory.stop_torque[joint])
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
-        memory.stopped[joint] = 1 if pressed else 0
+        pressed = memory.reaction.stop_torque[joint] != 0.0
+        if pressed and memory.reported.stopped[joint] == 0:
+            impulse = abs(memory.reaction.stop_torque[joint]) * work.step
+            log_event(time, JOINT_STOP, joint, impulse, 0.0, record)
+        memory.reported.stopped[joint] = 1 if pressed else 0
 
 
 @kernel
 def note_forces(
-    record: Record, row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory
+    row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory, record: Record
 ) -> None:
     """Write the forces of contacts and joints, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
     for contact in range(force.shape[0]):
-        record.force[row, contact, 0] = force[contact, 0]
-        record.force[row, contact, 1] = force[contact, 1]
-        record.slip[row, contact] = memory.slip[contact]
-    record.residual[row, 1] = memory.answer.residual[1]
+        record.contact_force[row, contact, 0] = force[contact, 0]
+        record.contact_force[row, contact, 1] = force[contact, 1]
+        record.slip_velocity[row, contact] = memory.reaction.slip[contact]
+    record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
 @kernel
 def begin(
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,  # noqa: ARG001
-    record: Record,  # noqa: ARG001
+    model: Model, ground: GroundModel, memory: Memory, work: CompliantWorkspace, record: Record
 ) -> int:
     """Points in the ground, or on it, are closed when the simulation begins."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
     for contact in range(model.contact_link.shape[0]):
-        memory.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
+        memory.reported.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
     return DONE
 
 
@@ -406,72 +401,52 @@ def prepare(
     model: Model,
     ground: GroundModel,
     memory: Memory,
-    work: CompliantWorkspace,  # noqa: ARG001
+    work: CompliantWorkspace,
 ) -> None:
     """Kinematics and contact points of the state now."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
 
 
 @kernel
 def decide(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,  # noqa: ARG001
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> int:
+) -> int:  # fmt: skip
     """Forces and rates at this sample, under the torques that the frame asked for."""
-    share_over_step(memory.pushes, clock.time, work.step)
-    evaluate(controller, control, model, ground, HELD, clock.time, memory, work)
+    share_over_step(clock.time, work.step, memory.pushes)
+    evaluate(scene.controller, control, scene.model, scene.ground, HELD, clock.time, memory, work)
     return DONE
 
 
 @kernel
 def report(
-    controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> None:
+) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
-    work.row = note_row_when_due(record, memory, clock)
+    work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
-        note_forces(record, work.row, work.force, work.stop_force, work.dry_force, memory)
+        note_forces(work.row, work.force, work.stop_force, work.dry_force, memory, record)
 
 
 @kernel
 def move(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    work: CompliantWorkspace,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, work: CompliantWorkspace, record: Record,
     clock: Clock,
-) -> int:
+) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
-    code = sample(controller, control, model, ground, clock.time, memory, work)
+    model = scene.model
+    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
     if code != DONE:
         return code
     step = work.step
-    first = record.events
-    note_events(model, record, clock.time + step, memory, work)
-    for place in range(first, record.events):
-        record.event_impulse[place, 0] *= step
-        record.event_impulse[place, 1] *= step
+    note_events(model, clock.time + step, work, memory, record)
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
+        reaction = memory.reaction
         note_forces(
-            record, work.row, memory.contacts.force, memory.stop_torque, memory.friction_torque,
-            memory,
+            work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
+            memory, record,
         )  # fmt: skip
     if control.continuous == 1:
         for contact in range(model.contact_link.shape[0]):

@@ -17,43 +17,39 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.sets import press
+from heelstrike.contact.workspace import ContactProblem
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import write_unit_row
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Assembly
 
 
 @kernel
-def select_dry_joints(model: Model, count: int, memory: Memory) -> int:
+def select_dry_joints(
+    model: Model, count: int, dry_joint: Integers, guess: Integers, v: Floats, assembly: Assembly
+) -> int:
     """Append the joints with dry friction to the candidates of a step; return how many there are.
 
-    They are numbered on from the joint stops.
+    They are numbered on from the joint stops; `guess` holds their contact modes.
     """
-    nv = model.parent.shape[0]
-    first = model.contact_link.shape[0] + 2 * nv
-    for place in range(memory.dry_joint.shape[0]):
-        joint = memory.dry_joint[place]
-        write_unit_row(memory, joint, 2 * count + 1, 1.0)
-        memory.problem.free[2 * count + 1] = memory.next_v[joint]
-        memory.answer.mode[count] = memory.dry_mode[place]
-        memory.candidate[count] = first + place
+    first = model.nc + 2 * model.nv
+    for place in range(dry_joint.shape[0]):
+        joint = dry_joint[place]
+        write_unit_row(joint, 2 * count + 1, 1.0, assembly)
+        assembly.problem.free[2 * count + 1] = v[joint]
+        assembly.answer.mode[count] = guess[place]
+        assembly.candidate[count] = first + place
         count += 1
     return count
 
 
 @kernel
-def press_dry_joints(model: Model, step: float, count: int, memory: Memory) -> None:
+def press_dry_joints(
+    model: Model, step: float, count: int, dry_joint: Integers, problem: ContactProblem
+) -> None:
     """Complete the problem of the candidates, of which the dry joints are the last."""
-    number = memory.dry_joint.shape[0]
+    number = dry_joint.shape[0]
     for place in range(number):
-        limit = step * model.dry_friction[memory.dry_joint[place]]
-        press(memory.problem, count - number + place, limit)
-
-
-@kernel
-def note_dry_joint(place: int, impulse: float, step: float, found: int, memory: Memory) -> None:
-    """Keep the torque and the mode that the contact problem found for a dry joint."""
-    memory.friction_torque[memory.dry_joint[place]] = impulse / step
-    memory.dry_mode[place] = found
+        press(count - number + place, step * model.dry_friction[dry_joint[place]], problem)
 
 
 @kernel

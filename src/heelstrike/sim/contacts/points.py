@@ -1,8 +1,7 @@
 """Several contact points of a robot at once, without a branch: kernels for straight-line code.
 
 `points` (k,) lists the contact points. Rows and components go point by point in that order, normal
-before tangent. Arrays of (nc, 2) have an entry for every contact point of the robot; positions and
-normals are those of :func:`~heelstrike.sim.contacts.geometry.locate_contacts`.
+before tangent. Arrays of (nc, 2) have an entry for every contact point of the robot.
 """
 
 from __future__ import annotations
@@ -11,35 +10,31 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.kernels import solve_factorized, solve_upper
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
+from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.controller.interface import Contacts
 
 
 @kernel
 def point_delassus(
-    model: Model,
-    points: Integers,
-    tree: Workspace,
-    position: Floats,
-    normal: Floats,
-    factor: Floats,
-    rows: Floats,
-    delassus: Floats,
-) -> None:
+    model: Model, points: Integers, tree: Workspace, contacts: Contacts, factor: Floats,
+    rows: Floats, delassus: Floats,
+) -> None:  # fmt: skip
     """Delassus matrix G = J A⁻¹ Jᵀ of the points, (2 k, 2 k); `rows` (2 k, nv) is scratch.
 
     With A = Lᵀ D L it is Y D⁻¹ Yᵀ, where Y = J L⁻¹.
     """
     for place in range(points.shape[0]):
-        contact = points[place]
-        link = model.contact_link[contact]
-        write_point_rows(model, tree, link, position[contact], normal[contact], rows, 2 * place)
-        solve_upper(model, factor, rows[2 * place])
-        solve_upper(model, factor, rows[2 * place + 1])
+        contact, first = points[place], 2 * place
+        position, normal = contacts.position[contact], contacts.normal[contact]
+        write_point_rows(model, tree, model.contact_link[contact], position, normal, first, rows)
+        solve_upper(model, factor, rows[first])
+        solve_upper(model, factor, rows[first + 1])
     for row in range(rows.shape[0]):
         for column in range(row + 1):
             total = 0.0
-            for j in range(model.parent.shape[0]):
+            for j in range(model.nv):
                 total += rows[row, j] * factor[j, j] * rows[column, j]
             delassus[row, column] = total
             delassus[column, row] = total
@@ -47,66 +42,49 @@ def point_delassus(
 
 @kernel
 def point_velocities(
-    model: Model,
-    points: Integers,
-    tree: Workspace,
-    position: Floats,
-    normal: Floats,
-    v: Floats,
-    velocity: Floats,
+    model: Model, points: Integers, contacts: Contacts, v: Floats, tree: Workspace, velocity: Floats
 ) -> None:
     """Velocities (normal, tangent) of the points under the joint velocity v, into (nc, 2)."""
     link = tree.force  # scratch
-    for i in range(model.parent.shape[0]):
-        parent = model.parent[i]
-        for k in range(3):
-            link[i, k] = tree.motion[i, k] * v[i]
-            if parent >= 0:
-                link[i, k] += link[parent, k]
+    for i in range(model.nl):
+        motion = scaled(spatial(tree.motion, i), v[i])
+        if model.parent[i] >= 0:
+            motion = plus(motion, spatial(link, model.parent[i]))
+        write(i, motion, link)
     for place in range(points.shape[0]):
         contact = points[place]
-        i = model.contact_link[contact]
-        velocity[contact, 0], velocity[contact, 1] = into_frame(
-            normal[contact], velocity_at(link, i, place_of(tree, position[contact]))
+        at = velocity_at(
+            link, model.contact_link[contact], place_of(tree, contacts.position[contact])
         )
+        normal, tangent = into_frame(contacts.normal[contact], at)
+        velocity[contact, 0] = normal
+        velocity[contact, 1] = tangent
 
 
 @kernel
 def push_points(
-    model: Model,
-    points: Integers,
-    tree: Workspace,
-    position: Floats,
-    normal: Floats,
-    factor: Floats,
-    impulse: Floats,
-    force: Floats,
-    v: Floats,
-) -> None:
+    model: Model, points: Integers, contacts: Contacts, factor: Floats, impulse: Floats,
+    tree: Workspace, force: Floats, v: Floats,
+) -> None:  # fmt: skip
     """Add A⁻¹ Jᵀ λ to a velocity, λ (nc, 2) the impulses of the points; `force` is scratch.
 
     The impulses are gathered link by link, as moments about the pivot and resultants.
     """
     link = tree.force  # scratch
-    for i in range(model.parent.shape[0]):
-        for k in range(3):
-            link[i, k] = 0.0
+    for i in range(model.nl):
+        write(i, (0.0, 0.0, 0.0), link)
     for place in range(points.shape[0]):
         contact = points[place]
         i = model.contact_link[contact]
-        fx, fz = out_of_frame(normal[contact], (impulse[contact, 0], impulse[contact, 1]))
-        x, z = place_of(tree, position[contact])
-        link[i, 0] += z * fx - x * fz
-        link[i, 1] += fx
-        link[i, 2] += fz
-    for i in range(model.parent.shape[0] - 1, -1, -1):
+        fx, fz = out_of_frame(contacts.normal[contact], (impulse[contact, 0], impulse[contact, 1]))
+        x, z = place_of(tree, contacts.position[contact])
+        write(i, plus(spatial(link, i), (z * fx - x * fz, fx, fz)), link)
+    for i in range(model.nl - 1, -1, -1):
         parent = model.parent[i]
-        total = 0.0
-        for k in range(3):
-            total += tree.motion[i, k] * link[i, k]
-            if parent >= 0:
-                link[parent, k] += link[i, k]
-        force[i] = total
+        own = spatial(link, i)
+        force[i] = power(spatial(tree.motion, i), own)
+        if parent >= 0:
+            write(parent, plus(spatial(link, parent), own), link)
     solve_factorized(model, factor, force)
-    for i in range(model.parent.shape[0]):
+    for i in range(model.nv):
         v[i] += force[i]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -12,12 +13,13 @@ from numpy.typing import NDArray
 from heelstrike.compiler.recording import Program
 from heelstrike.compiler.straight_line import straight_line_code
 from heelstrike.dynamics.kernels import solve_factorized, state_equations
-from heelstrike.dynamics.workspace import workspace
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.points import point_delassus, point_velocities, push_points
+from heelstrike.sim.controller.interface import Contacts
 
-# Places in ``Memory.programs``; an address of zero means that there is none.
+# Places in ``Equations.programs``; an address of zero means that there is none.
 EQUATIONS = 0
 SOLVE = 1
 DELASSUS = 2
@@ -61,38 +63,30 @@ def straight_line_programs(model: Model, points: NDArray[np.int64]) -> NDArray[n
 
 
 def _programs(model: Model, points: NDArray[np.int64]) -> NDArray[np.int64]:
-    nv, nc, size = len(model.parent), len(model.contact_link), len(points)
+    nv, size = model.nv, len(points)
     count = len(KERNELS) if size > 0 else DELASSUS
     programs = np.zeros(len(KERNELS), dtype=np.int64)
     if not 0 < nv <= MOST_COORDINATES:
         return programs
-    matrix, vector, pairs = np.zeros((nv, nv)), np.zeros(nv), np.zeros((nc, 2))
-    tree = workspace(nv)
-    arguments: list[dict[str, Any]] = [
-        {
-            "model": model, "q": vector, "v": vector, "tree": tree,
-            "matrix": matrix, "factor": matrix, "bias": vector,
-        },
-        {"model": model, "factor": matrix, "x": vector},
-        {
-            "model": model, "points": points, "tree": tree, "position": pairs, "normal": pairs,
-            "factor": matrix, "rows": np.zeros((2 * size, nv)),
-            "delassus": np.zeros((2 * size, 2 * size)),
-        },
-        {
-            "model": model, "points": points, "tree": tree, "position": pairs, "normal": pairs,
-            "v": vector, "velocity": pairs,
-        },
-        {
-            "model": model, "points": points, "tree": tree, "position": pairs, "normal": pairs,
-            "factor": matrix, "impulse": pairs, "force": vector, "v": vector,
-        },
-    ][:count]  # fmt: skip
-    scratch = tuple(f"tree.{name}" for name in ("acceleration", "force", "composite", "zero"))
+    extents = {**model.extents, "components": 2}
+    pairs = np.zeros((model.nc, 2))
+    known: dict[str, Any] = {
+        "model": model, "q": np.zeros(model.nq), "v": np.zeros(nv), "x": np.zeros(nv),
+        "tree": Workspace.allocate(extents),
+        "matrix": np.zeros((nv, nv)), "factor": np.zeros((nv, nv)), "bias": np.zeros(nv),
+        "points": points, "contacts": Contacts.allocate(extents),
+        "rows": np.zeros((2 * size, nv)), "delassus": np.zeros((2 * size, 2 * size)),
+        "velocity": pairs, "impulse": pairs, "force": np.zeros(nv),
+    }  # fmt: skip
+    scratch = [f"tree.{name}" for name in ("acceleration", "force", "composite", "zero")]
     programs[:count] = straight_line_code(
         [
-            Program(kernel, values, scratch=(*scratch, "matrix", "rows", "force"))
-            for kernel, values in zip(KERNELS, arguments, strict=False)
+            Program(
+                kernel,
+                {name: known[name] for name in inspect.signature(kernel).parameters},
+                scratch=(*scratch, "matrix", "rows", "force"),
+            )
+            for kernel in KERNELS[:count]
         ],
         known={"tree.zero": np.zeros(nv)},
     )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from heelstrike.compiler.bundle import address_of
+from heelstrike.compiler.bundle_type import address_of
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.words import copy_words
 from heelstrike.robot.model import Floats, Integers, Model
@@ -17,29 +17,28 @@ from heelstrike.sim.memory import Memory
 
 @dissolved_kernel
 def ask(
-    controller: Any, control: Control, time: float, q: Floats, v: Floats, model: Model,
-    memory: Memory, torque: Floats,
+    controller: Any, time: float, q: Floats, v: Floats, model: Model, memory: Memory,
+    control: Control, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for its torques; they are no number if it wrote where it may not."""
-    _ask(controller, control, control.kept, control.kept_at, time, q, v, model, memory, torque)
+    _show(q, v, model, memory, control)
+    _ask(controller, time, control.kept, control.kept_at, control, torque)
 
 
 @dissolved_kernel
 def consult(
-    controller: Any, control: Control, time: float, q: Floats, v: Floats, model: Model,
-    memory: Memory, torque: Floats,
+    controller: Any, time: float, q: Floats, v: Floats, model: Model, memory: Memory,
+    control: Control, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for the torques it would want, were this its next call; it forgets that."""
     for i in range(control.kept.shape[0]):
         control.spare[i] = control.kept[i]
-    _ask(controller, control, control.spare, control.spare_at, time, q, v, model, memory, torque)
+    _show(q, v, model, memory, control)
+    _ask(controller, time, control.spare, control.spare_at, control, torque)
 
 
 @dissolved_kernel
-def _ask(
-    controller: Any, control: Control, kept: Integers, kept_at: int, time: float, q: Floats,
-    v: Floats, model: Model, memory: Memory, torque: Floats,
-) -> None:  # fmt: skip
+def _show(q: Floats, v: Floats, model: Model, memory: Memory, control: Control) -> None:
     state = control.state
     for i in range(q.shape[0]):
         state.q[i] = q[i]
@@ -50,9 +49,15 @@ def _ask(
         state.joint_position[i] = q[joint]
         state.joint_velocity[i] = v[joint]
     if control.conduct != TRUSTED:
-        _show_copies(control, memory)
+        _show_copies(memory, control)
+
+
+@dissolved_kernel
+def _ask(
+    controller: Any, time: float, kept: Integers, kept_at: int, control: Control, torque: Floats
+) -> None:
     controller(
-        time, address_of(state), address_of(control.contacts), address_of(control.robot),
+        time, address_of(control.state), address_of(control.contacts), address_of(control.robot),
         control.parameters_at, kept_at, torque,
     )  # fmt: skip
     spoilt = not (intact(torque) and intact(kept) and intact(control.parameters))
@@ -68,9 +73,9 @@ def _ask(
 
 
 @kernel
-def _show_copies(control: Control, memory: Memory) -> None:
+def _show_copies(memory: Memory, control: Control) -> None:
     """Copy kinematics and contacts: what a controller does to them harms nobody."""
-    tree, own = memory.tree, control.state.kinematics
+    tree, own = memory.equations.tree, control.state.kinematics
     copy_words(tree.angle, own.angle)
     copy_words(tree.cosine, own.cosine)
     copy_words(tree.sine, own.sine)

@@ -103,17 +103,17 @@ class ReadyLaw:
         self.parameters, parameters, between_parameters = in_one_block(numbers)
         self.memory, kept, between_kept = in_one_block(memory)
         self._spare, spare, _ = in_one_block(memory)
-        shown: dict[str, Any] = {}
+        shown: dict[str, Any] = {
+            "state": ControlState.allocate(extents),
+            "contacts": Contacts.allocate(extents),
+            "robot": controlled_robot(robot),
+        }
         self._shown: dict[str, Bundle] = {}
         if law.function.is_ours and tree is not None and contacts is not None:
-            shown["state"] = ControlState.allocate(kinematics=tree, **extents)
+            shown["state"] = ControlState.allocate(extents, kinematics=tree)
             shown["contacts"] = contacts
-            shown["robot"] = controlled_robot(robot)
         else:
-            shown["state"] = guarded_bundle(ControlState.allocate(**extents))
-            shown["contacts"] = guarded_bundle(Contacts.allocate(**extents))
-            shown["robot"] = guarded_bundle(controlled_robot(robot))
-            self._shown = shown
+            shown = self._shown = {name: guarded_bundle(each) for name, each in shown.items()}
         self.control = Control(
             parameters=parameters, kept=kept, spare=spare,
             between_parameters=between_parameters, between_kept=between_kept,

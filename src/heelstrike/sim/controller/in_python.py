@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.errors import ControllerError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -47,7 +46,6 @@ class AskedLaw:
         control = ready.control
         self.name = law.function.name
         self.numbers, self._control = ready, control
-        self._model = robot.model
         self._torque: NDArray[np.float64] = np.zeros(robot.nu)
         self._given: dict[str, Any] = {
             "state": control.state,
@@ -77,12 +75,9 @@ class AskedLaw:
         ControllerError
             If it is checked and reads or writes beyond an array, or writes to one not its own.
         """
-        own, model = self._control.state, self._model
+        own = self._control.state
         own.q[:], own.v[:] = state.q, state.v
-        own.joint_position[:] = state.q[model.actuator_joint]
-        own.joint_velocity[:] = state.v[model.actuator_joint]
-        forward_kinematics(model, own.q, own.kinematics)
-        link_velocities(model, own.v, own.kinematics)
+        self._control.robot.update(own)
         if contacts is not None:
             for name, values in contacts.members().items():
                 getattr(self._control.contacts, name)[...] = values

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import copy
 import inspect
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, update_wrapper
-from typing import Any, get_type_hints, overload
+from typing import Any, overload
 
 import numpy as np
 from numba import types
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compiler.bundle import Bundle, bundle_at
+from heelstrike.compiler.bundle import Bundle
+from heelstrike.compiler.bundle_type import bundle_at
 from heelstrike.compiler.compilation import CompileError, is_ours, kernel, within_bounds
 from heelstrike.compiler.separate_kernel import SeparateKernel
 from heelstrike.errors import ControllerError
@@ -65,12 +67,11 @@ class ControllerFunction:
         if name not in self.arguments:
             return Bundle
 
-        def annotated() -> None: ...
-
-        hint = inspect.signature(self.python).parameters[name].annotation
-        annotated.__annotations__ = {name: hint}
+        hint: Any = inspect.signature(self.python).parameters[name].annotation
         try:
-            found: Any = get_type_hints(annotated, self.python.__globals__, dict(scope))[name]
+            found = (
+                eval(hint, self.python.__globals__, dict(scope)) if isinstance(hint, str) else hint
+            )
         except NameError as error:
             found = error
         if not (isinstance(found, type) and issubclass(found, Bundle)):
@@ -87,19 +88,9 @@ class ControllerFunction:
         """What it is called in messages."""
         return self.python.__name__
 
-    def __call__(
-        self,
-        parameters: Bundle | None = None,
-        *,
-        memory: Mapping[str, Any] | None = None,
-        robot: Robot | None = None,
-        stiffness: ArrayLike | None = None,
-        damping: ArrayLike | None = None,
-    ) -> Law:
-        """Return the law with these parameters; see :class:`Law`."""
-        return Law(
-            self, parameters, memory=memory, robot=robot, stiffness=stiffness, damping=damping
-        )
+    def __call__(self, parameters: Bundle | None = None, **options: Any) -> Law:
+        """Return the law with these parameters; see :class:`Law`, also for the options."""
+        return Law(self, parameters, **options)
 
     def __reduce__(self) -> str:
         """Copies and pickles are the one of that name, in any process: machine code stays here."""
@@ -226,6 +217,16 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
     return make if function is None else make(function)
 
 
+def per_actuator(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+    """Return one number for each actuator, (nu,), of one for all or for each."""
+    gains = np.asarray(value, dtype=np.float64)
+    if gains.ndim > 1 or gains.size not in (1, robot.nu) or not np.all(np.isfinite(gains)):
+        raise ControllerError(
+            f"{name} must be one finite number or {robot.nu} (one an actuator), got {value!r}"
+        )
+    return np.broadcast_to(gains, (robot.nu,)).copy()
+
+
 class Law:
     """A controller: a function made by :func:`controller`, with its parameters.
 
@@ -260,21 +261,14 @@ class Law:
         stiffness: ArrayLike | None = None,
         damping: ArrayLike | None = None,
     ) -> None:
-        parameters = Bundle() if parameters is None else parameters
-        if not isinstance(parameters, function.parameters):
-            wanted = "none" if function.parameters is Bundle else function.parameters.__name__
-            raise ControllerError(
-                f"controller {function.name!r} takes {wanted} as parameters, got "
-                f"{type(parameters).__name__}"
-            )
         self.memory = dict(memory or {})
-        strange = self.memory.keys() - function.memory.declared - function.memory.extent_names()
+        strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
             )
         self.function = function
-        self.parameters: Any = parameters
+        self.parameters: Any = _fitting(function, Bundle() if parameters is None else parameters)
         self.robot = robot
         self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
         self.damping = None if damping is None else np.asarray(damping, dtype=np.float64)
@@ -293,10 +287,9 @@ class Law:
         Law
             The law.
         """
-        return Law(
-            self.function, parameters, memory=self.memory, robot=self.robot,
-            stiffness=self.stiffness, damping=self.damping,
-        )  # fmt: skip
+        law = copy.copy(self)
+        law.parameters, law._asked = _fitting(self.function, parameters), None
+        return law
 
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
         """Return its parameters, and a memory to begin with, for a robot; all can be set.
@@ -317,15 +310,12 @@ class Law:
             If they do not fit the robot.
         """
         for name, gains in (("stiffness", self.stiffness), ("damping", self.damping)):
-            if gains is not None and gains.shape not in ((), (robot.nu,)):
-                raise ControllerError(
-                    f"controller {self.function.name!r}: {name} must be one number or {robot.nu} "
-                    f"(one an actuator), got shape {gains.shape}"
-                )
+            if gains is not None:
+                per_actuator(f"controller {self.function.name!r}: {name}", gains, robot)
         extents = extents_of(robot)
         try:
             self.parameters.check(extents)
-            memory = self.function.memory.settable().allocate(**extents | self.memory)
+            memory = self.function.memory.settable().allocate(extents, **self.memory)
             memory.check(extents)
         except TypeError as error:
             raise ControllerError(
@@ -376,6 +366,17 @@ class Law:
     def __getstate__(self) -> dict[str, Any]:
         """Leave what holds places in this process."""
         return self.__dict__ | {"_asked": None}
+
+
+def _fitting(function: ControllerFunction, parameters: Bundle) -> Bundle:
+    """Return parameters, or refuse those that a function does not take."""
+    if not isinstance(parameters, function.parameters):
+        wanted = "none" if function.parameters is Bundle else function.parameters.__name__
+        raise ControllerError(
+            f"controller {function.name!r} takes {wanted} as parameters, got "
+            f"{type(parameters).__name__}"
+        )
+    return parameters
 
 
 @controller

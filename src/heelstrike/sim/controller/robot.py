@@ -10,6 +10,8 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import (
     bias_force,
     center_of_mass,
+    composite_inertias,
+    first_moments,
     forward_kinematics,
     inverse_dynamics,
     link_velocities,
@@ -19,6 +21,8 @@ from heelstrike.dynamics.kernels import (
     point_jacobian,
     point_position,
 )
+from heelstrike.dynamics.places import write_point_rows
+from heelstrike.dynamics.spatial import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
@@ -121,20 +125,11 @@ class ControlledRobot(Bundle):
     def gravity_force(self, state: ControlState, torque: Floats) -> None:
         """Torques (nu,) of the actuators that bear the weight beyond each joint: H(q, 0)."""
         work, gravity = state.kinematics, self.model.gravity
-        for i in range(self.nl):
-            for k in range(3):
-                work.composite[i, k] = work.inertia[i, k]
-        for i in range(self.nl - 1, -1, -1):
-            moment = work.composite[i, 1] * gravity[1] - work.composite[i, 2] * gravity[0]
-            self.other[i] = work.motion[i, 0] * moment - work.composite[i, 0] * (
-                work.motion[i, 1] * gravity[0] + work.motion[i, 2] * gravity[1]
-            )
-            parent = self.model.parent[i]
-            if parent >= 0:
-                for k in range(3):
-                    work.composite[parent, k] += work.composite[i, k]
+        composite_inertias(self.model, work)
         for i in range(self.nu):
-            torque[i] = self.other[self.model.actuator_joint[i]]
+            joint = self.model.actuator_joint[i]
+            weight = momentum_of(work.composite, joint, (0.0, gravity[0], gravity[1]))
+            torque[i] = -power(spatial(work.motion, joint), weight)
 
     @kernel
     def point_position(
@@ -155,14 +150,10 @@ class ControlledRobot(Bundle):
         self, state: ControlState, contacts: Contacts, contact: int, jacobian: Floats
     ) -> None:
         """Jacobian (2, nv) of a contact point: along the ground's normal, then its tangent."""
-        link = self.model.contact_link[contact]
-        stance.point_columns(
-            self.model, state.kinematics, link, contacts.position[contact], self.columns
+        link, normal = self.model.contact_link[contact], contacts.normal[contact]
+        write_point_rows(
+            self.model, state.kinematics, link, contacts.position[contact], normal, 0, jacobian
         )
-        x, z = contacts.normal[contact, 0], contacts.normal[contact, 1]
-        for j in range(self.nv):
-            jacobian[0, j] = x * self.columns[j, 0] + z * self.columns[j, 1]
-            jacobian[1, j] = z * self.columns[j, 0] - x * self.columns[j, 1]
 
     @kernel
     def foot_pose(self, state: ControlState, foot: int, pose: Floats) -> None:
@@ -188,9 +179,7 @@ class ControlledRobot(Bundle):
         """Velocity (x, z) of the centre of mass."""
         found = self.columns[0]  # three numbers
         momentum(self.model, state.kinematics, found)
-        mass = 0.0
-        for i in range(self.nl):
-            mass += self.model.mass[i]
+        mass, _, _ = first_moments(self.model, state.kinematics)
         velocity[0] = found[0] / mass
         velocity[1] = found[1] / mass
 
@@ -200,19 +189,14 @@ class ControlledRobot(Bundle):
 
 def extents_of(robot: Robot) -> dict[str, int]:
     """Sizes of a robot by the names under which arrays of controllers are declared."""
-    return {
-        "nq": robot.nq, "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "nl": robot.nv,
-        "axes": 2, "components": 2,
-    }  # fmt: skip
+    return {**robot.model.extents, "components": 2}
 
 
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that a controller has of a robot."""
-    extents = extents_of(robot)
     driven = set(robot.model.actuator_joint.tolist())
     view = ControlledRobot.allocate(
-        model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven),
-        **extents,
+        extents_of(robot), model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven)
     )  # fmt: skip
     view.contact_foot[:] = -1
     for index, foot in enumerate(robot.feet):

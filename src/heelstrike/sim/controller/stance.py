@@ -21,6 +21,8 @@ import numpy as np
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import inverse_dynamics, passive_force, point_bias_acceleration
+from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.spatial import Spatial, plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 
@@ -30,39 +32,32 @@ if TYPE_CHECKING:
 
 
 @kernel
-def solve_three(
-    columns: Floats, a: int, b: int, c: int, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """Solve [columns a, b, c] s = (x, y, z) for a 3 by 3 system whose columns are rows here."""
-    a0, a1, a2 = columns[a, 0], columns[a, 1], columns[a, 2]
-    b0, b1, b2 = columns[b, 0], columns[b, 1], columns[b, 2]
-    c0, c1, c2 = columns[c, 0], columns[c, 1], columns[c, 2]
-    bc0, bc1, bc2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-    determinant = a0 * bc0 + a1 * bc1 + a2 * bc2
-    first = (x * bc0 + y * bc1 + z * bc2) / determinant
-    ca0, ca1, ca2 = c1 * a2 - c2 * a1, c2 * a0 - c0 * a2, c0 * a1 - c1 * a0
-    second = (x * ca0 + y * ca1 + z * ca2) / determinant
-    ab0, ab1, ab2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-    third = (x * ab0 + y * ab1 + z * ab2) / determinant
-    return first, second, third
+def cross(a: Spatial, b: Spatial) -> Spatial:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
-def solve_three_transposed(
-    columns: Floats, a: int, b: int, c: int, x: float, y: float, z: float
-) -> tuple[float, float, float]:
-    """Solve [columns a, b, c]ᵀ s = (x, y, z)."""
-    a0, a1, a2 = columns[a, 0], columns[a, 1], columns[a, 2]
-    b0, b1, b2 = columns[b, 0], columns[b, 1], columns[b, 2]
-    c0, c1, c2 = columns[c, 0], columns[c, 1], columns[c, 2]
-    bc0, bc1, bc2 = b1 * c2 - b2 * c1, b2 * c0 - b0 * c2, b0 * c1 - b1 * c0
-    ca0, ca1, ca2 = c1 * a2 - c2 * a1, c2 * a0 - c0 * a2, c0 * a1 - c1 * a0
-    ab0, ab1, ab2 = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
-    determinant = a0 * bc0 + a1 * bc1 + a2 * bc2
-    first = (x * bc0 + y * ca0 + z * ab0) / determinant
-    second = (x * bc1 + y * ca1 + z * ab1) / determinant
-    third = (x * bc2 + y * ca2 + z * ab2) / determinant
-    return first, second, third
+def solve_three(a: Spatial, b: Spatial, c: Spatial, right: Spatial) -> Spatial:
+    """Solve [a b c] s = right, three equations with these columns."""
+    bc = cross(b, c)
+    determinant = power(a, bc)
+    return (
+        power(right, bc) / determinant,
+        power(right, cross(c, a)) / determinant,
+        power(right, cross(a, b)) / determinant,
+    )
+
+
+@kernel
+def solve_three_transposed(a: Spatial, b: Spatial, c: Spatial, right: Spatial) -> Spatial:
+    """Solve [a b c]ᵀ s = right."""
+    bc = cross(b, c)
+    determinant = power(a, bc)
+    x, y, z = plus(
+        plus(scaled(bc, right[0]), scaled(cross(c, a), right[1])), scaled(cross(a, b), right[2])
+    )
+    return x / determinant, y / determinant, z / determinant
 
 
 @kernel
@@ -70,45 +65,72 @@ def point_columns(
     model: Model, work: Workspace, link: int, position: Floats, columns: Floats
 ) -> None:
     """Jacobian (x, z, rotation) of a point of a link, one row a coordinate."""
-    x = position[0] - work.pivot[0]
-    z = position[1] - work.pivot[1]
-    for j in range(model.parent.shape[0]):
-        for k in range(3):
-            columns[j, k] = 0.0
+    for j in range(model.nv):
+        write(j, (0.0, 0.0, 0.0), columns)
+    place = place_of(work, position)
     j = link
     while j >= 0:
-        columns[j, 0] = work.motion[j, 1] + work.motion[j, 0] * z
-        columns[j, 1] = work.motion[j, 2] - work.motion[j, 0] * x
-        columns[j, 2] = work.motion[j, 0]
+        x, z = velocity_at(work.motion, j, place)
+        write(j, (x, z, work.motion[j, 0]), columns)
         j = model.parent[j]
 
 
 @kernel
-def hold_still(robot: ControlledRobot, state: ControlState, foot: int) -> None:
-    """Set velocities of the unactuated coordinates so that a flat foot is at rest (eq. 29)."""
-    columns, v = robot.columns, state.v
-    link = robot.foot_link[foot]
-    point_columns(robot.model, state.kinematics, link, state.kinematics.origin[link], columns)
-    x = 0.0
-    z = 0.0
-    rotation = 0.0
+def complete(robot: ControlledRobot, target: Spatial, joints: Floats, whole: Floats) -> None:
+    """Write rates of all coordinates that move a foot as the target says, given the joints'.
+
+    The Jacobian of the foot is in `robot.columns`; `joints` is (nu,), `whole` (nv,).
+    """
+    columns, driven, rest = robot.columns, robot.model.actuator_joint, robot.unactuated
     for i in range(robot.nu):
-        joint = robot.model.actuator_joint[i]
-        x -= columns[joint, 0] * v[joint]
-        z -= columns[joint, 1] * v[joint]
-        rotation -= columns[joint, 2] * v[joint]
-    a, b, c = robot.unactuated[0], robot.unactuated[1], robot.unactuated[2]
-    v[a], v[b], v[c] = solve_three(columns, a, b, c, x, z, rotation)
+        whole[driven[i]] = joints[i]
+        target = plus(target, scaled(spatial(columns, driven[i]), -joints[i]))
+    a, b, c = rest[0], rest[1], rest[2]
+    whole[a], whole[b], whole[c] = solve_three(
+        spatial(columns, a), spatial(columns, b), spatial(columns, c), target
+    )
 
 
 @kernel
-def _force_wanted(
-    robot: ControlledRobot, state: ControlState, acceleration: Floats, force: Floats
-) -> None:
-    """Force A v̇ + H − passive that motors and ground must supply; `passive` is ready."""
-    inverse_dynamics(robot.model, acceleration, state.kinematics, force)
+def hold_still(robot: ControlledRobot, state: ControlState, foot: int) -> None:
+    """Write velocities `v` that go with those of the joints while a flat foot rests (eq. 29)."""
+    link = robot.foot_link[foot]
+    point_columns(robot.model, state.kinematics, link, state.kinematics.origin[link], robot.columns)
+    complete(robot, (0.0, 0.0, 0.0), state.joint_velocity, state.v)
+
+
+@kernel
+def force_wanted(robot: ControlledRobot, state: ControlState, force: Floats) -> None:
+    """Write A v̇ + H − passive, which motors and ground must supply for `robot.acceleration`."""
+    inverse_dynamics(robot.model, robot.acceleration, state.kinematics, force)
+    passive_force(robot.model, state.q, state.v, robot.passive)
     for j in range(robot.nv):
         force[j] -= robot.passive[j]
+
+
+@kernel
+def refused(robot: ControlledRobot, torque: Floats) -> bool:
+    """Whether other than three coordinates are without a motor; then torques are NaN."""
+    unfit = robot.unactuated.shape[0] != 3
+    for i in range(robot.nu):
+        torque[i] = np.nan if unfit else torque[i]
+    return unfit
+
+
+@kernel
+def joint_torques(robot: ControlledRobot, torque: Floats) -> None:
+    """Split `robot.force`: the foot's wrench, and the torques besides it (eq. 36, 37)."""
+    columns, force, rest = robot.columns, robot.force, robot.unactuated
+    a, b, c = rest[0], rest[1], rest[2]
+    wrench = solve_three_transposed(
+        spatial(columns, a),
+        spatial(columns, b),
+        spatial(columns, c),
+        (force[a], force[b], force[c]),
+    )
+    for i in range(robot.nu):
+        joint = robot.model.actuator_joint[i]
+        torque[i] = force[joint] - power(spatial(columns, joint), wrench)
 
 
 @kernel
@@ -120,36 +142,14 @@ def flat_foot_torque(
     For robots with three coordinates without a motor; NaN for others. `torque` may be the array
     `acceleration`.
     """
-    if self.unactuated.shape[0] != 3:
-        for i in range(self.nu):
-            torque[i] = np.nan
+    if refused(self, torque):
         return
-    model, work, columns, wanted = self.model, state.kinematics, self.columns, self.acceleration
-    a, b, c = self.unactuated[0], self.unactuated[1], self.unactuated[2]
-    link = self.foot_link[foot]
-    point_columns(model, work, link, work.origin[link], columns)
-    drift = self.other
+    work, link, drift = state.kinematics, self.foot_link[foot], self.other
+    point_columns(self.model, work, link, work.origin[link], self.columns)
     point_bias_acceleration(work, link, work.origin[link], drift)
-    x = -drift[0]
-    z = -drift[1]
-    rotation = -drift[2]
-    for i in range(self.nu):
-        joint = model.actuator_joint[i]
-        wanted[joint] = acceleration[i]
-        x -= columns[joint, 0] * acceleration[i]
-        z -= columns[joint, 1] * acceleration[i]
-        rotation -= columns[joint, 2] * acceleration[i]
-    wanted[a], wanted[b], wanted[c] = solve_three(columns, a, b, c, x, z, rotation)
-    passive_force(model, state.q, state.v, self.passive)
-    force = self.force
-    _force_wanted(self, state, wanted, force)
-    # The foot's wrench from the unactuated rows, torques from the actuated ones (eq. 36, 37).
-    x, z, rotation = solve_three_transposed(columns, a, b, c, force[a], force[b], force[c])
-    for i in range(self.nu):
-        joint = model.actuator_joint[i]
-        torque[i] = force[joint] - (
-            columns[joint, 0] * x + columns[joint, 1] * z + columns[joint, 2] * rotation
-        )
+    complete(self, (-drift[0], -drift[1], -drift[2]), acceleration, self.acceleration)
+    force_wanted(self, state, self.force)
+    joint_torques(self, torque)
 
 
 @kernel
@@ -162,42 +162,32 @@ def point_foot_torque(
     The foot's contact point is held, or its disc rolls. For robots with three coordinates without
     a motor; NaN for others. `torque` may be the array `acceleration`.
     """
-    if self.unactuated.shape[0] != 3:
-        for i in range(self.nu):
-            torque[i] = np.nan
+    if refused(self, torque):
         return
-    model, work, columns, wanted = self.model, state.kinematics, self.columns, self.acceleration
-    a, b, c = self.unactuated[0], self.unactuated[1], self.unactuated[2]
+    model, columns, wanted = self.model, self.columns, self.acceleration
     contact = self.foot_contact[foot]
-    link = model.contact_link[contact]
+    link, radius = model.contact_link[contact], model.contact_radius[contact]
     position, normal = contacts.position[contact], contacts.normal[contact]
-    radius = model.contact_radius[contact]
-    point_columns(model, work, link, position, columns)
+    point_columns(model, state.kinematics, link, position, columns)
+    # In the place of the rotation, which nothing holds: the trunk's turning about the foot.
     for j in range(self.nv):
         columns[j, 2] = 0.0
-    columns[a, 2] = columns[b, 0] * columns[c, 1] - columns[c, 0] * columns[b, 1]
-    columns[b, 2] = columns[c, 0] * columns[a, 1] - columns[a, 0] * columns[c, 1]
-    columns[c, 2] = columns[a, 0] * columns[b, 1] - columns[b, 0] * columns[a, 1]
+    a, b, c = self.unactuated[0], self.unactuated[1], self.unactuated[2]
+    columns[a, 2], columns[b, 2], columns[c, 2] = cross(
+        (columns[a, 0], columns[b, 0], columns[c, 0]), (columns[a, 1], columns[b, 1], columns[c, 1])
+    )
     center, drift = self.force, self.other  # both are written anew below
     center[0] = position[0] + radius * normal[0]
     center[1] = position[1] + radius * normal[1]
-    point_bias_acceleration(work, link, center, drift)
-    x = -drift[0]
-    z = -drift[1]
-    for i in range(self.nu):
-        joint = model.actuator_joint[i]
-        wanted[joint] = acceleration[i]
-        x -= columns[joint, 0] * acceleration[i]
-        z -= columns[joint, 1] * acceleration[i]
-    wanted[a], wanted[b], wanted[c] = solve_three(columns, a, b, c, x, z, 0.0)
+    point_bias_acceleration(state.kinematics, link, center, drift)
+    complete(self, (-drift[0], -drift[1], 0.0), acceleration, wanted)
 
     # Turning about the foot, without a motor; the force is linear in it.
-    passive_force(model, state.q, state.v, self.passive)
     force, other = self.force, self.other
-    _force_wanted(self, state, wanted, force)
+    force_wanted(self, state, force)
     for j in range(self.nv):
         wanted[j] += columns[j, 2]
-    _force_wanted(self, state, wanted, other)
+    force_wanted(self, state, other)
     missing = 0.0
     inertia = 0.0
     for j in range(self.nv):
@@ -206,7 +196,4 @@ def point_foot_torque(
     share = -missing / inertia
     for j in range(self.nv):
         force[j] += share * (other[j] - force[j])
-    x, z, _ = solve_three_transposed(columns, a, b, c, force[a], force[b], force[c])
-    for i in range(self.nu):
-        joint = model.actuator_joint[i]
-        torque[i] = force[joint] - (columns[joint, 0] * x + columns[joint, 1] * z)
+    joint_torques(self, torque)

@@ -5,38 +5,42 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.robot.model import Integers
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Assembly
 
 
 @kernel
 def solve_candidates(
-    count: int, memory: Memory, slide: Integers, accelerations: bool, order: Integers
-) -> int:
+    count: int, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
+    assembly: Assembly,
+) -> int:  # fmt: skip
     """Solve the contact problem of the candidates at the level of accelerations or velocities.
 
-    Matrix and free term are those in the memory. Of accelerations, points that slide are prescribed
-    to go on doing so: their friction is known. Forces or impulses and modes go to
-    ``memory.answer``. Returns the solver's status.
+    Matrix and free term are there. Of accelerations, points that slide are prescribed to go on
+    doing so: their friction is known. Forces or impulses and modes go to ``assembly.answer``.
+    Returns the solver's status.
     """
+    problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
-        contact = memory.candidate[place]
-        memory.problem.friction[place] = memory.friction[contact]
-        memory.answer.mode[place] = STICK
+        contact = assembly.candidate[place]
+        problem.friction[place] = friction[contact]
+        mode[place] = STICK
         if accelerations:
-            if slide[contact] > 0:
-                memory.answer.mode[place] = SLIDING_FORWARD
-            elif slide[contact] < 0:
-                memory.answer.mode[place] = SLIDING_BACKWARD
-            elif memory.mode[contact] < SLIDING_FORWARD:
-                memory.answer.mode[place] = memory.mode[contact]
-    memory.problem.count = count
-    return int(solve_contact_kernel(memory.problem, order, memory.solver, memory.answer))
+            if phase.slide[contact] > 0:
+                mode[place] = SLIDING_FORWARD
+            elif phase.slide[contact] < 0:
+                mode[place] = SLIDING_BACKWARD
+            elif guess[contact] < SLIDING_FORWARD:
+                mode[place] = guess[contact]
+    problem.count = count
+    return int(solve_contact_kernel(problem, phase.order, assembly.solver, assembly.answer))
 
 
 @kernel
-def share_redundant(count: int, memory: Memory, phase: Phase) -> None:
+def share_redundant(
+    count: int, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly
+) -> None:
     """Find forces within their limits where the equations leave open who carries what.
 
     A biped that stands on stuck joints, or a table on four legs: the equations of motion have many
@@ -46,22 +50,22 @@ def share_redundant(count: int, memory: Memory, phase: Phase) -> None:
     """
     short = False
     for place in range(count):
-        contact = memory.candidate[place]
+        contact = assembly.candidate[place]
         short = short or phase.value[2 * contact] < 0.0
         short = short or (phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0)
-    if not short or solve_candidates(count, memory, phase.slide, True, phase.order) != SOLVED:
+    if not short or solve_candidates(count, True, friction, guess, phase, assembly) != SOLVED:
         return
     for place in range(count):
-        contact = memory.candidate[place]
-        found = memory.answer.mode[place]
+        contact = assembly.candidate[place]
+        found = assembly.answer.mode[place]
         if found == OPEN:
             return
-        if found != STICK and phase.slide[contact] == 0 and memory.friction[contact] > 0.0:
+        if found != STICK and phase.slide[contact] == 0 and friction[contact] > 0.0:
             return
     for place in range(count):
-        contact = memory.candidate[place]
-        phase.force[contact, 0] = memory.answer.impulse[2 * place]
-        phase.force[contact, 1] = memory.answer.impulse[2 * place + 1]
+        contact = assembly.candidate[place]
+        for k in range(2):
+            phase.force[contact, k] = assembly.answer.impulse[2 * place + k]
         if phase.value[2 * contact] < 0.0:
             phase.value[2 * contact] = 1.0
         if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0:

@@ -7,7 +7,7 @@ contact points, dry joints from the stops, and these kernels tell them apart.
 
 from __future__ import annotations
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.sets import press
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
@@ -16,7 +16,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import contact_rows, contact_velocity, write_unit_row
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Assembly, Equations
 
 
 @kernel
@@ -33,33 +33,34 @@ def gap_velocity(
     contact: int, model: Model, contacts: Contacts, tree: Workspace, phase: Phase, state: Floats
 ) -> tuple[float, float]:
     """Normal and tangential velocity of a contact point or joint stop."""
-    stop = contact - contacts.gap.shape[0]
+    stop = contact - model.nc
     if stop < 0:
-        return contact_velocity(
-            model.contact_link[contact], contacts.position[contact], contacts.normal[contact], tree
-        )
-    return phase.stop_side[stop] * state[state.shape[0] // 2 + phase.stop_joint[stop]], 0.0
+        return contact_velocity(model, tree, contacts, contact)
+    return phase.stop_side[stop] * state[model.nq + phase.stop_joint[stop]], 0.0
 
 
 @kernel
-def gap_rows(model: Model, memory: Memory, phase: Phase, contact: int, place: int) -> None:
+def gap_rows(
+    model: Model, tree: Workspace, contacts: Contacts, phase: Phase, contact: int, place: int,
+    assembly: Assembly,
+) -> None:  # fmt: skip
     """Write the Jacobian rows (normal, tangent) of a contact, stop or dry joint as a candidate."""
-    stop = contact - model.contact_link.shape[0]
+    stop = contact - model.nc
     if stop < 0:
-        contact_rows(model, memory, contact, place)
-        return
-    dry = stop - phase.stop_joint.shape[0]
-    if dry < 0:
-        write_unit_row(memory, phase.stop_joint[stop], 2 * place, phase.stop_side[stop])
+        contact_rows(model, tree, contacts, contact, place, assembly)
+    elif contact < phase.first_dry:
+        write_unit_row(phase.stop_joint[stop], 2 * place, phase.stop_side[stop], assembly)
     else:
-        write_unit_row(memory, phase.dry_joint[dry], 2 * place + 1, 1.0)
+        dry = contact - phase.first_dry
+        write_unit_row(phase.dry_joint[dry], 2 * place + 1, 1.0, assembly)
 
 
-@kernel
+@dissolved_kernel
 def free_gap_acceleration(
-    model: Model, memory: Memory, phase: Phase, contact: int, place: int
-) -> None:
-    """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under ``memory.rate``.
+    model: Model, contacts: Contacts, equations: Equations, contact: int, place: int, phase: Phase,
+    assembly: Assembly,
+) -> None:  # fmt: skip
+    """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under ``equations.rate``.
 
     Of a contact point it is that of the gap and of the sliding velocity: for a rolling disc the
     acceleration of its centre and not of the material point that touches the ground. A dry joint
@@ -68,22 +69,22 @@ def free_gap_acceleration(
     """
     along_normal = 0.0
     along_tangent = 0.0
-    if contact < model.contact_link.shape[0]:
-        position = memory.contacts.position[contact]
-        normal = memory.contacts.normal[contact]
+    if contact < model.nc:
+        position, normal = contacts.position[contact], contacts.normal[contact]
         radius = model.contact_radius[contact]
-        scratch = phase.scratch
-        scratch[0, 0] = position[0] + radius * normal[0]
-        scratch[0, 1] = position[1] + radius * normal[1]
-        point_bias_acceleration(memory.tree, model.contact_link[contact], scratch[0], scratch[1])
-        along_normal, along_tangent = into_frame(normal, (scratch[1, 0], scratch[1, 1]))
-        along_tangent -= radius * scratch[1, 2]
-    for j in range(model.parent.shape[0]):
-        along_normal += memory.jacobian[2 * place, j] * memory.rate[j]
-        along_tangent += memory.jacobian[2 * place + 1, j] * memory.rate[j]
-    memory.problem.free[2 * place] = along_normal
-    memory.problem.free[2 * place + 1] = along_tangent
-    dry = contact - phase.closed.shape[0] + phase.dry_joint.shape[0]
-    if dry >= 0:
-        limit = model.dry_friction[phase.dry_joint[dry]]
-        press(memory.problem, place, limit)
+        center, acceleration = phase.scratch[0], phase.scratch[1]
+        center[0] = position[0] + radius * normal[0]
+        center[1] = position[1] + radius * normal[1]
+        link = model.contact_link[contact]
+        point_bias_acceleration(equations.tree, link, center, acceleration)
+        along_normal, along_tangent = into_frame(normal, (acceleration[0], acceleration[1]))
+        along_tangent -= radius * acceleration[2]
+    jacobian, rate = assembly.jacobian, equations.rate
+    for j in range(model.nv):
+        along_normal += jacobian[2 * place, j] * rate[j]
+        along_tangent += jacobian[2 * place + 1, j] * rate[j]
+    assembly.problem.free[2 * place] = along_normal
+    assembly.problem.free[2 * place + 1] = along_tangent
+    if contact >= phase.first_dry:
+        joint = phase.dry_joint[contact - phase.first_dry]
+        press(place, model.dry_friction[joint], assembly.problem)

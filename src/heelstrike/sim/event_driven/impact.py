@@ -12,22 +12,18 @@ from heelstrike.sim.contacts.geometry import (
     assemble_delassus,
     evaluate_equations,
     locate_contacts,
+    row_product,
 )
 from heelstrike.sim.event_driven.candidates import solve_candidates
-from heelstrike.sim.event_driven.dynamics import (
-    free_acceleration,
-    gather_closed,
-)
+from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
-from heelstrike.sim.event_driven.modes import log_event, note_residual
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
 
-TOUCHDOWN = int(EventKind.TOUCHDOWN)
 IMPACT = int(EventKind.IMPACT)
 ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
-JOINT_STOP = int(EventKind.JOINT_STOP)
 
 # Velocities (m/s) up to which a point on the ground is at rest.
 REST = 1e-9
@@ -40,16 +36,6 @@ PERPETUAL = 0.999999
 
 
 @kernel
-def row_velocity(row: int, jacobian: Floats, state: Floats) -> float:
-    """Velocity along a Jacobian row."""
-    nv = jacobian.shape[1]
-    total = 0.0
-    for j in range(nv):
-        total += jacobian[row, j] * state[nv + j]
-    return total
-
-
-@kernel
 def heading(speed: float) -> int:
     """Whether something slides, and where to: -1, 0 or 1."""
     if speed > REST:
@@ -59,7 +45,7 @@ def heading(speed: float) -> int:
 
 @kernel
 def collide(
-    model: Model, memory: Memory, phase: Phase, state: Floats, nudge: float
+    model: Model, nudge: float, memory: Memory, phase: Phase, state: Floats
 ) -> tuple[bool, float]:
     """Let the points on the ground, and those that reach it now, change the velocities of `state`.
 
@@ -72,93 +58,93 @@ def collide(
     contacts. The impulses go to ``phase.impulse``; ``phase.closed`` and ``phase.slide`` become
     those after the impact.
     """
-    nv = model.parent.shape[0]
+    v = state[model.nq :]
+    equations, assembly = memory.equations, memory.assembly
+    jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
     count = 0
-    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
-    for contact in range(first):
+    for contact in range(phase.first_dry):
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
         if phase.closed[contact] == 0 and phase.hit[contact] == 0:
             continue
-        gap_rows(model, memory, phase, contact, count)
-        normal = row_velocity(2 * count, memory.jacobian, state)
+        gap_rows(model, equations.tree, memory.contacts, phase, contact, count, assembly)
+        normal = row_product(jacobian, 2 * count, v)
         if normal < 0.0 and phase.plastic[contact] == 0:
-            normal += memory.restitution[contact] * normal
-        memory.problem.free[2 * count] = normal - nudge
-        memory.problem.free[2 * count + 1] = row_velocity(2 * count + 1, memory.jacobian, state)
-        memory.candidate[count] = contact
+            normal += memory.surface.restitution[contact] * normal
+        free[2 * count] = normal - nudge
+        free[2 * count + 1] = row_product(jacobian, 2 * count + 1, v)
+        assembly.candidate[count] = contact
         count += 1
     if count == 0:
         return True, 0.0
-    assemble_delassus(model, memory, count)
-    status = solve_candidates(count, memory, phase.slide, False, phase.order)
-    note_residual(memory.answer.residual, memory.tally)
+    assemble_delassus(model, equations, count, assembly)
+    friction, guess = memory.surface.friction, memory.reaction.mode
+    status = solve_candidates(count, False, friction, guess, phase, assembly)
+    note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
     for row in range(2 * count):
-        work = memory.answer.impulse[row] * row_velocity(row, memory.jacobian, state)
+        work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    add_impulse(model, memory, count, state[nv:])
+    add_impulse(model, assembly, count, equations, v)
     for place in range(count):
-        contact = memory.candidate[place]
-        row = 2 * place
-        normal = row_velocity(row, memory.jacobian, state)
-        tangent = row_velocity(row + 1, memory.jacobian, state)
-        made += memory.answer.impulse[row] * normal + memory.answer.impulse[row + 1] * tangent
-        through += abs(memory.answer.impulse[row] * normal) + abs(
-            memory.answer.impulse[row + 1] * tangent
-        )
-        phase.impulse[contact, 0] = memory.answer.impulse[row]
-        phase.impulse[contact, 1] = memory.answer.impulse[row + 1]
-        phase.closed[contact] = 0
-        phase.slide[contact] = 0
-        if normal <= REST or phase.plastic[contact] == 1:
-            phase.closed[contact] = 1
-            phase.slide[contact] = heading(tangent)
+        contact = assembly.candidate[place]
+        normal = row_product(jacobian, 2 * place, v)
+        tangent = row_product(jacobian, 2 * place + 1, v)
+        pressing, rubbing = impulse[2 * place] * normal, impulse[2 * place + 1] * tangent
+        made += pressing + rubbing
+        through += abs(pressing) + abs(rubbing)
+        phase.impulse[contact, 0] = impulse[2 * place]
+        phase.impulse[contact, 1] = impulse[2 * place + 1]
+        rests = normal <= REST or phase.plastic[contact] == 1
+        phase.closed[contact] = 1 if rests else 0
+        phase.slide[contact] = heading(tangent) if rests else 0
     for dry in range(phase.dry_joint.shape[0]):
-        phase.slide[first + dry] = heading(state[nv + phase.dry_joint[dry]])
+        phase.slide[phase.first_dry + dry] = heading(v[phase.dry_joint[dry]])
     return status == SOLVED, made / through if through > 0.0 else 0.0
 
 
 @kernel
 def short_bounces(
-    model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
+    model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase
 ) -> bool:
     """Mark the points that would come down again too soon to follow; return whether there are any.
 
     Their bounces are taken to go on shrinking in the ratio of the next to the last; the geometric
     series gives the time at which they end.
     """
-    nv = model.parent.shape[0]
-    time = phase.time
-    evaluate_equations(model, state[:nv], state[nv:], memory)
-    locate_contacts(model, ground, memory)
-    free_acceleration(model, memory, phase.dry_joint, phase.slide, state)
-    count = gather_closed(model, memory, phase)
+    time, was_closed = phase.time, memory.reported.closed
+    contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
+    friction = memory.surface.friction
+    evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
+    locate_contacts(model, ground, equations.tree, contacts, memory.surface)
+    free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
+    count = gather_closed(model, contacts, phase, equations, assembly)
     for place in range(count):
-        free_gap_acceleration(model, memory, phase, memory.candidate[place], place)
+        contact = assembly.candidate[place]
+        free_gap_acceleration(model, contacts, equations, contact, place, phase, assembly)
     if count > 0:
-        solve_candidates(count, memory, phase.slide, True, phase.order)
-        add_impulse(model, memory, count, memory.rate)
+        solve_candidates(count, True, friction, memory.reaction.mode, phase, assembly)
+        add_impulse(model, assembly, count, equations, equations.rate)
     found = False
     for contact in range(phase.closed.shape[0]):
-        touched = phase.hit[contact] == 1 or memory.closed[contact] == 1
+        touched = phase.hit[contact] == 1 or was_closed[contact] == 1
         if phase.closed[contact] == 1 or not touched:
             continue
-        gap_rows(model, memory, phase, contact, count)
-        free_gap_acceleration(model, memory, phase, contact, count)
-        normal, _ = gap_velocity(contact, model, memory.contacts, memory.tree, phase, state)
-        pull = -memory.problem.free[2 * count]
+        gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
+        free_gap_acceleration(model, contacts, equations, contact, count, phase, assembly)
+        normal, _ = gap_velocity(contact, model, contacts, equations.tree, phase, state)
+        pull = -assembly.problem.free[2 * count]
         if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
         last = time - phase.last_blow
-        if memory.closed[contact] == 0:
+        if was_closed[contact] == 0:
             last = time - phase.last_impact[contact]
         ratio = bounce / last
         if not ratio < PERPETUAL:
-            ratio = min(memory.restitution[contact], PERPETUAL)
+            ratio = min(memory.surface.restitution[contact], PERPETUAL)
         phase.plastic[contact] = 1
         phase.accumulation[contact] = time + bounce / (1.0 - ratio)
         found = True
@@ -166,55 +152,47 @@ def short_bounces(
 
 
 @kernel
-def strike(model: Model, ground: GroundModel, memory: Memory, record: Record, phase: Phase) -> bool:
+def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> bool:
     """Let the points in ``phase.hit`` meet the ground now, and report it; return success.
 
-    The equations of now have been evaluated. ``memory.closed`` and ``memory.slipping`` still hold
-    the modes from before.
+    The equations of now have been evaluated. ``memory.reported`` still holds the modes from before.
     """
-    state, before = phase.begin, phase.end
-    contacts = phase.closed.shape[0] - phase.dry_joint.shape[0]
-    points = contacts - phase.stop_joint.shape[0]
-    time = phase.time
+    state, before, reported = phase.begin, phase.end, memory.reported
+    time, impulse = phase.time, phase.impulse
     for i in range(state.shape[0]):
         before[i] = state[i]
     made = 0.0
     for attempt in range(2):
-        solved, made = collide(model, memory, phase, state, 0.0)
+        solved, made = collide(model, 0.0, memory, phase, state)
         if not solved:
             return False
-        if attempt == 1 or not short_bounces(model, ground, memory, phase, state):
+        if attempt == 1 or not short_bounces(model, ground, state, memory, phase):
             break
         for i in range(state.shape[0]):
             state[i] = before[i]
-        for contact in range(contacts):
-            phase.closed[contact] = memory.closed[contact]
-            phase.slide[contact] = memory.slipping[contact]
+        for contact in range(phase.first_dry):
+            phase.closed[contact] = reported.closed[contact]
+            phase.slide[contact] = reported.slipping[contact]
     phase.last_blow = time
     largest = 0
-    for contact in range(contacts):
-        normal = phase.impulse[contact, 0]
-        tangent = phase.impulse[contact, 1]
+    for contact in range(phase.first_dry):
+        normal, tangent = impulse[contact, 0], impulse[contact, 1]
         phase.plastic[contact] = 0
         if phase.hit[contact] == 1:
             phase.last_impact[contact] = time
-        if contact >= points:
-            if normal > 0.0:
-                memory.closed[contact] = 1
-                joint = phase.stop_joint[contact - points]
-                log_event(record, time, JOINT_STOP, joint, normal, 0.0)
-            continue
-        if normal > phase.impulse[largest, 0]:
+        if contact < model.nc and normal > impulse[largest, 0]:
             largest = contact
-        if normal > 0.0 and memory.closed[contact] == 0:
-            memory.closed[contact] = 1
-            memory.slipping[contact] = 0
-            log_event(record, time, TOUCHDOWN, contact, normal, tangent)
-        elif normal > 0.0:
-            log_event(record, time, IMPACT, contact, normal, tangent)
+        if not normal > 0.0:
+            continue
+        landed = reported.closed[contact] == 0
+        reported.closed[contact] = 1
+        if contact >= model.nc:
+            joint = phase.stop_joint[contact - model.nc]
+            log_event(time, JOINT_STOP, joint, normal, 0.0, record)
+            continue
+        if landed:
+            reported.slipping[contact] = 0
+        log_event(time, TOUCHDOWN if landed else IMPACT, contact, normal, tangent, record)
     if made > NOTICEABLE:
-        log_event(
-            record, time, ENERGY_GAIN, largest, phase.impulse[largest, 0],
-            phase.impulse[largest, 1],
-        )  # fmt: skip
+        log_event(time, ENERGY_GAIN, largest, impulse[largest, 0], impulse[largest, 1], record)
     return True

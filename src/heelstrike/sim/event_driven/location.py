@@ -7,13 +7,10 @@ limit of a sticking one.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.ground import GroundModel
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
@@ -24,8 +21,9 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import evaluate
+from heelstrike.sim.event_driven.dynamics import evaluate, look
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
 
 NO_EVENT = 2.0
@@ -54,40 +52,48 @@ def shortest_step(time: float) -> float:
 
 
 @kernel
-def take_step(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
+def copy_events(value: Floats, rate: Floats, kept_value: Floats, kept_rate: Floats) -> None:
+    """Keep event functions and their rates."""
+    for i in range(value.shape[0]):
+        kept_value[i] = value[i]
+        kept_rate[i] = rate[i]
+
+
+@kernel
+def evaluate_within(
+    scene: Scene, part: float, length: float, forces: bool, control: Control, memory: Memory,
     phase: Phase,
-    length: float,
-) -> float:
+) -> None:  # fmt: skip
+    """Event functions at a fraction of the step, with forces or only those that need none."""
+    interpolate(part, phase.begin, phase.dense, phase.trial)
+    if forces:
+        time, slope = phase.time + part * length, phase.slopes[SLOPES - 1]
+        evaluate(scene, time, phase.trial, control, memory, phase, slope)
+    else:
+        look(scene.model, scene.ground, phase.trial, memory, phase)
+
+
+@kernel
+def take_step(scene: Scene, length: float, control: Control, memory: Memory, phase: Phase) -> float:
     """Try a step of the given length from ``phase.begin``; return its error over the tolerance.
 
     ``phase.slopes[0]`` must be the slope at the start. A step that is good enough gets its dense
     output; event functions and forces are left as they are at its end.
     """
-    time = phase.time
     error = 0.0
     for stage in range(1, SLOPES):
         at_end = stage == STAGES
         state = phase.end if at_end else phase.trial
         stage_point(stage, length, phase.begin, phase.slopes, state)
-        evaluate(
-            controller, control, model, ground, memory, phase,
-            time + NODES[stage] * length, state, phase.slopes[stage], True,
-        )  # fmt: skip
+        time = phase.time + NODES[stage] * length
+        evaluate(scene, time, state, control, memory, phase, phase.slopes[stage])
         if at_end:
             error = error_norm(
-                length, phase.begin, phase.end, phase.slopes, phase.relative,
-                phase.absolute,
-            )  # fmt: skip
+                length, phase.begin, phase.end, phase.slopes, phase.relative, phase.absolute
+            )
             if not error <= 1.0:
                 return error
-            for i in range(phase.value.shape[0]):
-                phase.end_value[i] = phase.value[i]
-                phase.end_rate[i] = phase.rate[i]
+            copy_events(phase.value, phase.rate, phase.end_value, phase.end_rate)
             for contact in range(phase.closed.shape[0]):
                 phase.end_force[contact, 0] = phase.force[contact, 0]
                 phase.end_force[contact, 1] = phase.force[contact, 1]
@@ -98,39 +104,35 @@ def take_step(
 
 
 @kernel
-def noise(closed: int, slide: int, function: int, weight: float) -> float:
+def is_geometric(function: int, phase: Phase) -> bool:
+    """Whether an event function needs no forces: a gap, or the speed of what slides."""
+    contact = function // 2
+    slides = function % 2 == 1 and phase.slide[contact] != 0
+    return bool(phase.closed[contact] == 0 or slides)
+
+
+@kernel
+def noise(function: int, phase: Phase) -> float:
     """How far an event function may be below zero without meaning it."""
-    if closed == 0:
+    if phase.closed[function // 2] == 0:
         return GAP_NOISE
-    if function % 2 == 1 and slide != 0:
-        return SPEED_NOISE
-    return FORCE_NOISE * weight
+    return SPEED_NOISE if is_geometric(function, phase) else FORCE_NOISE * phase.weight
 
 
 @kernel
 def find_root(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    length: float,
-    function: int,
-    low: float,
-    low_value: float,
-    high: float,
-    high_value: float,
-    of_rate: bool,
-) -> float:
+    scene: Scene, function: int, of_rate: bool, bracket: tuple[float, float, float, float],
+    length: float, control: Control, memory: Memory, phase: Phase,
+) -> float:  # fmt: skip
     """Fraction of the step at which an event function, or its rate, first changes sign.
 
-    It is positive (its rate negative) at `low` and the other way round at `high`. Regula falsi
-    that halves the interval every third time. An event function that is zero at `low`, where its
-    phase begins, is first followed back from `high` to where it is positive.
+    In the bracket (low, its value, high, its value) it is positive (its rate negative) at `low` and
+    the other way round at `high`. Regula falsi that halves the interval every third time. An event
+    function that is zero at `low`, where its phase begins, is first followed back from `high` to
+    where it is positive.
     """
-    contact = function // 2
-    geometric = phase.closed[contact] == 0 or (function % 2 == 1 and phase.slide[contact] != 0)
+    low, low_value, high, high_value = bracket
+    forces = not is_geometric(function, phase)
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
@@ -140,12 +142,7 @@ def find_root(
         if attempt % 3 != 2 and not going_back:
             part = high - high_value * (high - low) / (high_value - low_value)
             part = min(max(part, low + 0.4 * width), high - 0.4 * width)
-        interpolate(part, phase.begin, phase.dense, phase.trial)
-        evaluate(
-            controller, control, model, ground, memory, phase,
-            phase.time + part * length, phase.trial, phase.slopes[SLOPES - 1],
-            not geometric,
-        )  # fmt: skip
+        evaluate_within(scene, part, length, forces, control, memory, phase)
         value = -phase.rate[function] if of_rate else phase.value[function]
         if value > 0.0:
             low = part
@@ -158,162 +155,138 @@ def find_root(
 
 
 @kernel
+def crossing(
+    scene: Scene, function: int, low: float, high: float, length: float, control: Control,
+    memory: Memory, phase: Phase,
+) -> float:  # fmt: skip
+    """Fraction of the step at which an event function passes zero, between two samples of it."""
+    value, end = phase.sample[function], high
+    rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
+    is_gap = function % 2 == 0 and phase.closed[function // 2] == 0
+    if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
+        # An open point came down and went up again: how close was it?
+        bracket = low, -rate, high, -later_rate
+        end = find_root(scene, function, True, bracket, length, control, memory, phase)
+        value = phase.value[function]
+    if not value < -noise(function, phase):
+        return NO_EVENT
+    bracket = low, phase.before[function], end, value
+    return find_root(scene, function, False, bracket, length, control, memory, phase)
+
+
+@kernel
 def first_event(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    length: float,
-    weight: float,
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
 ) -> float:
     """Fraction of the step just taken at which the first event happens, or ``NO_EVENT``.
 
     The event functions that vanish there are marked in ``phase.fired``. ``phase.before`` and
     ``phase.before_rate`` must hold the event functions at the start of the step.
     """
-    functions = phase.value.shape[0]
-    for i in range(functions):
-        phase.fired[i] = 0
+    sample, sample_rate = phase.sample, phase.sample_rate
+    together = EVENT_TIME / length
     low = 0.0
     for k in range(1, SAMPLES + 1):
         high = k / SAMPLES
         if k < SAMPLES:
-            interpolate(high, phase.begin, phase.dense, phase.trial)
-            evaluate(
-                controller, control, model, ground, memory, phase,
-                phase.time + high * length, phase.trial, phase.slopes[SLOPES - 1], True,
-            )  # fmt: skip
-            for i in range(functions):
-                phase.sample[i] = phase.value[i]
-                phase.sample_rate[i] = phase.rate[i]
+            evaluate_within(scene, high, length, True, control, memory, phase)
+            copy_events(phase.value, phase.rate, sample, sample_rate)
         else:
-            for i in range(functions):
-                phase.sample[i] = phase.end_value[i]
-                phase.sample_rate[i] = phase.end_rate[i]
+            copy_events(phase.end_value, phase.end_rate, sample, sample_rate)
         first = NO_EVENT
-        for i in range(functions):
-            contact = i // 2
-            end = high
-            value = phase.sample[i]
-            if (
-                i % 2 == 0
-                and phase.closed[contact] == 0
-                and phase.before_rate[i] < 0.0
-                and phase.sample_rate[i] > 0.0
-                and value >= 0.0
-            ):
-                # An open point came down and went up again: how close was it?
-                end = find_root(
-                    controller, control, model, ground, memory, phase, length, i,
-                    low, -phase.before_rate[i], high, -phase.sample_rate[i], True,
-                )  # fmt: skip
-                value = phase.value[i]
-            if value < -noise(phase.closed[contact], phase.slide[contact], i, weight):
-                root = find_root(
-                    controller, control, model, ground, memory, phase, length, i,
-                    low, phase.before[i], end, value, False,
-                )  # fmt: skip
-                if root < first - EVENT_TIME / length:
-                    for j in range(i):
-                        phase.fired[j] = 0
-                    first = root
-                if root <= first + EVENT_TIME / length:
-                    phase.fired[i] = 1
+        for i in range(sample.shape[0]):
+            phase.fired[i] = 0
+            root = crossing(scene, i, low, high, length, control, memory, phase)
+            if root < first - together:
+                for j in range(i):
+                    phase.fired[j] = 0
+                first = root
+            if root < NO_EVENT and root <= first + together:
+                phase.fired[i] = 1
         if first < NO_EVENT:
             return first
-        for i in range(functions):
-            phase.before[i] = phase.sample[i]
-            phase.before_rate[i] = phase.sample_rate[i]
+        copy_events(sample, sample_rate, phase.before, phase.before_rate)
         low = high
     return NO_EVENT
 
 
 @kernel
-def integrate(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    stop: float,
-) -> bool:
+def longest_good_step(
+    scene: Scene, length: float, stop: float, control: Control, memory: Memory, phase: Phase
+) -> tuple[float, float, bool]:
+    """Take a step of some length or, if it is not good enough, a shorter one.
+
+    Returns its length, zero if it would have to be too short; how much longer the next may be; and
+    whether any was rejected.
+    """
+    rejected = False
+    while True:
+        if phase.time + 1.0001 * length >= stop:
+            length = stop - phase.time
+        if length < shortest_step(phase.time):
+            return 0.0, 1.0, rejected
+        error = take_step(scene, length, control, memory, phase)
+        factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
+        if error <= 1.0:
+            return length, factor, rejected
+        length *= max(0.2, factor) if error < np.inf else 0.1
+        rejected = True
+
+
+@kernel
+def end_at_event(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> tuple[float, bool]:
+    """Repeat the step to end at the event, and correct its length by what is left there.
+
+    Returns the length, and whether the step is good enough.
+    """
+    for attempt in range(4):
+        if not take_step(scene, length, control, memory, phase) <= 1.0:
+            return length, False
+        change = 0.0
+        for i in range(phase.fired.shape[0]):
+            if phase.fired[i] == 1 and is_geometric(i, phase) and phase.end_rate[i] < 0.0:
+                change = -phase.end_value[i] / phase.end_rate[i]
+        change = max(change, -length)
+        if attempt == 3 or not 1e-15 < abs(change) < 1e-6:
+            break
+        length += change
+    return length, True
+
+
+@kernel
+def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase) -> bool:
     """Take one good step that ends at its first event, or at `stop` at the latest.
 
     ``phase.slopes[0]`` must be the slope now, and the event functions those of now. Returns false
     if the step would have to be too short.
     """
-    time = phase.time
-    weight = total_weight(model.mass, model.gravity)
-    for i in range(phase.value.shape[0]):
-        phase.before[i] = phase.value[i]
-        phase.before_rate[i] = phase.rate[i]
+    copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
     wish = min(phase.next_length, phase.longest)
     length = wish
     rejected = False
-    factor = 1.0
-    repeated = False
-    while not repeated:
-        while True:
-            if time + 1.0001 * length >= stop:
-                length = stop - time
-            if length < shortest_step(time):
-                return False
-            error = take_step(controller, control, model, ground, memory, phase, length)
-            factor = 10.0 if error == 0.0 else min(10.0, 0.9 * error**-0.125)
-            if error <= 1.0:
-                break
-            length *= max(0.2, factor) if error < np.inf else 0.1
-            rejected = True
+    while True:
+        length, factor, shortened = longest_good_step(scene, length, stop, control, memory, phase)
+        if length == 0.0:
+            return False
+        rejected = rejected or shortened
         if rejected:
             phase.next_length = length * min(factor, 1.0)
         else:  # a step cut short by a stop says little about how long the next may be
             phase.next_length = max(min(wish, 10.0 * length), length * factor)
-        part = first_event(controller, control, model, ground, memory, phase, length, weight)
-        phase.has_fired = 0
+        part = first_event(scene, length, control, memory, phase)
+        phase.has_fired = 0 if part == NO_EVENT else 1
         if part == NO_EVENT:
             break
-        phase.has_fired = 1
-        length *= part
-        # Repeat the step to end at the event, and correct its length by what is left there.
-        for attempt in range(4):
-            error = take_step(controller, control, model, ground, memory, phase, length)
-            repeated = error <= 1.0
-            if not repeated:
-                break
-            change = 0.0
-            for i in range(phase.fired.shape[0]):
-                contact = i // 2
-                geometric = phase.closed[contact] == 0 or (i % 2 == 1 and phase.slide[contact] != 0)
-                if phase.fired[i] == 1 and geometric and phase.end_rate[i] < 0.0:
-                    change = -phase.end_value[i] / phase.end_rate[i]
-            change = max(change, -length)
-            if attempt == 3 or not 1e-15 < abs(change) < 1e-6:
-                break
-            length += change
-        if not repeated:
-            # Where a torque saturates the shorter step can be the worse one: take less of it.
-            length *= 0.5
-            rejected = True
-            evaluate(
-                controller, control, model, ground, memory, phase, time,
-                phase.begin, phase.slopes[0], True,
-            )  # fmt: skip
-            for i in range(phase.value.shape[0]):
-                phase.before[i] = phase.value[i]
-                phase.before_rate[i] = phase.rate[i]
+        length, good = end_at_event(scene, length * part, control, memory, phase)
+        if good:
+            break
+        # Where a torque saturates the shorter step can be the worse one: take less of it.
+        length *= 0.5
+        rejected = True
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+        copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
     phase.length = length
     phase.finished = 1
     return True
-
-
-@kernel
-def total_weight(mass: Floats, gravity: Floats) -> float:
-    """Weight of the robot, or its mass where there is no gravity."""
-    total = 0.0
-    for i in range(mass.shape[0]):
-        total += mass[i]
-    size = np.sqrt(gravity[0] ** 2 + gravity[1] ** 2)
-    return total * size if size > 0.0 else total

@@ -10,7 +10,7 @@ next phase; at a touchdown the impact law (eq. 20-22) first decides the velociti
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics.kernels import forward_kinematics, momentum
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
@@ -38,21 +39,15 @@ from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
 from heelstrike.sim.event_driven.impact import REST, collide, heading, strike
-from heelstrike.sim.event_driven.location import integrate, shortest_step, total_weight
-from heelstrike.sim.event_driven.modes import (
-    JOINT_STOP,
-    adopt_modes,
-    form_groups,
-    log_event,
-    note_residual,
-    report_modes,
-)
-from heelstrike.sim.event_driven.phase import Phase, allocate_phase, contact_count
-from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.event_driven.location import integrate, shortest_step
+from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
+from heelstrike.sim.event_driven.phase import Phase, allocate_phase
+from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.memory import Assembly, Memory, Reported, contact_capacity
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import JOINT_STOP, log_event, note_residual, note_row
 from heelstrike.sim.record.size import check_room, check_steps
 from heelstrike.sim.setting import Setting
 
@@ -179,7 +174,7 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_count(robot) + 8
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_capacity(robot) + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
@@ -236,92 +231,60 @@ class EventDriven(Method):
 
 
 @kernel
-def copy_row(
-    row: int,
-    time: float,
-    state: Floats,
-    torque: Floats,
-    contacts: Contacts,
-    residual: Floats,
-    record: Record,
-) -> None:
-    """Copy everything but the contact forces to a row of the record."""
-    nv = record.q.shape[1]
-    record.time[row] = time
-    for i in range(nv):
-        record.q[row, i] = state[i]
-        record.v[row, i] = state[nv + i]
+def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
+    """Write a state to a row, where no force acts as yet."""
+    for i in range(model.nv):
+        record.position[row, i] = state[i]
+        record.velocity[row, i] = state[model.nq + i]
         record.stop_torque[row, i] = 0.0
         record.friction_torque[row, i] = 0.0
-    for i in range(torque.shape[0]):
-        record.torque[row, i] = torque[i]
-    for i in range(contacts.gap.shape[0]):
-        for k in range(2):
-            record.point[row, i, k] = contacts.position[i, k]
-            record.normal[row, i, k] = contacts.normal[i, k]
-            record.force[row, i, k] = 0.0
-        record.gap[row, i] = contacts.gap[i]
-        record.slip[row, i] = 0.0
-    for k in range(3):
-        record.residual[row, k] = residual[k]
+    for contact in range(model.nc):
+        record.contact_force[row, contact, 0] = 0.0
+        record.contact_force[row, contact, 1] = 0.0
+        record.slip_velocity[row, contact] = 0.0
 
 
 @kernel
 def write_row(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    time: float,
-    state: Floats,
+    scene: Scene, time: float, state: Floats, control: Control, memory: Memory, phase: Phase,
     record: Record,
-) -> None:
+) -> None:  # fmt: skip
     """Append a state, put on its constraints, with the certified contact forces in it."""
-    contacts = memory.contacts
+    model, contacts, assembly = scene.model, memory.contacts, memory.assembly
+    trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
     for i in range(state.shape[0]):
-        phase.trial[i] = state[i]
-    project(model, ground, memory, phase, phase.trial)
-    evaluate(
-        controller, control, model, ground, memory, phase, time, phase.trial,
-        phase.slopes[SLOPES - 1], True,
-    )  # fmt: skip
+        trial[i] = state[i]
+    project(model, scene.ground, memory, phase, trial)
+    evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
-        memory.answer.residual[k] = 0.0
+        residual[k] = 0.0
     count = phase.closed_count
     if count > 0:
-        solve_candidates(count, memory, phase.slide, True, phase.order)
-        note_residual(memory.answer.residual, memory.tally)
-    row = record.rows
-    copy_row(row, time, phase.trial, memory.torque, contacts, memory.answer.residual, record)
-    points = contacts.gap.shape[0]
-    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
-    dry_force(
-        phase.dry_joint, phase.slide[first:], model.dry_friction, record.friction_torque[row]
-    )  # fmt: skip
-    for contact in range(points):
+        friction, guess = memory.surface.friction, memory.reaction.mode
+        solve_candidates(count, True, friction, guess, phase, assembly)
+        note_residual(residual, memory.tally)
+    row, friction_torque = record.rows, record.friction_torque[record.rows]
+    note_row(time, memory, record)
+    note_state(model, row, trial, record)
+    slide = phase.slide[phase.first_dry :]
+    dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
+    for contact in range(model.nc):
         if phase.passing[contact] == 0:
             memory.tally.penetration = max(memory.tally.penetration, -contacts.gap[contact])
     for place in range(count):
-        contact = memory.candidate[place]
-        if contact >= first:
-            joint = phase.dry_joint[contact - first]
-            record.friction_torque[row, joint] = memory.answer.impulse[2 * place + 1]
-            continue
-        if contact >= points:
-            stop = contact - points
-            record.stop_torque[row, phase.stop_joint[stop]] += (
-                phase.stop_side[stop] * memory.answer.impulse[2 * place]
+        contact = assembly.candidate[place]
+        normal, tangent = impulse[2 * place], impulse[2 * place + 1]
+        if contact >= phase.first_dry:
+            friction_torque[phase.dry_joint[contact - phase.first_dry]] = tangent
+        elif contact >= model.nc:
+            stop = contact - model.nc
+            record.stop_torque[row, phase.stop_joint[stop]] += phase.stop_side[stop] * normal
+        else:
+            record.contact_force[row, contact, 0] = normal
+            record.contact_force[row, contact, 1] = tangent
+            _, record.slip_velocity[row, contact] = contact_velocity(
+                model, memory.equations.tree, contacts, contact
             )
-            continue
-        record.force[row, contact, 0] = memory.answer.impulse[2 * place]
-        record.force[row, contact, 1] = memory.answer.impulse[2 * place + 1]
-        _, record.slip[row, contact] = contact_velocity(
-            model.contact_link[contact], contacts.position[contact], contacts.normal[contact],
-            memory.tree,
-        )  # fmt: skip
-    record.rows = row + 1
     phase.last_row = time
     period = phase.output_period * phase.row_every
     if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:
@@ -329,12 +292,12 @@ def write_row(
 
 
 @kernel
-def extrapolate(ahead: float, begin: Floats, slope: Floats, state: Floats) -> None:
+def extrapolate(model: Model, ahead: float, begin: Floats, slope: Floats, state: Floats) -> None:
     """Where the state comes to in a moment if its accelerations stay as they are."""
-    nv = begin.shape[0] // 2
-    for i in range(nv):
-        state[i] = begin[i] + ahead * (begin[nv + i] + 0.5 * ahead * slope[nv + i])
-        state[nv + i] = begin[nv + i] + ahead * slope[nv + i]
+    for i in range(model.nq):
+        v, v_dot = model.nq + i, slope[model.nq + i]
+        state[i] = begin[i] + ahead * (begin[v] + 0.5 * ahead * v_dot)
+        state[v] = begin[v] + ahead * v_dot
 
 
 @kernel
@@ -349,14 +312,78 @@ def insist(phase: Phase) -> None:
 
 
 @kernel
+def is_unclear(ahead: float, phase: Phase) -> bool:
+    """Whether a force that reached its limit is not clearly beyond it in a moment."""
+    for i in range(phase.fired.shape[0]):
+        if phase.fired[i] == 1 and phase.value[i] > -CLEARLY * phase.weight:
+            return ahead < LAST_LOOK
+    return False
+
+
+@kernel
+def jump(model: Model, memory: Memory, phase: Phase, record: Record) -> bool:
+    """Let velocities jump without a collision (Painlevé's paradox); return success."""
+    impulse = phase.impulse
+    for contact in range(phase.first_dry):
+        phase.hit[contact] = 0
+        phase.plastic[contact] = phase.closed[contact]
+    solved, _ = collide(model, NUDGE, memory, phase, phase.begin)
+    for contact in range(phase.first_dry):
+        phase.plastic[contact] = 0
+        normal = impulse[contact, 0]
+        if normal > 0.0 and contact >= model.nc:
+            joint = phase.stop_joint[contact - model.nc]
+            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
+        elif normal > 0.0:
+            log_event(phase.time, PAINLEVE, contact, normal, impulse[contact, 1], record)
+    return bool(solved)
+
+
+@kernel
+def leave_if_possible(
+    count: int, friction: Floats, phase: Phase, assembly: Assembly, record: Record
+) -> None:
+    """Let all points leave the ground, if that is one of several solutions."""
+    free, delassus = assembly.problem.free, assembly.problem.delassus
+    several = False
+    apart = True
+    for place in range(count):
+        contact, row = assembly.candidate[place], 2 * place
+        if contact >= phase.first_dry:
+            continue
+        apart = apart and free[row] >= 0.0
+        lean = -phase.slide[contact] * friction[contact]
+        if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
+            # Pressing it harder would push it into the ground: there are other solutions.
+            several = True
+            log_event(phase.time, PAINLEVE, contact, 0.0, 0.0, record)
+    if several and apart:
+        for place in range(count):
+            if assembly.candidate[place] < phase.first_dry:
+                assembly.answer.mode[place] = OPEN
+
+
+@kernel
+def begin_phase(
+    model: Model, ground: GroundModel, count: int, memory: Memory, phase: Phase, record: Record
+) -> None:
+    """Begin a phase with the modes that the acceleration-level problem has found."""
+    assembly, friction = memory.assembly, memory.surface.friction
+    leave_if_possible(count, friction, phase, assembly, record)
+    if count > 0:
+        note_residual(assembly.answer.residual, memory.tally)
+    adopt_modes(model, count, assembly, phase, memory.reaction)
+    tree, contacts = memory.equations.tree, memory.contacts
+    forward_kinematics(model, phase.begin[: model.nq], tree)
+    locate_contacts(model, ground, tree, contacts, memory.surface)
+    form_groups(model, tree, contacts, friction, phase)
+    project(model, ground, memory, phase, phase.begin)
+    report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
+
+
+@kernel
 def decide_modes(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
 ) -> bool:
     """Decide the contact modes of the phase that begins now; return success.
 
@@ -367,24 +394,16 @@ def decide_modes(
     point (`jammed`), the velocities jump without a collision (Painlevé's paradox). Where it has
     several, the points leave the ground if that is one of them.
     """
-    time = phase.time
-    weight = total_weight(model.mass, model.gravity)
+    model = scene.model
     forced, jammed = phase.forced == 1, phase.jammed == 1
-    contacts = phase.closed.shape[0]
-    dry = contacts - phase.dry_joint.shape[0]
-    points = model.contact_link.shape[0]
+    friction, guess = memory.surface.friction, memory.reaction.mode
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
-        extrapolate(ahead, phase.begin, phase.slopes[0], phase.trial)
-        evaluate(
-            controller, control, model, ground, memory, phase, time + ahead,
-            phase.trial, phase.slopes[1], True,
-        )  # fmt: skip
+        extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
+        time = phase.time + ahead
+        evaluate(scene, time, phase.trial, control, memory, phase, phase.slopes[1])
         if forced:
-            forced = False
-            for i in range(2 * contacts):
-                if phase.fired[i] == 1 and phase.value[i] > -CLEARLY * weight:
-                    forced = ahead < LAST_LOOK
+            forced = is_unclear(ahead, phase)
             if forced:
                 ahead *= 4.0
                 continue
@@ -394,64 +413,17 @@ def decide_modes(
                 continue
         count = phase.closed_count
         if not jammed and count > 0:
-            jammed = solve_candidates(count, memory, phase.slide, True, phase.order) != SOLVED
+            status = solve_candidates(count, True, friction, guess, phase, memory.assembly)
+            jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
                 continue
-        if jammed:
-            jammed = False
-            for contact in range(dry):
-                phase.hit[contact] = 0
-                phase.plastic[contact] = phase.closed[contact]
-            solved, _ = collide(model, memory, phase, phase.begin, NUDGE)
-            for contact in range(dry):
-                phase.plastic[contact] = 0
-                if phase.impulse[contact, 0] > 0.0 and contact >= points:
-                    log_event(
-                        record, time, JOINT_STOP, phase.stop_joint[contact - points],
-                        phase.impulse[contact, 0], 0.0,
-                    )  # fmt: skip
-                elif phase.impulse[contact, 0] > 0.0:
-                    log_event(
-                        record, time, PAINLEVE, contact, phase.impulse[contact, 0],
-                        phase.impulse[contact, 1],
-                    )  # fmt: skip
-            if not solved:
-                return False
-            continue
-        several = False
-        apart = True
-        for place in range(count):
-            contact = memory.candidate[place]
-            if contact >= dry:
-                continue
-            row = 2 * place
-            apart = apart and memory.problem.free[row] >= 0.0
-            lean = -phase.slide[contact] * memory.friction[contact]
-            if (
-                memory.problem.delassus[row, row] + lean * memory.problem.delassus[row, row + 1]
-                <= 0.0
-            ):
-                # Pressing it harder would push it into the ground: there are other solutions.
-                several = True
-                log_event(record, time, PAINLEVE, contact, 0.0, 0.0)
-        if several and apart:
-            for place in range(count):
-                if memory.candidate[place] < dry:
-                    memory.answer.mode[place] = OPEN
-        if count > 0:
-            note_residual(memory.answer.residual, memory.tally)
-        adopt_modes(count, memory.candidate, memory.answer.mode, memory.mode, phase)
-        nv = model.parent.shape[0]
-        forward_kinematics(model, phase.begin[:nv], memory.tree)
-        locate_contacts(model, ground, memory)
-        form_groups(
-            model, memory.contacts.position, memory.contacts.normal, memory.friction,
-            memory.tree.angle, phase,
-        )  # fmt: skip
-        project(model, ground, memory, phase, phase.begin)
-        report_modes(time, phase, memory, record, phase.started == BEGUN)
-        return True
+        if not jammed:
+            begin_phase(model, scene.ground, count, memory, phase, record)
+            return True
+        jammed = False
+        if not jump(model, memory, phase, record):
+            return False
     return False
 
 
@@ -466,23 +438,20 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
 
 
 @kernel
-def begin_dry_joints(memory: Memory, phase: Phase) -> None:
+def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
     """Let joints with dry friction begin as they move."""
-    first = phase.closed.shape[0] - phase.dry_joint.shape[0]
     for dry in range(phase.dry_joint.shape[0]):
-        phase.slide[first + dry] = heading(memory.v[phase.dry_joint[dry]])
-        memory.closed[first + dry] = 1
-        memory.slipping[first + dry] = phase.slide[first + dry]
+        contact = phase.first_dry + dry
+        phase.slide[contact] = heading(v[phase.dry_joint[dry]])
+        reported.closed[contact] = 1
+        reported.slipping[contact] = phase.slide[contact]
 
 
 @kernel
 def find_what_happened(
-    starting: bool,
-    direction: float,
-    model: Model,
-    memory: Memory,
+    starting: bool, direction: float, model: Model, tree: Workspace, contacts: Contacts,
     phase: Phase,
-) -> tuple[bool, bool]:
+) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
     Points that touch the ground without speed are closed, sliding ones that stop are at rest; an
@@ -491,48 +460,41 @@ def find_what_happened(
     """
     impact = False
     forced = False
-    contacts = memory.contacts
-    points = contacts.gap.shape[0]
     rest = ON_THE_GROUND if starting else REST
     for contact in range(phase.closed.shape[0]):
         phase.hit[contact] = 0
         first = phase.fired[2 * contact] == 1
         second = phase.fired[2 * contact + 1] == 1
-        if phase.closed[contact] == 0:
-            gap = gap_now(contact, contacts, phase, phase.begin)
-            normal, tangent = gap_velocity(
-                contact, model, contacts, memory.tree, phase, phase.begin
-            )
-            if starting:
-                phase.group[contact] = contact
-                if contact < points and gap < -ON_THE_GROUND:
-                    phase.passing[contact] = phase.let_pass
-                first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
-            if phase.passing[contact] == 1:
-                phase.passing[contact] = 0 if first else 1
-            elif (
-                first
-                and not starting
-                and contact < points
-                and behind(contact, direction, contacts, phase)
-            ):
-                phase.passing[contact] = 1
-            elif normal < -rest and (first or gap <= TOGETHER):
-                phase.hit[contact] = 1
-                impact = True
-            elif first:
-                phase.closed[contact] = 1
-                phase.slide[contact] = 0
-                if abs(tangent) > rest:
-                    phase.slide[contact] = 1 if tangent > 0.0 else -1
-            elif gap <= TOGETHER and normal <= rest:
-                phase.hit[contact] = UNPRESSED
-        elif second and phase.slide[contact] != 0:
-            for other in range(phase.closed.shape[0]):
-                if phase.group[other] == phase.group[contact]:
-                    phase.slide[other] = 0
-        elif first or second:
-            forced = True
+        if phase.closed[contact] == 1:
+            if second and phase.slide[contact] != 0:
+                for other in range(phase.closed.shape[0]):
+                    if phase.group[other] == phase.group[contact]:
+                        phase.slide[other] = 0
+            elif first or second:
+                forced = True
+            continue
+        gap = gap_now(contact, contacts, phase, phase.begin)
+        normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
+        if starting:
+            phase.group[contact] = contact
+            if contact < model.nc and gap < -ON_THE_GROUND:
+                phase.passing[contact] = phase.let_pass
+            first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
+        may_pass = first and not starting and contact < model.nc
+        if phase.passing[contact] == 1:
+            phase.passing[contact] = 0 if first else 1
+        elif may_pass and behind(contact, direction, contacts, phase):
+            phase.passing[contact] = 1
+        elif normal < -rest and (first or gap <= TOGETHER):
+            phase.hit[contact] = 1
+            impact = True
+        elif first:
+            phase.closed[contact] = 1
+            phase.slide[contact] = 0
+            if abs(tangent) > rest:
+                phase.slide[contact] = 1 if tangent > 0.0 else -1
+        elif gap <= TOGETHER and normal <= rest:
+            phase.hit[contact] = UNPRESSED
     for contact in range(phase.closed.shape[0]):
         if phase.hit[contact] == UNPRESSED:
             phase.hit[contact] = 1 if impact else 0
@@ -551,17 +513,25 @@ def next_stop(phase: Phase, clock: Clock) -> float:
 
 
 @kernel
-def end_bounces(memory: Memory, record: Record, phase: Phase) -> None:
+def end_bounces(model: Model, phase: Phase, record: Record) -> None:
     """Let the points rest whose accumulating impacts have come to an end by now."""
     for contact in range(phase.closed.shape[0]):
         if phase.accumulation[contact] <= phase.time:
-            if contact < memory.contacts.gap.shape[0]:
-                log_event(record, phase.accumulation[contact], ZENO, contact, 0.0, 0.0)
+            if contact < model.nc:
+                log_event(phase.accumulation[contact], ZENO, contact, 0.0, 0.0, record)
             phase.accumulation[contact] = np.inf
 
 
 @kernel
-def end_step(memory: Memory, record: Record, phase: Phase, clock: Clock) -> None:
+def copy_forces(source: Floats, force: Floats) -> None:
+    """Copy the forces of the contact points; what stands after them is of joints."""
+    for contact in range(force.shape[0]):
+        force[contact, 0] = source[contact, 0]
+        force[contact, 1] = source[contact, 1]
+
+
+@kernel
+def end_step(model: Model, clock: Clock, memory: Memory, phase: Phase, record: Record) -> None:
     """Move time and state to the end of the finished step."""
     stop = next_stop(phase, clock)
     phase.time += phase.length
@@ -569,11 +539,8 @@ def end_step(memory: Memory, record: Record, phase: Phase, clock: Clock) -> None
         phase.time = stop
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
-    points = memory.contacts.gap.shape[0]
-    for contact in range(points):
-        memory.contacts.force[contact, 0] = phase.end_force[contact, 0]
-        memory.contacts.force[contact, 1] = phase.end_force[contact, 1]
-    end_bounces(memory, record, phase)
+    copy_forces(phase.end_force, memory.contacts.force)
+    end_bounces(model, phase, record)
     phase.finished = 0
     memory.tally.steps += 1
     if phase.has_fired == 1:
@@ -584,13 +551,7 @@ def end_step(memory: Memory, record: Record, phase: Phase, clock: Clock) -> None
 
 @kernel
 def write_rows_within(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
 ) -> bool:
     """Append the rows due within the finished step; return whether there was room for all.
 
@@ -603,48 +564,39 @@ def write_rows_within(
         last -= 1e-12
         for contact in range(phase.closed.shape[0]):
             touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
-    due = period > 0.0 and phase.next_row * period <= last
-    while due or touch:
+    state = phase.slopes[SLOPES - 1]
+    while True:
+        time = phase.next_row * period
+        part = (time - phase.time) / phase.length
+        if not (period > 0.0 and time <= last):
+            if not touch:
+                return True
+            touch = False
+            time = phase.time + phase.length
+            part = 1.0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return False
-        time = phase.time + phase.length
-        part = 1.0
-        if due:
-            time = phase.next_row * period
-            part = (time - phase.time) / phase.length
-        else:
-            touch = False
-        interpolate(part, phase.begin, phase.dense, phase.slopes[SLOPES - 1])
-        write_row(
-            controller, control, model, ground, memory, phase, time, phase.slopes[SLOPES - 1],
-            record,
-        )  # fmt: skip
-        due = period > 0.0 and phase.next_row * period <= last
-    return True
+        interpolate(part, phase.begin, phase.dense, state)
+        write_row(scene, time, state, control, memory, phase, record)
 
 
 @kernel
 def meet_event(
-    starting: bool,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
+    starting: bool, model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record
 ) -> int:
     """Deal with what ended the step: impacts change velocities, all else is left to be decided.
 
     The equations of now have been evaluated.
     """
-    contacts = memory.contacts
-    momentum(model, memory.tree, phase.scratch[0])
-    impact, forced = find_what_happened(starting, phase.scratch[0, 0], model, memory, phase)
+    contacts, tree, direction = memory.contacts, memory.equations.tree, phase.scratch[0]
+    momentum(model, tree, direction)
+    impact, forced = find_what_happened(starting, direction[0], model, tree, contacts, phase)
     if impact:
-        if not strike(model, ground, memory, record, phase):
+        if not strike(model, ground, memory, phase, record):
             phase.reason = NO_CONSISTENT_FORCE
             return SOLVER_FAILED
         # The controller shall know before the modes are decided under its torques.
-        for contact in range(contacts.gap.shape[0]):
+        for contact in range(model.nc):
             if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
                 contacts.force[contact, 0] = phase.impulse[contact, 0]
                 contacts.force[contact, 1] = phase.impulse[contact, 1]
@@ -657,112 +609,82 @@ def meet_event(
 @kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> int:
     """Find what the robot stands on when the simulation begins."""
-    nv = model.parent.shape[0]
-    for i in range(nv):
-        phase.begin[i] = memory.q[i]
-        phase.begin[nv + i] = memory.v[i]
-    begin_dry_joints(memory, phase)
-    evaluate_equations(model, memory.q, memory.v, memory)
-    locate_contacts(model, ground, memory)
+    q, v, equations = memory.q, memory.v, memory.equations
+    for i in range(model.nv):
+        phase.begin[i] = q[i]
+        phase.begin[model.nq + i] = v[i]
+    begin_dry_joints(v, phase, memory.reported)
+    evaluate_equations(model, q, v, equations)
+    locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
     code = meet_event(True, model, ground, memory, phase, record)
-    for i in range(nv):
-        memory.v[i] = phase.begin[nv + i]
+    for i in range(model.nv):
+        v[i] = phase.begin[model.nq + i]
     return code
 
 
 @kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:  # noqa: ARG001
     """Kinematics, velocities and contact points of the state now."""
-    observe(model, ground, memory)
+    observe(model, ground, memory.q, memory.v, memory)
 
 
 @kernel
 def decide(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
     """Decide the contact modes if an event or a jump of forces left them open."""
-    contacts = memory.contacts
     phase.row_every = clock.record_every
-    jumped, phase.next_push = switch_at(memory.pushes, phase.time)
-    for i in range(memory.torque.shape[0]):
+    jumped, phase.next_push = switch_at(phase.time, memory.pushes)
+    for i in range(scene.model.nu):
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
     phase.at_event = phase.undecided
-    if (phase.at_event == 1 or jumped) and not decide_modes(
-        controller, control, model, ground, memory, phase, record
-    ):
+    open_modes = phase.at_event == 1 or jumped
+    if open_modes and not decide_modes(scene, control, memory, phase, record):
         phase.reason = NO_CONSISTENT_FORCE
         return SOLVER_FAILED
     phase.undecided = 0
     phase.forced = 0
     phase.jammed = 0
-    evaluate(
-        controller, control, model, ground, memory, phase, phase.time, phase.begin,
-        phase.slopes[0], True,
-    )  # fmt: skip
+    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     if phase.at_event == 1:
-        for contact in range(contacts.gap.shape[0]):
-            contacts.force[contact, 0] = phase.force[contact, 0]
-            contacts.force[contact, 1] = phase.force[contact, 1]
+        copy_forces(phase.force, memory.contacts.force)
     return DONE
 
 
 @kernel
 def report(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> None:
     """Append a row at events, at the end, and at every step if no period is asked for."""
     every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
     last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
     if phase.undecided == 0 and (phase.at_event == 1 or last):
-        write_row(
-            controller, control, model, ground, memory, phase, phase.time, phase.begin, record
-        )
+        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
 
 
 @kernel
 def move(
-    controller: Any,
-    control: Control,
-    model: Model,
-    ground: GroundModel,
-    memory: Memory,
-    phase: Phase,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
     """Take a step to the next event, at the longest to where something is due."""
-    nv = model.parent.shape[0]
+    model, ground = scene.model, scene.ground
     if phase.finished == 0:
         stop = next_stop(phase, clock)
         if stop - phase.time < shortest_step(phase.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
             phase.time = stop
             clock.time = stop
-            end_bounces(memory, record, phase)
+            end_bounces(model, phase, record)
             return DONE
         wish = min(phase.next_length, phase.longest)
         if clock.forked == 0 and stop == clock.until and phase.time + 1.0001 * wish >= stop:
             clock.forked = 1
             return FORK
-        if not integrate(controller, control, model, ground, memory, phase, stop):
+        if not integrate(scene, stop, control, memory, phase):
             # Forces that grow without bound before a sliding point end in a jump of velocity.
-            for contact in range(memory.contacts.gap.shape[0]):
+            for contact in range(model.nc):
                 if phase.slide[contact] != 0:
                     phase.jammed = 1
                     phase.undecided = 1
@@ -772,9 +694,9 @@ def move(
                 return DIVERGED
             phase.next_length = 1e-6
             return DONE
-    if not write_rows_within(controller, control, model, ground, memory, phase, record):
+    if not write_rows_within(scene, control, memory, phase, record):
         return RECORD_FULL
-    end_step(memory, record, phase, clock)
+    end_step(model, clock, memory, phase, record)
     clock.time = phase.time
     project(model, ground, memory, phase, phase.begin)
     if phase.burst > TOO_MANY:
@@ -782,14 +704,11 @@ def move(
         return DIVERGED
     code = DONE
     if phase.has_fired == 1:
-        evaluate(
-            controller, control, model, ground, memory, phase, phase.time, phase.begin,
-            phase.slopes[0], True,
-        )  # fmt: skip
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         code = meet_event(False, model, ground, memory, phase, record)
-    for i in range(nv):
+    for i in range(model.nv):
         memory.q[i] = phase.begin[i]
-        memory.v[i] = phase.begin[nv + i]
+        memory.v[i] = phase.begin[model.nq + i]
     return code
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, cell
+from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
+from heelstrike.sim.memory import contact_capacity
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -25,6 +26,10 @@ class Phase(Bundle):
 
     Attributes
     ----------
+    first_dry : int
+        Number of the first dry joint among the contacts.
+    weight : float
+        Of the robot, or its mass where there is no gravity.
     stop_joint : (ns,) int
     stop_side, stop_limit : (ns,) float
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
@@ -110,6 +115,8 @@ class Phase(Bundle):
         Whether swing feet may scuff without effect.
     """
 
+    first_dry: int = number(int)
+    weight: float = number(float)
     stop_joint: Integers = array("ns", of=int)
     stop_side: Floats = array("ns")
     stop_limit: Floats = array("ns")
@@ -178,29 +185,24 @@ class Phase(Bundle):
     let_pass: int = cell(int)
 
 
-def contact_count(robot: Robot) -> int:
-    """Return how many contacts a phase counts: points, joint stops and joints with dry friction."""
-    model = robot.model
-    stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
-    return robot.nc + int(stops) + int((model.dry_friction > 0.0).sum())
-
-
 def allocate_phase(robot: Robot) -> Phase:
     """Allocate the memory of an event-driven simulation of `robot`."""
-    model, nv, nu = robot.model, robot.nv, robot.nu
+    model = robot.model
+    mass, gravity = float(sum(model.mass)), np.sqrt(np.sum(model.gravity**2))
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
     dry = np.flatnonzero(model.dry_friction > 0.0)
-    nc = contact_count(robot)
+    contacts = contact_capacity(robot)
     return Phase.allocate(
-        nv=nv, nu=nu, ns=len(lower) + len(upper), nd=len(dry), contacts=nc, axes=2, components=2,
-        stages=SLOPES, dense_rows=DENSE_ROWS,
+        model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
+        stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
+        weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
-        closed=(np.arange(nc) >= nc - len(dry)).astype(np.int64),
-        last_impact=np.full(nc, -np.inf),
-        accumulation=np.full(nc, np.inf),
-        value=np.ones(2 * nc),
+        closed=(np.arange(contacts) >= contacts - len(dry)).astype(np.int64),
+        last_impact=np.full(contacts, -np.inf),
+        accumulation=np.full(contacts, np.inf),
+        value=np.ones(2 * contacts),
     )  # fmt: skip

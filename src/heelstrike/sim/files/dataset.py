@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import enum
-from dataclasses import fields, is_dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.compliant.contact_law import (
-    BristleFriction,
-    HuntCrossley,
-    KelvinVoigt,
-    RegularisedFriction,
-)
-from heelstrike.sim.compliant.method import Compliant
-from heelstrike.sim.event_driven.method import EventDriven
-from heelstrike.sim.method import UnknownMethod
-from heelstrike.sim.run import Run
-from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.files.settings import settings
+from heelstrike.sim.files.variables import Variable
+from heelstrike.sim.push import numbers_of_pushes
+from heelstrike.sim.run import EVENT_MEMBERS, QUANTITIES, SOLVED, WORST, Run
 
 if TYPE_CHECKING:
     import xarray
@@ -30,43 +22,63 @@ FORMAT = 1
 
 ROBOT_GROUP = "robot"
 
-# Field of Run -> dimensions, unit, description.
+DIMENSIONS = {
+    "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
+    "axes": "axis", "components": "component", "conditions": "condition",
+}  # fmt: skip
+"""What datasets call the extents of a row. In the plane links and coordinates share one."""
+
 ROWS = {
-    "position": (("coordinate",), "m or rad", "generalised positions"),
-    "velocity": (("coordinate",), "m/s or rad/s", "generalised velocities"),
-    "torque": (("actuator",), "N m", "joint torques within their limits"),
-    "stop_torque": (("coordinate",), "N m or N", "force of the joint stops on the robot"),
-    "friction_torque": (("coordinate",), "N m or N", "dry friction of the joints on the robot"),
-    "contact_point": (("contact", "axis"), "m", "world position of the contact points"),
-    "contact_normal": (("contact", "axis"), "1", "ground normal under the contact points"),
-    "gap": (("contact",), "m", "distance of the contact points to the ground"),
-    "contact_force": (
-        ("contact", "component"),
-        "N",
-        "force on the robot at the contact points, mean over the step that follows",
+    name: Variable(
+        ("time", *(DIMENSIONS[extent] for extent in each.shape)),
+        each.unit,
+        each.label,
+        default=0.0 if each.later else None,
+    )
+    for name, each in QUANTITIES.items()
+}
+TIME = {"time": Variable(("time",), "s", "time")}
+EVENTS = {
+    "event_time": Variable(("event",), "s", "time of the event"),
+    "event_kind": Variable(("event",), "1", "what happened", int),
+    "event_contact": Variable(
+        ("event",), "1", "index of the contact point, or of the joint of a joint event", int
     ),
-    "slip_velocity": (
-        ("contact",),
-        "m/s",
-        "tangential velocity of the contact points at the end of the step",
+    "event_impulse": Variable(
+        ("event", "component"),
+        "N s",
+        "impulse on the robot in the step of the event",
+        allowed="anything",
     ),
-    "residual": (("condition",), "1", "relative residuals of the contact problem"),
 }
-LABELS = {
-    "axis": ["x", "z"],
-    "component": ["normal", "tangent"],
-    "condition": ["complementarity", "cone", "non-penetration"],
-    "window": ["start", "duration"],
+GROUND = {
+    "ground_corner": Variable(
+        ("corner", "axis"), "m", "corners of the ground; its end segments go on for ever"
+    ),
+    "ground_friction": Variable(
+        ("segment",), "1", "friction coefficient of the segments of the ground"
+    ),
+    "ground_restitution": Variable(("segment",), "1", "restitution of the segments of the ground"),
 }
-METHODS = {kind.__name__: kind for kind in (TimeStepping, EventDriven, Compliant)}
-LAWS = {
-    kind.__name__: kind
-    for kind in (HuntCrossley, KelvinVoigt, RegularisedFriction, BristleFriction)
+PUSHES = {
+    "push_link": Variable(("push",), "1", "index of the link that was pushed", int, default=0),
+    "push_point": Variable(("push", "axis"), "m", "where it was pushed, in the axes of the link"),
+    "push_force": Variable(("push", "axis"), "N", "force of the push on the robot"),
+    "push_window": Variable(("push", "window"), "s", "beginning and duration of the push"),
 }
-NONE = "none"
-"""How a setting that is None is written, for NetCDF has no such attribute."""
-COUNTS = ("solves", "shortcuts", "fallbacks", "failures")
-WORST = ("penetration", "complementarity", "cone", "non_penetration")
+
+
+def labels(robot: Robot) -> dict[str, list[str]]:
+    """Return what counts along the dimensions of a dataset."""
+    return {
+        "coordinate": list(robot.joint_names),
+        "actuator": list(robot.actuator_names),
+        "contact": list(robot.contact_names),
+        "axis": ["x", "z"],
+        "component": ["normal", "tangent"],
+        "condition": ["complementarity", "cone", "non-penetration"],
+        "window": ["start", "duration"],
+    }
 
 
 def to_dataset(run: Run) -> xarray.Dataset:
@@ -87,97 +99,28 @@ def to_dataset(run: Run) -> xarray.Dataset:
     """
     import xarray
 
-    robot = run.robot
-    variables: dict[str, Any] = {
-        name: (("time", *dims), getattr(run, name), {"units": units, "long_name": words})
-        for name, (dims, units, words) in ROWS.items()
+    columns: list[Any] = [[getattr(event, name) for event in run.events] for name in EVENT_MEMBERS]
+    columns[-1] = np.reshape(columns[-1], (-1, 2))  # of no events, too
+    values: dict[str, Any] = {
+        **{name: getattr(run, name) for name in ROWS},
+        **dict(zip(EVENTS, columns, strict=True)),
+        **{f"ground_{name}": each for name, each in run.ground.numbers().items()},
+        **{f"push_{name}": each for name, each in numbers_of_pushes(run.robot, run.pushes).items()},
     }
-    events = run.events
-    kinds = np.array([event.kind.value for event in events], dtype=np.int64)
-    variables |= {
-        "event_time": (
-            ("event",),
-            np.array([event.time for event in events], dtype=np.float64),
-            {"units": "s", "long_name": "time of the event"},
-        ),
-        "event_kind": (
-            ("event",),
-            kinds,
-            {
-                "units": "1",
-                "long_name": "what happened",
-                "flag_values": np.array([kind.value for kind in EventKind]),
-                "flag_meanings": " ".join(kind.name.lower() for kind in EventKind),
-            },
-        ),
-        "event_contact": (
-            ("event",),
-            np.array([event.contact for event in events], dtype=np.int64),
-            {
-                "units": "1",
-                "long_name": "index of the contact point, or of the joint of a joint event",
-            },
-        ),
-        "event_impulse": (
-            ("event", "component"),
-            np.array([event.impulse for event in events], dtype=np.float64).reshape(-1, 2),
-            {"units": "N s", "long_name": "impulse on the robot in the step of the event"},
-        ),
-    }
-    ground = run.ground.model()
-    variables |= {
-        "ground_corner": (
-            ("corner", "axis"),
-            ground.vertices,
-            {"units": "m", "long_name": "corners of the ground; its end segments go on for ever"},
-        ),
-        "ground_friction": (
-            ("segment",),
-            ground.friction,
-            {"units": "1", "long_name": "friction coefficient of the segments of the ground"},
-        ),
-        "ground_restitution": (
-            ("segment",),
-            ground.restitution,
-            {"units": "1", "long_name": "restitution of the segments of the ground"},
-        ),
-    }
-    places = [push.place(robot) for push in run.pushes]
-    variables |= {
-        "push_link": (
-            ("push",),
-            np.array([link for link, _ in places], dtype=np.int64),
-            {"units": "1", "long_name": "index of the link that was pushed"},
-        ),
-        "push_point": (
-            ("push", "axis"),
-            np.array([point for _, point in places], dtype=np.float64).reshape(-1, 2),
-            {"units": "m", "long_name": "where it was pushed, in the axes of the link"},
-        ),
-        "push_force": (
-            ("push", "axis"),
-            np.array([push.force for push in run.pushes], dtype=np.float64).reshape(-1, 2),
-            {"units": "N", "long_name": "force of the push on the robot"},
-        ),
-        "push_window": (
-            ("push", "window"),
-            np.array([(p.start, p.duration) for p in run.pushes], dtype=np.float64).reshape(-1, 2),
-            {"units": "s", "long_name": "beginning and duration of the push"},
-        ),
-    }
-    coordinates: dict[str, Any] = {
-        "time": (("time",), run.time, {"units": "s", "long_name": "time"}),
-        "coordinate": list(robot.joint_names),
-        "actuator": list(robot.actuator_names),
-        "contact": list(robot.contact_names),
-        **LABELS,
-    }
+    declared = ROWS | EVENTS | GROUND | PUSHES
+    variables = {name: each.written(values[name]) for name, each in declared.items()}
+    variables["event_kind"][2].update(
+        flag_values=np.array([kind.value for kind in EventKind]),
+        flag_meanings=" ".join(kind.name.lower() for kind in EventKind),
+    )
     # A dimension of length zero has no labels, and an empty list would pass for numbers.
-    coordinates = {name: value for name, value in coordinates.items() if len(value)}
+    coordinates: dict[str, Any] = {dim: names for dim, names in labels(run.robot).items() if names}
+    coordinates["time"] = TIME["time"].written(run.time)
     return xarray.Dataset(variables, coords=coordinates, attrs=_attributes(run))
 
 
 def _attributes(run: Run) -> dict[str, Any]:
+    error = "" if run.error is None else f"{type(run.error).__name__}: {run.error}"
     return {
         "heelstrike_format": FORMAT,
         "title": f"heelstrike run of {run.robot.name}",
@@ -185,68 +128,20 @@ def _attributes(run: Run) -> dict[str, Any]:
         "status": run.status.value,
         "message": _writable(run.message),
         "method": run.method.name,
-        **_settings("method", run.method),
+        **settings("method", run.method),
         "impulses_in_events": int(run.method.impulses_in_events),
         "ground_slope": float(run.ground.slope),
         "ground_has_profile": int(run.ground.profile is not None),
-        **{f"worst_{name}": float(getattr(run.certificates, name)) for name in WORST},
+        **{f"worst_{name}": getattr(run.certificates, name) for name in WORST},
         "solver_name": run.solver.name,
-        **{f"solver_{name}": int(getattr(run.solver, name)) for name in COUNTS},
+        **{f"solver_{name}": getattr(run.solver, name) for name in SOLVED},
         "steps": run.steps,
         "saturations": run.saturations,
         "compile_s": run.timing.compile_s,
         "wall_s": run.timing.wall_s,
-        "error": (
-            "" if run.error is None else _writable(f"{type(run.error).__name__}: {run.error}")
-        ),
+        "error": _writable(error),
         **{f"{name}_version": _version(name) for name in ("heelstrike", "numpy", "numba")},
     }
-
-
-def _settings(prefix: str, thing: Any) -> dict[str, str | int | float]:
-    """Fields of a frozen dataclass as attributes: enums by name, dataclasses with their own."""
-    if isinstance(thing, UnknownMethod):
-        return {f"{prefix}_{name}": value for name, value in thing.settings.items()}
-    settings: dict[str, str | int | float] = {}
-    for field in fields(thing) if is_dataclass(thing) else ():
-        name, value = f"{prefix}_{field.name}", getattr(thing, field.name)
-        if is_dataclass(value):
-            settings |= {name: type(value).__name__, **_settings(name, value)}
-        else:
-            settings[name] = _plain(value)
-    return settings
-
-
-_PLAIN = (str, int, float, enum.Enum, np.bool_, np.number)
-
-
-def unreadable(thing: Any) -> str:
-    """Say why a method, or a law of it, could not be made again of its settings; or nothing."""
-    if isinstance(thing, UnknownMethod):
-        return ""
-    kind: Any = type(thing)
-    if not getattr(getattr(kind, "__dataclass_params__", None), "frozen", False):
-        return f"{kind.__name__} is not a frozen dataclass"
-    if (METHODS | LAWS).get(kind.__name__, kind) is not kind:
-        return f"heelstrike has a {kind.__name__} of its own; call it something else"
-    for field in fields(thing):
-        value = getattr(thing, field.name)
-        if is_dataclass(value):
-            if reason := unreadable(value):
-                return reason
-        elif value is not None and not isinstance(value, _PLAIN):
-            return f"its setting {field.name} is neither number nor text, but {value!r}"
-    return ""
-
-
-def _plain(value: Any) -> str | int | float:
-    if value is None:
-        return NONE
-    if isinstance(value, enum.Enum):
-        return value.name.lower()
-    if isinstance(value, bool | np.bool_):
-        return int(value)  # NetCDF knows no truth values either
-    return value if isinstance(value, str | int) else float(value)
 
 
 def _writable(text: str) -> str:

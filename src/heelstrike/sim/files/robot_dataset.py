@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Model
 from heelstrike.robot.robot import Foot, Robot
+from heelstrike.sim.files.variables import DamageError, Stored, Variable
 
 if TYPE_CHECKING:
     import xarray
@@ -21,43 +22,62 @@ _DIMS: dict[str | int, str] = {
     "nc": "contact", "nu": "actuator", "axes": "xz", 3: "motion",
 }  # fmt: skip
 """Dimensions of the file. In the plane links, joints and coordinates share one."""
-_ARRAYS = {name: number for name, number in NUMBERS.items() if number.shape}
-_DIMS_OF = {name: tuple(_DIMS[size] for size in one.shape) for name, one in _ARRAYS.items()}
-_NAMES = {
-    "joint_names": "coordinate",
-    "link_names": "coordinate",
-    "actuator_names": "actuator",
-    "contact_names": "contact",
+_SIZES = {"xz": 2, "motion": 3}
+_NUMBERS = {
+    name: Variable(
+        tuple(_DIMS[size] for size in number.shape),
+        number.unit,
+        kind=number.kind,
+        allowed="infinite" if number.infinite else "",
+        default=number.default if number.later else None,
+    )
+    for name, number in NUMBERS.items()
+    if number.shape
 }
-_MIRROR = {"joint": "coordinate", "sign": "coordinate", "contact": "contact", "foot": "foot"}
+_NAMES = {
+    "joint_names": Variable(("coordinate",), kind=str),
+    "link_names": Variable(("coordinate",), kind=str),
+    "actuator_names": Variable(("actuator",), kind=str),
+    "contact_names": Variable(("contact",), kind=str),
+}
+_FEET = {
+    "foot_link": Variable(("foot",), kind=int),
+    "foot_name": Variable(("foot",), kind=str),
+    "contact_foot": Variable(("contact",), kind=int),
+}
+_FRICTION = {"contact_friction": Variable(("contact",))}
+_MIRROR = {
+    "mirror_joint": Variable(("coordinate",), kind=int),
+    "mirror_sign": Variable(("coordinate",)),
+    "mirror_contact": Variable(("contact",), kind=int),
+    "mirror_foot": Variable(("foot",), kind=int),
+}
 
 
 def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     """Return the numbers and names of a robot as a dataset."""
     import xarray
 
-    variables: dict[str, Any] = {
-        name: (_DIMS_OF[name], getattr(robot.model, name), {"units": one.unit} if one.unit else {})
-        for name, one in _ARRAYS.items()
-    }
-    for name, dim in _NAMES.items():
-        variables[name] = ((dim,), np.array(getattr(robot, name), dtype=object))
-    variables["foot_name"] = (("foot",), np.array([f.name for f in robot.feet], dtype=object))
-    variables["foot_link"] = (("foot",), np.array([f.link for f in robot.feet], dtype=np.int64))
     foot_of = np.full(robot.nc, -1)
     for index, foot in enumerate(robot.feet):
         foot_of[list(foot.contacts)] = index
-    variables["contact_foot"] = (("contact",), foot_of)
+    values: dict[str, Any] = {
+        **{name: getattr(robot.model, name) for name in _NUMBERS},
+        **{name: getattr(robot, name) for name in _NAMES},
+        "foot_link": [foot.link for foot in robot.feet],
+        "foot_name": [foot.name for foot in robot.feet],
+        "contact_foot": foot_of,
+    }
     if robot.contact_friction:
-        variables["contact_friction"] = (("contact",), np.array(robot.contact_friction))
+        values["contact_friction"] = robot.contact_friction
     if robot.mirror is not None:
-        for name, dim in _MIRROR.items():
-            variables[f"mirror_{name}"] = ((dim,), getattr(robot.mirror, name))
+        values |= {name: getattr(robot.mirror, name.removeprefix("mirror_")) for name in _MIRROR}
+    declared = _NUMBERS | _NAMES | _FEET | _FRICTION | _MIRROR
     # NetCDF has no lists of no text: names of nothing are left out.
     variables = {
-        name: value
-        for name, value in variables.items()
-        if value[1].dtype.kind != "O" or len(value[1])
+        name: declared[name].written(each)
+        for name, each in values.items()
+        if declared[name].kind is not str or len(each)
     }
     attributes = {
         "name": robot.name,
@@ -83,81 +103,34 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
     ValueError
         If anything is missing, of the wrong shape, or points outside the robot.
     """
-
-    def found(name: str) -> NDArray[Any]:
-        if name not in contents:
-            raise ValueError(f"{name.lstrip('@')} is missing")
-        return contents[name]
-
-    sizes = {
-        "coordinate": found("parent").size,
-        "contact": found("contact_link").size,
-        "actuator": found("actuator_joint").size,
-        "foot": found("foot_link").size,
-        "motion": 3,
-        "xz": 2,
-    }
-
-    def numbers(name: str, dims: tuple[str, ...], kind: type) -> Any:
-        shape = tuple(sizes[dim] for dim in dims)
-        if name in _ARRAYS and _ARRAYS[name].later and name not in contents:
-            return np.full(shape, _ARRAYS[name].default)
-        values = found(name)
-        if values.shape != shape or values.dtype.kind not in "fi":
-            raise ValueError(f"{name} is not an array of numbers of shape {shape}")
-        if kind is np.int64 and values.dtype.kind != "i":
-            raise ValueError(f"{name} does not hold whole numbers")
-        return np.ascontiguousarray(values, dtype=kind)
-
-    def texts(name: str, dim: str) -> tuple[str, ...]:
-        if not sizes[dim]:
-            return ()
-        values = found(name)
-        if values.shape != (sizes[dim],) or values.dtype.kind != "U":
-            raise ValueError(f"{name} does not have {sizes[dim]} names")
-        return tuple(values.tolist())
-
-    def attribute(name: str, kind: str) -> Any:
-        value = found(f"@{name}")
-        if value.ndim or value.dtype.kind != kind:
-            raise ValueError(f"{name} is not {'text' if kind == 'U' else 'a whole number'}")
-        return value.item()
-
-    model = Model(
-        **{name: numbers(name, _DIMS_OF[name], one.dtype.type) for name, one in _ARRAYS.items()},
-        pivot=attribute("pivot", "i"),
-    )
-    foot_link = numbers("foot_link", ("foot",), np.int64)
-    contact_foot = numbers("contact_foot", ("contact",), np.int64)
+    stored, sizes = Stored(contents), _SIZES.copy()
+    model = Model(**stored.arrays(_NUMBERS, sizes), pivot=stored.count("pivot"))
+    names = stored.arrays(_NAMES, sizes)
+    foot_link, foot_name, contact_foot = stored.arrays(_FEET, sizes).values()
     if np.any(contact_foot < -1) or np.any(contact_foot >= len(foot_link)):
-        raise ValueError("contact_foot points outside the robot")
+        raise DamageError("contact_foot points outside the robot")
     feet = tuple(
-        Foot(name, int(link), tuple(int(i) for i in np.flatnonzero(contact_foot == index)))
+        Foot(name, link, tuple(np.flatnonzero(contact_foot == index).tolist()))
         for index, (name, link) in enumerate(
-            zip(texts("foot_name", "foot"), foot_link, strict=True)
+            zip(foot_name.tolist(), foot_link.tolist(), strict=True)
         )
     )
     mirror = None
-    if attribute("symmetric", "i"):
-        mirror = Mirror(
-            **{
-                name: numbers(f"mirror_{name}", (dim,), np.float64 if name == "sign" else np.int64)
-                for name, dim in _MIRROR.items()
-            }
-        )
-    friction: tuple[float, ...] = ()
+    if stored.count("symmetric"):
+        arrays = stored.arrays(_MIRROR, sizes)
+        mirror = Mirror(**{name.removeprefix("mirror_"): each for name, each in arrays.items()})
+    friction: list[float] = []
     if "contact_friction" in contents:
-        friction = tuple(numbers("contact_friction", ("contact",), np.float64).tolist())
-    names: dict[str, Any] = {name: texts(name, dim) for name, dim in _NAMES.items()}
+        friction = stored.arrays(_FRICTION, sizes)["contact_friction"].tolist()
     robot = Robot(
-        name=attribute("name", "U"),
+        name=stored.text("name"),
         model=model,
-        **names,
+        **{name: tuple(each.tolist()) for name, each in names.items()},
         feet=feet,
         mirror=mirror,
-        floating=bool(attribute("floating", "i")),
-        contact_friction=friction,
-        source=attribute("source", "U"),
+        floating=bool(stored.count("floating")),
+        contact_friction=tuple(friction),
+        source=stored.text("source"),
     )
     _check(robot)
     return robot
@@ -178,21 +151,16 @@ def _check(robot: Robot) -> None:
             astray[name] = astray.get(name) or np.any((values < number.least) | (values >= high))
     for name, whether in astray.items():
         if whether:
-            raise ValueError(f"{name} points outside the robot")
-    for name, number in _ARRAYS.items():
-        values = getattr(model, name)
-        bad = np.isnan(values) if number.infinite else ~np.isfinite(values)
-        if np.any(bad):
-            raise ValueError(f"{name} is not finite")
-    if not all(0.0 <= friction < math.inf for friction in robot.contact_friction):
-        raise ValueError("contact_friction must be finite and not negative")
+            raise DamageError(f"{name} points outside the robot")
+    if any(friction < 0.0 for friction in robot.contact_friction):
+        raise DamageError("contact_friction must not be negative")
     if any(not foot.contacts for foot in robot.feet):
-        raise ValueError("a foot has no contact points")
+        raise DamageError("a foot has no contact points")
     if not math.isfinite(robot.total_mass) or np.any(model.mass < 0.0):
-        raise ValueError("masses must be finite and not negative")
+        raise DamageError("masses must be finite and not negative")
     if robot.mirror is not None:
         for name, size in (("joint", robot.nj), ("contact", robot.nc), ("foot", len(robot.feet))):
             if sorted(getattr(robot.mirror, name)) != list(range(size)):
-                raise ValueError(f"mirror_{name} is not an exchange of left and right")
+                raise DamageError(f"mirror_{name} is not an exchange of left and right")
         if np.any(np.abs(robot.mirror.sign) != 1.0):
-            raise ValueError("mirror_sign must be 1 or -1")
+            raise DamageError("mirror_sign must be 1 or -1")

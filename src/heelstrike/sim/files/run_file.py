@@ -15,15 +15,15 @@ from pathlib import Path
 
 from heelstrike.errors import RunFileError, WriteError
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset, unreadable
+from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset
 from heelstrike.sim.files.hdf5_contents import (
-    Contents,
     HostileFileError,
     contents,
     contents_of_stranger,
 )
 from heelstrike.sim.files.robot_dataset import robot_to_dataset
 from heelstrike.sim.files.seal import seal, seal_holds
+from heelstrike.sim.files.settings import unreadable
 from heelstrike.sim.files.stored_run import stored_run
 from heelstrike.sim.run import Run
 from heelstrike.whole_file import write_whole
@@ -135,33 +135,22 @@ def load_run(
             raise RunFileError(f"there is no file {source}")
         if not source.is_file():
             raise RunFileError(f"{source}: not a run of heelstrike: it is not a regular file")
-        found = _contents(source)
+        sealed = seal_holds(source)
     except RunFileError:
         raise
-    except PermissionError as error:
-        raise RunFileError(f"{source}: no permission to read it") from error
     except (OSError, ValueError) as error:  # also a path with a null character
         raise RunFileError(f"{source}: cannot be read ({error})") from error
-    try:
-        return stored_run(source, found, robot, classes)
-    except MemoryError as error:
-        raise RunFileError(f"{source}: the run does not fit into memory") from error
-
-
-def _contents(source: Path) -> Contents:
-    sealed = seal_holds(source)
     if sealed is False:
         raise RunFileError(
             f"{source}: damaged: its bytes are not those that were written (their checksum differs)"
         )
-    read = contents if sealed else contents_of_stranger
     try:
-        return read(source, (ROBOT_GROUP,))
-    except HostileFileError as error:
-        raise RunFileError(f"{source}: not a run of heelstrike, or damaged: {error}") from error
+        found = (contents if sealed else contents_of_stranger)(source, (ROBOT_GROUP,))
+        return stored_run(source, found, robot, classes)
+    except RunFileError:
+        raise
     except MemoryError as error:
         raise RunFileError(f"{source}: the run does not fit into memory") from error
     except Exception as error:  # whatever the HDF5 library makes of it
-        raise RunFileError(
-            f"{source}: not a run of heelstrike, or damaged ({type(error).__name__}: {error})"
-        ) from error
+        told = error if isinstance(error, HostileFileError) else repr(error)
+        raise RunFileError(f"{source}: not a run of heelstrike, or damaged: {told}") from error

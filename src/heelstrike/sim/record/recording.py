@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Memory, Tally
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.run import QUANTITIES
 
 TOUCHDOWN = int(EventKind.TOUCHDOWN)
 LIFTOFF = int(EventKind.LIFTOFF)
@@ -45,7 +50,7 @@ def limit_torque(model: Model, memory: Memory) -> bool:
 
 
 @kernel
-def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memory) -> None:
+def try_torque(model: Model, q: Floats, v: Floats, tally: Tally, torque: Floats) -> None:
     """Clip torques that a controller was asked for within a step, at a state that may be no good.
 
     Keeps in mind which of them was not finite when it was last asked at a state that was.
@@ -61,7 +66,7 @@ def try_torque(model: Model, q: Floats, v: Floats, torque: Floats, memory: Memor
     for i in range(v.shape[0]):
         if not (abs(q[i]) < INFINITY and abs(v[i]) < INFINITY):
             return
-    memory.tally.bad_trial = bad
+    tally.bad_trial = bad
 
 
 @dissolved_kernel
@@ -70,25 +75,41 @@ def note_extremes(model: Model, memory: Memory) -> None:
     tally = memory.tally
     for contact in range(model.contact_link.shape[0]):
         tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
-    tally.complementarity = max(tally.complementarity, memory.answer.residual[0])
-    tally.cone = max(tally.cone, memory.answer.residual[1])
-    tally.non_penetration = max(tally.non_penetration, memory.answer.residual[2])
+    note_residual(memory.assembly.answer.residual, tally)
 
 
 @kernel
-def note_event(record: Record, time: float, kind: int, contact: int, memory: Memory) -> None:
-    """Append an event; its impulse is that of the step it happened in."""
-    place = record.events
-    record.event_time[place] = time
-    record.event_kind[place] = kind
-    record.event_contact[place] = contact
-    record.event_impulse[place, 0] = memory.contacts.force[contact, 0]
-    record.event_impulse[place, 1] = memory.contacts.force[contact, 1]
-    record.events = place + 1
+def note_residual(residual: Floats, tally: Tally) -> None:
+    """Keep the worst residuals of the run."""
+    tally.complementarity = max(tally.complementarity, residual[0])
+    tally.cone = max(tally.cone, residual[1])
+    tally.non_penetration = max(tally.non_penetration, residual[2])
+
+
+@kernel
+def log_event(
+    time: float, kind: int, place: int, normal: float, tangent: float, record: Record
+) -> None:
+    """Append an event of a contact point or joint, with its impulse."""
+    event = record.events
+    record.event_time[event] = time
+    record.event_kind[event] = kind
+    record.event_contact[event] = place
+    record.event_impulse[event, 0] = normal
+    record.event_impulse[event, 1] = tangent
+    record.events = event + 1
+
+
+@kernel
+def note_event(
+    time: float, kind: int, contact: int, step: float, force: Floats, record: Record
+) -> None:
+    """Append an event of a contact point; its impulse is that of the step it happened in."""
+    log_event(time, kind, contact, force[contact, 0] * step, force[contact, 1] * step, record)
 
 
 @dissolved_kernel
-def note_events(model: Model, record: Record, time: float, step: float, memory: Memory) -> None:
+def note_events(model: Model, time: float, step: float, memory: Memory, record: Record) -> None:
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
     An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
@@ -96,116 +117,103 @@ def note_events(model: Model, record: Record, time: float, step: float, memory: 
     rest at a stop do not reach it. Joints with dry friction come to rest, or begin to move.
     """
     for contact in range(model.contact_link.shape[0]):
-        pushed = memory.contacts.force[contact, 0] > 0.0
-        first = record.events
-        if memory.closed[contact] == 0 and pushed:
-            memory.closed[contact] = 1
-            memory.slipping[contact] = 0
-            stood = memory.tally.steps == 0 and memory.contacts.gap[contact] <= LIFTOFF_GAP
-            if stood:
-                normal, _ = contact_velocity(
-                    model.contact_link[contact],
-                    memory.contacts.position[contact],
-                    memory.contacts.normal[contact],
-                    memory.tree,
-                )
-                stood = normal >= -STANDING_SPEED
-            if not stood:
-                note_event(record, time + step, TOUCHDOWN, contact, memory)
-        elif (
-            memory.closed[contact] == 1
-            and not pushed
-            and memory.contacts.gap[contact] > LIFTOFF_GAP
-        ):
-            memory.closed[contact] = 0
-            memory.slipping[contact] = 0
-            note_event(record, time, LIFTOFF, contact, memory)
-        if memory.closed[contact] == 1 and pushed:
-            slips = abs(memory.slip[contact]) > SLIP_SPEED
-            if slips and memory.slipping[contact] == 0:
-                memory.slipping[contact] = 1
-                note_event(record, time + step, SLIP, contact, memory)
-            elif not slips and memory.slipping[contact] == 1:
-                memory.slipping[contact] = 0
-                note_event(record, time + step, STICK, contact, memory)
-        for place in range(first, record.events):
-            record.event_impulse[place, 0] *= step
-            record.event_impulse[place, 1] *= step
+        note_events_of_contact(model, time, step, contact, memory, record)
     for joint in range(model.parent.shape[0]):
-        pushed = memory.stop_torque[joint] != 0.0
-        if not pushed and memory.stopped[joint] == 0:
-            continue
-        way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
-        stood = (
-            memory.tally.steps == 0
-            and way <= LIFTOFF_GAP
-            and abs(memory.v[joint]) <= STANDING_SPEED
-        )
-        if pushed and memory.stopped[joint] == 0 and not stood:
-            place = record.events
-            record.event_time[place] = time + step
-            record.event_kind[place] = JOINT_STOP
-            record.event_contact[place] = joint
-            record.event_impulse[place, 0] = abs(memory.stop_torque[joint]) * step
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
-        if pushed:
-            memory.stopped[joint] = 1
-        elif way > LIFTOFF_GAP:
-            memory.stopped[joint] = 0
+        if memory.reaction.stop_torque[joint] != 0.0 or memory.reported.stopped[joint] != 0:
+            note_stop(model, time, step, joint, memory, record)
     for dry in range(memory.dry_joint.shape[0]):
-        rests = abs(memory.next_v[memory.dry_joint[dry]]) <= SLIP_SPEED
-        if memory.resting[dry] == -1:
-            memory.resting[dry] = 1 if abs(memory.v[memory.dry_joint[dry]]) <= SLIP_SPEED else 0
-        if rests != (memory.resting[dry] == 1):
-            place = record.events
-            record.event_time[place] = time + step
-            record.event_kind[place] = JOINT_STICK if rests else JOINT_SLIP
-            record.event_contact[place] = memory.dry_joint[dry]
-            record.event_impulse[place, 0] = 0.0
-            record.event_impulse[place, 1] = 0.0
-            record.events = place + 1
-            memory.resting[dry] = 1 if rests else 0
+        joint = memory.dry_joint[dry]
+        rests = abs(memory.next_v[joint]) <= SLIP_SPEED
+        if memory.reported.resting[dry] == -1:
+            memory.reported.resting[dry] = 1 if abs(memory.v[joint]) <= SLIP_SPEED else 0
+        if rests != (memory.reported.resting[dry] == 1):
+            log_event(time + step, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
+            memory.reported.resting[dry] = 1 if rests else 0
 
 
 @dissolved_kernel
-def note_row(record: Record, time: float, memory: Memory) -> None:
-    """Append the state now and what acts on it to the record."""
-    row = record.rows
-    record.time[row] = time
-    for i in range(memory.v.shape[0]):
-        record.q[row, i] = memory.q[i]
-        record.v[row, i] = memory.v[i]
-        record.stop_torque[row, i] = memory.stop_torque[i]
-        record.friction_torque[row, i] = memory.friction_torque[i]
-    for i in range(memory.torque.shape[0]):
-        record.torque[row, i] = memory.torque[i]
-    contacts = memory.contacts
-    for i in range(memory.slip.shape[0]):
-        for k in range(2):
-            record.point[row, i, k] = contacts.position[i, k]
-            record.normal[row, i, k] = contacts.normal[i, k]
-            record.force[row, i, k] = contacts.force[i, k]
-        record.gap[row, i] = contacts.gap[i]
-        record.slip[row, i] = memory.slip[i]
-    for k in range(3):
-        record.residual[row, k] = memory.answer.residual[k]
-    record.rows = row + 1
+def note_events_of_contact(
+    model: Model, time: float, step: float, contact: int, memory: Memory, record: Record
+) -> None:
+    """Find what happened to a contact point in this step."""
+    force, gap = memory.contacts.force, memory.contacts.gap[contact]
+    closed, slipping = memory.reported.closed, memory.reported.slipping
+    pushed = force[contact, 0] > 0.0
+    if closed[contact] == 0 and pushed:
+        closed[contact] = 1
+        slipping[contact] = 0
+        stood = memory.tally.steps == 0 and gap <= LIFTOFF_GAP
+        if stood:
+            normal, _ = contact_velocity(model, memory.equations.tree, memory.contacts, contact)
+            stood = normal >= -STANDING_SPEED
+        if not stood:
+            note_event(time + step, TOUCHDOWN, contact, step, force, record)
+    elif closed[contact] == 1 and not pushed and gap > LIFTOFF_GAP:
+        closed[contact] = 0
+        slipping[contact] = 0
+        note_event(time, LIFTOFF, contact, step, force, record)
+    if closed[contact] == 1 and pushed:
+        slips = abs(memory.reaction.slip[contact]) > SLIP_SPEED
+        if slips != (slipping[contact] == 1):
+            slipping[contact] = 1 if slips else 0
+            note_event(time + step, SLIP if slips else STICK, contact, step, force, record)
 
 
 @kernel
-def note_row_when_due(record: Record, memory: Memory, clock: Clock) -> int:
+def note_stop(
+    model: Model, time: float, step: float, joint: int, memory: Memory, record: Record
+) -> None:
+    """Find whether a joint reached a stop in this step, or left it."""
+    pushed = memory.reaction.stop_torque[joint] != 0.0
+    way = min(memory.q[joint] - model.lower[joint], model.upper[joint] - memory.q[joint])
+    stood = (
+        memory.tally.steps == 0 and way <= LIFTOFF_GAP and abs(memory.v[joint]) <= STANDING_SPEED
+    )
+    if pushed and memory.reported.stopped[joint] == 0 and not stood:
+        impulse = abs(memory.reaction.stop_torque[joint]) * step
+        log_event(time + step, JOINT_STOP, joint, impulse, 0.0, record)
+    if pushed:
+        memory.reported.stopped[joint] = 1
+    elif way > LIFTOFF_GAP:
+        memory.reported.stopped[joint] = 0
+
+
+def _row_writer() -> Callable[[float, Memory, Record], None]:
+    """Make the kernel that writes rows, a loop for each recorded quantity."""
+    lines = [
+        "def note_row(time, memory, record):",
+        " row = record.rows",
+        " record.time[row] = time",
+    ]
+    for name, quantity in QUANTITIES.items():
+        indices = ["i", "j"][: len(quantity.shape)]
+        for depth, index in enumerate(indices):
+            extent = f"record.{name}.shape[{depth + 1}]"
+            lines.append(f"{' ' * (depth + 1)}for {index} in range({extent}):")
+        place = ", ".join(indices)
+        copy = f"record.{name}[row, {place}] = memory.{quantity.of}[{place}]"
+        lines.append(" " * (len(indices) + 1) + copy)
+    scope: dict[str, Any] = {"__name__": __name__}
+    exec("\n".join([*lines, " record.rows = row + 1"]), scope)
+    scope["note_row"].__doc__ = "Append what acts now, of every recorded quantity, to the record."
+    return dissolved_kernel(scope["note_row"])
+
+
+note_row = _row_writer()
+
+
+@kernel
+def note_row_when_due(memory: Memory, clock: Clock, record: Record) -> int:
     """Append a row if one is due, every so many steps and at the end; return which, or -1."""
     if clock.index % clock.record_every != 0 and clock.finishing == 0:
         return -1
-    note_row(record, clock.time, memory)
+    note_row(clock.time, memory, record)
     return int(record.rows - 1)
 
 
 @dissolved_kernel
-def center_height(model: Model, ground: GroundModel, memory: Memory) -> float:
+def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
     """Height of the centre of mass above the ground below it."""
-    tree = memory.tree
     mass = 0.0
     x = 0.0
     z = 0.0

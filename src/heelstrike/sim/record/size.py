@@ -95,17 +95,14 @@ def check_room(setting: Setting, duration: float, name: str, period: float) -> N
         return
     size = row_size(setting.robot)
     # At the end the pieces of the record are joined: every row is there twice.
-    if 2.0 * rows * size <= ALWAYS_THERE:
-        return
-    available = room()
-    if 2.0 * rows * size <= available:
-        return
-    raise SimulationError(
-        f"the record of {duration:g} s with {name} = {period:g} s and "
-        f"record_every={setting.record_every} does not fit into memory: {_count(rows)} rows of "
-        f"{size} bytes, {_gigabytes(2.0 * rows * size)} with room to join them, where a record may "
-        f"take {_gigabytes(available)}. It fits with {_advice(periods, size, available)}"
-    )
+    available = _missing(2.0 * rows * size)
+    if available is not None:
+        raise SimulationError(
+            f"the record of {duration:g} s with {name} = {period:g} s and "
+            f"record_every={setting.record_every} does not fit into memory: {_count(rows)} rows of "
+            f"{size} bytes, {_gigabytes(2.0 * rows * size)} with room to join them, where a record "
+            f"may take {_gigabytes(available)}. It fits with {_advice(periods, size, available)}"
+        )
 
 
 def check_runs(robot: Robot, rows: int, runs: int, record_every: int) -> None:
@@ -126,10 +123,8 @@ def check_runs(robot: Robot, rows: int, runs: int, record_every: int) -> None:
         With the rows they would have, and a `record_every` that fits.
     """
     size = row_size(robot)
-    if rows * size <= ALWAYS_THERE:
-        return
-    available = room()
-    if rows * size <= available:
+    available = _missing(rows * size)
+    if available is None:
         return
     words = (
         f"the records of all runs do not fit into memory: {_count(rows)} rows of {size} bytes, "
@@ -145,6 +140,12 @@ def check_runs(robot: Robot, rows: int, runs: int, record_every: int) -> None:
         f"{words}. They fit with record_every={enough:.0f}; or keep final states only "
         "(record_every=None)"
     )
+
+
+def _missing(size: float) -> int | None:
+    """Return what a record may take, if so many bytes are more than that."""
+    available = ALWAYS_THERE if size <= ALWAYS_THERE else room()
+    return available if size > available else None
 
 
 def row_size(robot: Robot) -> int:

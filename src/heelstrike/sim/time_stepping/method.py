@@ -14,10 +14,11 @@ positions first and the new velocity computed there, which is the same sequence 
 them with the new velocity at the end of each step.
 """
 
+# ruff: noqa: ARG001 - the kernels of all methods have the same arguments
+
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -28,13 +29,14 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
-from heelstrike.dynamics.kernels import passive_force
+from heelstrike.dynamics.kernels import integrate, passive_force
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.dry_friction import note_dry_joint, press_dry_joints, select_dry_joints
+from heelstrike.sim.contacts.dry_friction import press_dry_joints, select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -49,8 +51,9 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
@@ -180,13 +183,7 @@ class TimeStepping(Method):
 
 
 @dissolved_kernel
-def begin(
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,  # noqa: ARG001
-    work: Stepping,  # noqa: ARG001
-    record: Record,  # noqa: ARG001
-) -> int:
+def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
     """Begin: there is nothing to prepare."""
     return DONE
 
@@ -194,121 +191,116 @@ def begin(
 @dissolved_kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
+    equations = memory.equations
     if work.scheme == LINEARLY_IMPLICIT:
-        for i in range(memory.added.shape[0]):
-            memory.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
-    evaluate_equations(model, memory.q, memory.v, memory)
-    locate_contacts(model, ground, memory)
+        for i in range(model.nv):
+            equations.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
+    evaluate_equations(model, memory.q, memory.v, equations)
+    locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
 
 
 @dissolved_kernel
-def free_velocity(model: Model, step: float, scheme: int, memory: Memory) -> None:
+def free_velocity(model: Model, work: Stepping, time: float, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
     The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
     order that adds h D + h² K to the mass matrix, as if it were armature, and −h K v to the force.
     """
-    nv = model.parent.shape[0]
-    passive_force(model, memory.q, memory.v, memory.force)
-    for i in range(model.actuator_joint.shape[0]):
-        memory.force[model.actuator_joint[i]] += memory.torque[i]
-    if scheme == LINEARLY_IMPLICIT:
-        for i in range(nv):
-            memory.force[i] -= step * memory.stiffness[i] * memory.v[i]
-        if memory.programs[SOLVE] != 0:
-            weigh(model, memory)  # the program has not heard of it
-    for i in range(nv):
-        memory.rate[i] = step * (memory.force[i] - memory.bias[i])
-    solve_mass_matrix(model, memory, memory.rate)
-    for i in range(nv):
-        memory.next_v[i] = memory.v[i] + memory.rate[i]
+    step, equations, v, next_v = work.step, memory.equations, memory.v, memory.next_v
+    force, rate = equations.force, equations.rate
+    passive_force(model, memory.q, v, force)
+    for i in range(model.nu):
+        force[model.actuator_joint[i]] += memory.torque[i]
+    if work.scheme == LINEARLY_IMPLICIT:
+        for i in range(model.nv):
+            force[i] -= step * memory.stiffness[i] * v[i]
+        if equations.programs[SOLVE] != 0:
+            weigh(model, equations)  # the program has not heard of it
+    for i in range(model.nv):
+        rate[i] = step * (force[i] - equations.bias[i])
+    solve_mass_matrix(model, equations, rate)
+    for i in range(model.nv):
+        next_v[i] = v[i] + rate[i]
+    if share_over_step(time, step, memory.pushes):
+        for i in range(model.nv):
+            rate[i] = 0.0
+        add_pushes(model, equations.tree, memory.pushes, rate)
+        solve_mass_matrix(model, equations, rate)
+        for i in range(model.nv):
+            next_v[i] += step * rate[i]
 
 
 @dissolved_kernel
-def push_robot(model: Model, time: float, step: float, memory: Memory) -> None:
-    """Add to the free velocity what pushes do in this step."""
-    if not share_over_step(memory.pushes, time, step):
-        return
-    nv = model.parent.shape[0]
-    for i in range(nv):
-        memory.rate[i] = 0.0
-    add_pushes(model, memory.tree, memory.pushes, memory.rate)
-    solve_mass_matrix(model, memory, memory.rate)
-    for i in range(nv):
-        memory.next_v[i] += step * memory.rate[i]
-
-
-@dissolved_kernel
-def select_candidates(
-    model: Model, step: float, scheme: int, activation: float, memory: Memory
-) -> int:
-    """List the contact points that could act in this step, with their free terms."""
-    contacts = memory.contacts
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
-    farthest = FAR_STEPS * CLOSING_SPEED * step
-    if scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
-        farthest = activation
-    count = 0
-    usual = memory.programs[VELOCITIES] != 0
-    for contact in range(model.contact_link.shape[0]):
-        if contacts.gap[contact] <= farthest:
-            memory.candidate[count] = contact
-            usual = usual and memory.usual_place[contact] >= 0
-            count += 1
-    if count == 0:
-        return 0
-    near = count
-    velocity = memory.point_velocity
-    if usual:
-        play(
-            memory.programs[VELOCITIES],
-            (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.next_v, velocity,
-            ),
-        )  # fmt: skip
+def find_velocities(
+    model: Model, contacts: Contacts, v: Floats, straight: bool, tree: Workspace, usual: UsualPoints
+) -> None:
+    """Velocities of the usual points by their program, or of all by the loops."""
+    velocity = usual.point_velocity
+    if straight:
+        play(usual.programs[VELOCITIES], (model, usual.usual_points, contacts, v, tree, velocity))
     else:
-        point_velocities(
-            model, memory.every_point, memory.tree, contacts.position, contacts.normal,
-            memory.next_v, velocity,
-        )  # fmt: skip
+        point_velocities(model, usual.every_point, contacts, v, tree, velocity)
+
+
+@kernel
+def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) -> bool:
+    """Whether there is a program for the contact points among the candidates, the first `near`."""
+    straight = usual.programs[program] != 0
+    for place in range(near):
+        straight = straight and usual.usual_place[candidate[place]] >= 0
+    return straight
+
+
+@dissolved_kernel
+def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
+    """List the contact points that could act in this step, with their free terms."""
+    contacts, assembly, step = memory.contacts, memory.assembly, work.step
+    candidate, problem = assembly.candidate, assembly.problem
+    linearised = work.scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    farthest = FAR_STEPS * CLOSING_SPEED * step
+    if work.scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
+        farthest = work.activation
+    near = 0
+    for contact in range(model.nc):
+        if contacts.gap[contact] <= farthest:
+            candidate[near] = contact
+            near += 1
+    if near == 0:
+        return 0
+    straight = are_usual(candidate, near, VELOCITIES, memory.usual)
+    tree = memory.equations.tree
+    find_velocities(model, contacts, memory.next_v, straight, tree, memory.usual)
+    velocity = memory.usual.point_velocity
     count = 0
     for place in range(near):
-        contact = memory.candidate[place]
+        contact = candidate[place]
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if linearised:
             if gap > step * max(CLOSING_SPEED, -2.0 * normal):
                 continue
             normal += gap / step
-        elif scheme == MOREAU_JEAN:
-            before, _ = contact_velocity(
-                model.contact_link[contact],
-                contacts.position[contact],
-                contacts.normal[contact],
-                memory.tree,
-            )
-            if gap + 0.5 * step * before > activation:
+        elif work.scheme == MOREAU_JEAN:
+            before, _ = contact_velocity(model, tree, contacts, contact)
+            if gap + 0.5 * step * before > work.activation:
                 continue
-            normal += memory.restitution[contact] * before
-        memory.problem.free[2 * count] = normal
-        memory.problem.free[2 * count + 1] = velocity[contact, 1]
-        memory.problem.set[count] = CONE
-        memory.problem.friction[count] = memory.friction[contact]
-        memory.answer.mode[count] = memory.mode[contact]
-        memory.candidate[count] = contact
+            normal += memory.surface.restitution[contact] * before
+        problem.free[2 * count] = normal
+        problem.free[2 * count + 1] = velocity[contact, 1]
+        problem.set[count] = CONE
+        problem.friction[count] = memory.surface.friction[contact]
+        assembly.answer.mode[count] = memory.reaction.mode[contact]
+        candidate[count] = contact
         count += 1
     return count
 
 
 @dissolved_kernel
-def select_stops(
-    model: Model, step: float, scheme: int, activation: float, count: int, memory: Memory
-) -> int:
+def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
-    points = model.contact_link.shape[0]
-    linearised = scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
-    for joint in range(model.parent.shape[0]):
+    assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
+    linearised = work.scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    for joint in range(model.nv):
         for end in range(2):
             sign = 1.0 - 2.0 * end
             limit = model.upper[joint] if end == 1 else model.lower[joint]
@@ -319,260 +311,244 @@ def select_stops(
                 if not gap < step * max(CLOSING_RATE, -2.0 * normal):
                     continue
                 normal += gap / step
-            elif scheme == MOREAU_JEAN:
-                if not gap + 0.5 * step * before <= activation:
+            elif work.scheme == MOREAU_JEAN:
+                if not gap + 0.5 * step * before <= work.activation:
                     continue
-            elif not gap <= activation:
+            elif not gap <= work.activation:
                 continue
-            memory.problem.free[2 * count] = normal
-            memory.problem.free[2 * count + 1] = 0.0
-            memory.problem.set[count] = HALF_LINE
-            memory.problem.friction[count] = 0.0
-            memory.answer.mode[count] = memory.stop_mode[joint, end]
-            memory.candidate[count] = points + 2 * joint + end
+            problem.free[2 * count] = normal
+            problem.free[2 * count + 1] = 0.0
+            problem.set[count] = HALF_LINE
+            problem.friction[count] = 0.0
+            assembly.answer.mode[count] = memory.reaction.stop_mode[joint, end]
+            assembly.candidate[count] = model.nc + 2 * joint + end
             count += 1
     return count
 
 
 @kernel
-def write_rows(model: Model, memory: Memory, count: int) -> None:
-    """Write the Jacobian rows of contact points and stops; those of dry joints are written.
+def write_rows(
+    model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
+) -> None:
+    """Write the Jacobian rows of the first `count` candidates, contact points and stops.
 
     A stop has a normal row ±1 at its joint and a tangent row of zeros.
     """
-    points = model.contact_link.shape[0]
-    for place in range(count - memory.dry_joint.shape[0]):
-        candidate = memory.candidate[place]
-        if candidate < points:
-            contact_rows(model, memory, candidate, place)
-            continue
-        stop = candidate - points
-        write_unit_row(memory, stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2))
-
-
-@dissolved_kernel
-def are_usual(memory: Memory, near: int) -> bool:
-    """Whether there are programs for the contact points among the candidates, the first `near`."""
-    usual = memory.programs[DELASSUS] != 0
-    for place in range(near):
-        usual = usual and memory.usual_place[memory.candidate[place]] >= 0
-    return usual
+    for place in range(count):
+        stop = assembly.candidate[place] - model.nc
+        if stop < 0:
+            contact_rows(model, tree, contacts, assembly.candidate[place], place, assembly)
+        else:
+            write_unit_row(stop // 2, 2 * place, 1.0 - 2.0 * (stop % 2), assembly)
 
 
 @kernel
-def joint_row(model: Model, memory: Memory, place: int) -> tuple[int, int, float]:
+def joint_row(
+    model: Model, dry_joint: Integers, candidate: Integers, place: int
+) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
-    stop = memory.candidate[place] - model.contact_link.shape[0]
-    dry = stop - 2 * model.parent.shape[0]
+    stop = candidate[place] - model.nc
+    dry = stop - 2 * model.nv
     if dry >= 0:
-        return 2 * place + 1, memory.dry_joint[dry], 1.0
+        return 2 * place + 1, dry_joint[dry], 1.0
     return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
 
 
 @dissolved_kernel
-def gather_delassus(model: Model, memory: Memory, near: int, count: int) -> None:
+def gather_delassus(
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int,
+    equations: Equations, usual: UsualPoints, assembly: Assembly,
+) -> None:  # fmt: skip
     """Delassus matrix of all usual points; that of the candidates too, if these are others."""
-    contacts = memory.contacts
+    candidate, usual_place = assembly.candidate, usual.usual_place
     if near > 0:
         play(
-            memory.programs[DELASSUS],
+            usual.programs[DELASSUS],
             (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.factor, memory.point_rows, memory.usual_problem.delassus,
+                model, usual.usual_points, equations.tree, contacts, equations.factor,
+                usual.point_rows, usual.usual_problem.delassus,
             ),
         )  # fmt: skip
-    if near == count == memory.usual_points.shape[0]:
+    if near == count == usual.usual_points.shape[0]:
         return
     for place in range(near):
-        row = 2 * memory.usual_place[memory.candidate[place]]
+        row = 2 * usual_place[candidate[place]]
         for other in range(near):
-            column = 2 * memory.usual_place[memory.candidate[other]]
+            column = 2 * usual_place[candidate[other]]
             for i in range(2):
                 for j in range(2):
-                    entry = memory.usual_problem.delassus[row + i, column + j]
-                    memory.problem.delassus[2 * place + i, 2 * other + j] = entry
+                    entry = usual.usual_problem.delassus[row + i, column + j]
+                    assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
     for place in range(near, count):
-        add_joint(model, memory, near, place)
+        add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
 
 
 @dissolved_kernel
-def add_joint(model: Model, memory: Memory, near: int, place: int) -> None:
+def add_joint(
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, place: int,
+    equations: Equations, usual: UsualPoints, assembly: Assembly,
+) -> None:  # fmt: skip
     """Add the stop or dry joint at a place to the Delassus matrix of the candidates before.
 
     What a unit impulse along its row does to the joint velocities, A⁻¹ e, goes to that row of
-    ``memory.jacobian``.
+    ``assembly.jacobian``.
     """
-    contacts, delassus, velocity = memory.contacts, memory.problem.delassus, memory.point_velocity
-    row, joint, sign = joint_row(model, memory, place)
-    change = memory.jacobian[row]
-    for j in range(model.parent.shape[0]):
+    candidate, delassus = assembly.candidate, assembly.problem.delassus
+    row, joint, sign = joint_row(model, dry_joint, candidate, place)
+    change = assembly.jacobian[row]
+    for j in range(model.nv):
         change[j] = 0.0
     change[joint] = sign
-    solve_mass_matrix(model, memory, change)
+    solve_mass_matrix(model, equations, change)
     for other in range(2 * place + 2):
         for own in range(2 * place, 2 * place + 2):
             delassus[own, other] = 0.0
             delassus[other, own] = 0.0
     if near > 0:
-        play(
-            memory.programs[VELOCITIES],
-            (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                change, velocity,
-            ),
-        )  # fmt: skip
+        find_velocities(model, contacts, change, True, equations.tree, usual)
     for other in range(near):
         for i in range(2):
-            entry = velocity[memory.candidate[other], i]
+            entry = usual.point_velocity[candidate[other], i]
             delassus[row, 2 * other + i] = entry
             delassus[2 * other + i, row] = entry
     for other in range(near, place + 1):
-        column, its_joint, its_sign = joint_row(model, memory, other)
+        column, its_joint, its_sign = joint_row(model, dry_joint, candidate, other)
         entry = its_sign * change[its_joint]
         delassus[row, column] = entry
         delassus[column, row] = entry
 
 
 @dissolved_kernel
-def push_candidates(model: Model, memory: Memory, near: int, count: int) -> None:
-    """Add what the impulses of the candidates do to the velocity, after `gather_delassus`."""
-    contacts = memory.contacts
-    for contact in range(model.contact_link.shape[0]):
-        memory.point_impulse[contact, 0] = 0.0
-        memory.point_impulse[contact, 1] = 0.0
+def push_candidates(
+    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int,
+    equations: Equations, usual: UsualPoints, v: Floats,
+) -> None:  # fmt: skip
+    """Add what the impulses of the candidates do to a velocity, after `gather_delassus`."""
+    impulse = assembly.answer.impulse
+    for contact in range(model.nc):
+        for k in range(2):
+            usual.point_impulse[contact, k] = 0.0
     for place in range(near):
-        memory.point_impulse[memory.candidate[place], 0] = memory.answer.impulse[2 * place]
-        memory.point_impulse[memory.candidate[place], 1] = memory.answer.impulse[2 * place + 1]
+        for k in range(2):
+            usual.point_impulse[assembly.candidate[place], k] = impulse[2 * place + k]
     if near > 0:
         play(
-            memory.programs[PUSH],
+            usual.programs[PUSH],
             (
-                model, memory.usual_points, memory.tree, contacts.position, contacts.normal,
-                memory.factor, memory.point_impulse, memory.rate, memory.next_v,
+                model, usual.usual_points, contacts, equations.factor, usual.point_impulse,
+                equations.tree, equations.rate, v,
             ),
         )  # fmt: skip
     for place in range(near, count):
-        row, _, _ = joint_row(model, memory, place)
-        for j in range(model.parent.shape[0]):
-            memory.next_v[j] += memory.answer.impulse[row] * memory.jacobian[row, j]
+        row = 2 * place
+        if assembly.candidate[place] >= model.nc + 2 * model.nv:
+            row += 1
+        for j in range(model.nv):
+            v[j] += impulse[row] * assembly.jacobian[row, j]
 
 
 @dissolved_kernel
-def solve_contacts(
-    model: Model, step: float, scheme: int, activation: float, order: Integers, memory: Memory
-) -> bool:
+def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
     """Turn the free velocity into the velocity at the end of the step; return success."""
-    near = select_candidates(model, step, scheme, activation, memory)
-    count = select_stops(model, step, scheme, activation, near, memory)
-    count = select_dry_joints(model, count, memory)
-    nv = model.parent.shape[0]
-    points = model.contact_link.shape[0]
-    dry = points + 2 * nv
-    for j in range(nv):
-        memory.stop_torque[j] = 0.0
-        memory.stop_mode[j, 0] = 0
-        memory.stop_mode[j, 1] = 0
-    contacts = memory.contacts
-    for contact in range(model.contact_link.shape[0]):
-        contacts.force[contact, 0] = 0.0
-        contacts.force[contact, 1] = 0.0
-        memory.slip[contact] = 0.0
-        memory.mode[contact] = 0
+    assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
+    equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
+    near = select_candidates(model, work, memory)
+    joints = select_stops(model, work, near, memory)
+    count = select_dry_joints(
+        model, joints, dry_joint, memory.reaction.dry_mode, memory.next_v, assembly
+    )
     for i in range(3):
-        memory.answer.residual[i] = 0.0
+        assembly.answer.residual[i] = 0.0
     if count == 0:
+        note_answer(model, work.step, 0, memory)
         return True
-    straight = are_usual(memory, near)
-    problem = memory.problem
+    straight = are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
-        gather_delassus(model, memory, near, count)
-        if near == count == memory.usual_points.shape[0]:
-            problem = memory.usual_problem
+        gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        if near == count == usual.usual_points.shape[0]:
+            problem = usual.usual_problem
     else:
-        write_rows(model, memory, count)
-        assemble_delassus(model, memory, count)
-    press_dry_joints(model, step, count, memory)
+        write_rows(model, equations.tree, contacts, joints, assembly)
+        assemble_delassus(model, equations, count, assembly)
+    press_dry_joints(model, work.step, count, dry_joint, problem)
     problem.count = count
-    status = solve_contact_kernel(problem, order, memory.solver, memory.answer)
+    status = solve_contact_kernel(problem, work.order, assembly.solver, assembly.answer)
     if straight:
-        push_candidates(model, memory, near, count)
+        push_candidates(model, contacts, assembly, near, count, equations, usual, memory.next_v)
     else:
-        add_impulse(model, memory, count, memory.next_v)
-    for place in range(count):
-        contact = memory.candidate[place]
-        if contact >= dry:
-            impulse = memory.answer.impulse[2 * place + 1]
-            note_dry_joint(contact - dry, impulse, step, memory.answer.mode[place], memory)
-            continue
-        if contact >= points:
-            joint = (contact - points) // 2
-            sign = 1.0 - 2.0 * ((contact - points) % 2)
-            memory.stop_torque[joint] += sign * memory.answer.impulse[2 * place] / step
-            memory.stop_mode[joint, (contact - points) % 2] = memory.answer.mode[place] != 0
-            continue
-        contacts.force[contact, 0] = memory.answer.impulse[2 * place] / step
-        contacts.force[contact, 1] = memory.answer.impulse[2 * place + 1] / step
-        memory.slip[contact] = memory.answer.velocity[2 * place + 1]
-        memory.mode[contact] = memory.answer.mode[place]
+        add_impulse(model, assembly, count, equations, memory.next_v)
+    note_answer(model, work.step, count, memory)
     return status == SOLVED
 
 
 @dissolved_kernel
+def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
+    """Keep the forces, slips and modes of the candidates; all others have none."""
+    answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
+    for joint in range(model.nv):
+        reaction.stop_torque[joint] = 0.0
+        reaction.stop_mode[joint, 0] = 0
+        reaction.stop_mode[joint, 1] = 0
+    for contact in range(model.nc):
+        force[contact, 0] = 0.0
+        force[contact, 1] = 0.0
+        reaction.slip[contact] = 0.0
+        reaction.mode[contact] = 0
+    for place in range(count):
+        contact = memory.assembly.candidate[place]
+        stop = contact - model.nc
+        dry = stop - 2 * model.nv
+        normal, tangent = answer.impulse[2 * place], answer.impulse[2 * place + 1]
+        if dry >= 0:
+            reaction.friction_torque[memory.dry_joint[dry]] = tangent / step
+            reaction.dry_mode[dry] = answer.mode[place]
+        elif stop >= 0:
+            reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step
+            reaction.stop_mode[stop // 2, stop % 2] = answer.mode[place] != 0
+        else:
+            force[contact, 0] = normal / step
+            force[contact, 1] = tangent / step
+            reaction.slip[contact] = answer.velocity[2 * place + 1]
+            reaction.mode[contact] = answer.mode[place]
+
+
+@dissolved_kernel
 def decide(
-    controller: Any,  # noqa: ARG001 - asked by the frame
-    control: Control,  # noqa: ARG001
-    model: Model,
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
-    free_velocity(model, work.step, work.scheme, memory)
-    push_robot(model, clock.time, work.step, memory)
-    solved = solve_contacts(model, work.step, work.scheme, work.activation, work.order, memory)
+    model = scene.model
+    free_velocity(model, work, clock.time, memory)
+    solved = solve_contacts(model, work, memory)
     note_extremes(model, memory)
-    note_events(model, record, clock.time, work.step, memory)
+    note_events(model, clock.time, work.step, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 
 @dissolved_kernel
 def report(
-    controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    model: Model,  # noqa: ARG001
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,  # noqa: ARG001
-    record: Record,
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> None:
     """Append a row if one is due."""
-    note_row_when_due(record, memory, clock)
+    note_row_when_due(memory, clock, record)
 
 
 @dissolved_kernel
 def move(
-    controller: Any,  # noqa: ARG001
-    control: Control,  # noqa: ARG001
-    model: Model,
-    ground: GroundModel,  # noqa: ARG001
-    memory: Memory,
-    work: Stepping,
-    record: Record,  # noqa: ARG001
-    clock: Clock,
+    scene: Scene, control: Control, memory: Memory, work: Stepping, record: Record, clock: Clock
 ) -> int:
     """Move on by a step."""
+    model = scene.model
+    q, v, next_v = memory.q, memory.v, memory.next_v
     memory.tally.steps += 1
-    for i in range(model.parent.shape[0]):
-        if work.scheme == PAPER_EXPLICIT:
-            memory.q[i] += work.step * memory.v[i]
-        elif work.scheme == MOREAU_JEAN:
-            memory.q[i] += 0.5 * work.step * (memory.v[i] + memory.next_v[i])
-        else:
-            memory.q[i] += work.step * memory.next_v[i]
-        memory.v[i] = memory.next_v[i]
+    if work.scheme == MOREAU_JEAN:
+        for i in range(model.nv):
+            v[i] += next_v[i]
+        integrate(model, q, v, 0.5 * work.step, q)
+    else:
+        integrate(model, q, v if work.scheme == PAPER_EXPLICIT else next_v, work.step, q)
+    for i in range(model.nv):
+        v[i] = next_v[i]
     clock.time = clock.start + (clock.index + 1) * work.step
     return DONE
 

@@ -105,7 +105,7 @@ def check_urdf(root: Element, label: str) -> None:
     _check(root, "the robot", label, strange)
     massive = {
         link.get("name", "") for link in root.iterfind("link") if link.find("inertial") is not None
-    }
+    } - {"world"}
     for joint in root.iterfind("joint"):
         parent = joint.find("parent")
         # The joints of a floating base, on links without mass, have no limits.
@@ -134,7 +134,7 @@ def check_urdf_tree(root: Element, label: str) -> None:
         above, below = (
             "" if end is None else end.get("link", "") for end in (ends["parent"], ends["child"])
         )
-        what = f"{label}: joint {joint.get('name', '')!r}"
+        what = f"{_at(label, joint)}: joint {joint.get('name', '')!r}"
         for kind, link in (("parent", above), ("child", below)):
             if link not in names:
                 raise RobotError(

@@ -1,0 +1,146 @@
+"""From a request to a gait: optima from several starts, the best of them held at all times."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.errors import InfeasibleGaitError
+from heelstrike.gait.clearance import ClearanceProfile
+from heelstrike.gait.gait import Footing, Gait, Phase, actuated_joints, fingerprint
+from heelstrike.gait.infeasible import nearest_to_feasible
+from heelstrike.gait.margins import Margins
+from heelstrike.gait.program import Program, Solution, first_instants
+from heelstrike.gait.refinement import checked_instants, held_between_nodes
+from heelstrike.gait.starts import starts
+from heelstrike.gait.transcription import Group, Transcription
+from heelstrike.robot.state import State
+
+Floats = NDArray[np.float64]
+
+
+def designed(
+    transcription: Transcription, profile: ClearanceProfile, report: Callable[[float], None]
+) -> Gait:
+    """Design a gait whose swing foot keeps above a profile; `report` is told the share of it."""
+    program = Program(transcription, profile, *first_instants(transcription.request))
+    report(0.05)
+    best = _best_of_starts(program, report)
+    unknowns = held_between_nodes(program, best)
+    report(1.0)
+    return designed_gait(program, unknowns)
+
+
+def _best_of_starts(program: Program, report: Callable[[float], None]) -> Solution:
+    request = program.request
+    guesses = [program.sampled(start) for start in islice(starts(request), request.starts)]
+    solutions: list[Solution] = []
+    while guesses:
+        solutions.append(program.solve(guesses.pop(0)))
+        if len(solutions) == 1 and not solutions[0].converged:
+            # Perhaps no start can succeed, which ends here in an error that tells why. Otherwise
+            # a point that satisfies all constraints is as good a start as can be.
+            guesses.insert(0, nearest_to_feasible(program))
+        report(0.05 + 0.75 * len(solutions) / (len(solutions) + len(guesses)))
+    converged = [solution for solution in solutions if solution.converged]
+    if not converged:
+        raise InfeasibleGaitError(
+            f"robot {request.robot.name!r}: gaits with {request} exist only just: points that "
+            f"satisfy all constraints were found, but no optimum ({solutions[-1].ended}). Ask "
+            "for a shorter or slower step or a lower clearance of the swing foot."
+        )
+    return min(converged, key=lambda solution: solution.objective)
+
+
+def designed_gait(program: Program, unknowns: Floats) -> Gait:
+    """Gait with the given unknowns, its joints in the order of the actuators."""
+    transcription, request = program.transcription, program.request
+    robot, stance = request.robot, request.stance
+    joint = robot.model.actuator_joint
+    pieces = program.pieces(unknowns)
+    end, _, start_velocity, duration, length = touchdown = program.at_touchdown(unknowns)
+    impulse = np.zeros(3)
+    if request.impact:
+        impulse[: stance.held] = np.array(transcription.landing(*touchdown[:3])[0]).ravel()
+    state = (np.array(part).ravel() for part in transcription.start(end, start_velocity))
+    phase = Phase(
+        contacts={stance.foot: Footing.FLAT if stance.flat else Footing.POINT},
+        breakpoints=float(duration) * np.linspace(0.0, 1.0, len(pieces) + 1),
+        pieces=pieces[:, :, joint - stance.held],
+        pitch_pieces=None if stance.flat else pieces[:, :, 0],
+    )
+    legs = request.mirror.among(joint)
+    return Gait(
+        robot=robot.name,
+        fingerprint=fingerprint(robot),
+        joint_names=actuated_joints(robot),
+        step_length=float(length),
+        phases=(phase,),
+        mirror_joint=legs.joint,
+        mirror_sign=legs.sign,
+        mirror_offset=legs.offset,
+        initial_state=State(*state),
+        cost=program.effort(unknowns),
+        friction=request.friction,
+        clearance=request.clearance,
+        clearance_profile=program.profile,
+        touchdown_impulse=impulse[[1, 0, 2]],
+        margins=margins_of(program, unknowns),
+    )
+
+
+def margins_of(program: Program, unknowns: Floats) -> Margins:
+    """Worst values at the instants at which a program was checked, from the motion itself."""
+    transcription, request = program.transcription, program.request
+    model = request.robot.model
+    fine = checked_instants(program)
+    motion = program.motion(unknowns, fine)
+    wrench, torque, heights = (
+        np.array(part) for part in transcription.motion.map(fine.share.size)(*motion)
+    )
+    position = motion[0][-request.robot.nu :]
+    half = request.stance.half_length
+    actuator = np.argsort(model.actuator_joint)
+    limits = np.minimum(
+        model.torque_upper[actuator, None] - torque, torque - model.torque_lower[actuator, None]
+    )
+    ranges = np.minimum(request.upper[3:, None] - position, position - request.lower[3:, None])
+    end = program.at_touchdown(unknowns)
+    impulse, landing, lift = (np.array(part).ravel() for part in transcription.landing(*end[:3]))
+    touchdown = np.array(transcription.touchdown(*end)).ravel()
+    groups = np.array([row.group for row in transcription.touchdown_rows])
+    placed = (groups == Group.TOUCHDOWN_PLACE) | (groups == Group.TOUCHDOWN_ANGLE)
+    periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)
+    return Margins(
+        normal_force=float(wrench[1].min()),
+        friction_use=_use(wrench, request.friction),
+        zero_moment_point=_inside(wrench, half),
+        clearance=float((heights - program.clearance(fine)).min()),
+        joint_range=float(ranges.min()),
+        torque=float(limits.min()),
+        peak_torque=float(np.abs(torque).max()),
+        impulse=float(impulse[1]) if request.impact else 0.0,
+        impulse_friction_use=_use(impulse, request.friction) if request.impact else 0.0,
+        impulse_center=_inside(impulse, half) if request.impact else half,
+        landing_velocity=float(landing.max()),
+        lift_velocity=float(lift.min()),
+        touchdown_error=float(np.abs(touchdown[placed]).max()),
+        impact_error=float(np.abs(touchdown[periodic]).max()),
+    )
+
+
+def _use(wrench: Floats, friction: float) -> float:
+    """Largest share of the friction cone in use."""
+    if friction == 0.0:
+        return 0.0 if not np.any(wrench[0]) else math.inf
+    return float((np.abs(wrench[0]) / (friction * wrench[1])).max())
+
+
+def _inside(wrench: Floats, half_length: float) -> float:
+    """Least distance of the centre of pressure from the ends of the sole (m)."""
+    moment = wrench[2:].sum(axis=0)  # none on a point foot
+    return float((half_length - np.abs(moment / wrench[1])).min())
