@@ -7,10 +7,14 @@ One row a step is needed (``record_every=1``). With the recorded state (q, v), t
   implicit scheme has ``M + hD + h²K`` in the place of M and ``−h K v`` on the right, K and D
   including the gains of the controller.
 - motion: ``q⁺ = q + h v⁺``; the explicit scheme moves with v, Moreau-Jean with the mean of the two.
+  The one that resolves impacts may move with another velocity u than v⁺ where a contact arrives,
+  or is in the ground; then ``J_n u ≥ −gap/h``.
 - contact: ``w_n ≥ b ⟂ λ_n ≥ 0`` with w = J v⁺ and b = −gap/h (gap linearised), b = 0 where
   gap ≤ activation (the paper's), b = −e w_n of before where the gap is foreseen to close
-  (Moreau-Jean); elsewhere λ = 0. The friction cone, and friction of μ λ_n against what slides.
-  Stops are contacts without friction, dry friction of joints a contact with a known normal force.
+  (Moreau-Jean); b = −e w_n of before, where u is not v⁺, for the contacts that u brings to the
+  ground, if they touch already, touched a step ago, or would close freely; elsewhere λ = 0. The
+  friction cone, and friction of μ λ_n against what slides. Stops are contacts without friction,
+  dry friction of joints a contact with a known normal force.
 - energy: the contact solve takes kinetic energy, but for what b > 0 asks for: λ_n b.
 
 All is measured in kinetic sizes (:class:`scenes.mechanics.Metric`) relative to the size of the
@@ -41,6 +45,8 @@ MOTION = 1e-10
 """Change of position (m, rad) that the velocity does not explain."""
 SINK = 1e-6
 """Depth (m) in the ground that neither the linearised gap nor the turning of the robot explains."""
+TOUCHING = 1e-9
+"""A contact touches when its gap is no more than this (m)."""
 UNDECIDED = 1e-12
 """A gap (m) this near the edge of a scheme's activation may count either way."""
 
@@ -97,6 +103,12 @@ class _Steps:
         self.size = size(self.before) + size(self.after) + self.h * self.metric.of_force(known)
         self.size = np.maximum(self.size, 1e-100)
         self.gap = rows.gap[:-1]
+        self.moved = np.diff(rows.q, axis=0) / self.h
+        self.split = np.zeros(len(self.time), dtype=bool)
+        """Steps whose positions move with another velocity than the one behind them."""
+        if self.scheme is Scheme.IMPACT_RESOLVED:
+            apart = np.abs(self.moved - self.after) * self.h / (1.0 + np.abs(rows.q[1:]))
+            self.split = np.any(apart > MOTION, axis=1)
         self.asked_for = np.zeros(len(self.time))
         """Energy that the bounds b of the normal velocities ask for."""
 
@@ -117,6 +129,8 @@ class _Steps:
 
     def motion(self, found: Findings) -> None:
         velocity = self.after
+        if self.scheme is Scheme.IMPACT_RESOLVED:
+            velocity = np.where(self.split[:, None], self.moved, self.after)
         if self.scheme is Scheme.PAPER_EXPLICIT:
             velocity = self.before
         elif self.scheme is Scheme.MOREAU_JEAN:
@@ -127,12 +141,30 @@ class _Steps:
         dt = np.abs(np.diff(self.rows.time) - self.h)
         found.look("length of a step", dt, 1e-9, self.time)
 
-    def bound(self, gap: Array, before: Array, bounce: Array) -> tuple[Array, Array]:
+    def arrives(self, found: Findings, law: str, gap: Array, speed: Array, free: Array) -> Array:
+        """Judge where the positions go in split steps; tell whose impact each of them is."""
+        after = gap + self.h * speed
+        deep = np.where(self.split[:, None], -after, 0.0)
+        found.look(f"{law}: moved into it", deep / (1.0 + np.abs(gap)), MOTION, self.time)
+        touches = after <= TOUCHING
+        touched = np.concatenate((gap[:1] <= TOUCHING, touches[:-1]))
+        closes = gap + self.h * free < 0.0
+        return (gap <= TOUCHING) | (touches & (touched | closes))
+
+    def bound(
+        self, gap: Array, before: Array, bounce: Array, mine: Array | None = None
+    ) -> tuple[Array, Array]:
         """Least normal velocity that the scheme asks for, -inf where it asks for none.
 
-        The second array tells where rounding decides whether it asks.
+        The second array tells where rounding decides whether it asks; `mine` tells who takes part
+        in the impacts of split steps.
         """
-        if self.scheme in (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT):
+        if mine is not None:
+            whole = np.where(mine, -bounce * before, -np.inf)
+            least = np.where(self.split[:, None], whole, -gap / self.h)
+            near = self.split[:, None] & (np.abs(gap) < 2.0 * TOUCHING)
+            return least, near
+        if self.scheme in (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT, Scheme.IMPACT_RESOLVED):
             return -gap / self.h, np.zeros(gap.shape, dtype=bool)
         foreseen, least = gap, np.zeros_like(gap)
         if self.scheme is Scheme.MOREAU_JEAN:
@@ -166,7 +198,11 @@ class _Steps:
         weight = self.metric.weight(self.jacobian)
         speed = rates(self.jacobian, self.after)
         before = rates(self.jacobian, self.before)[..., 0]
-        least, near = self.bound(self.gap, before, rows.measured.restitution[:-1])
+        mine = None
+        if self.scheme is Scheme.IMPACT_RESOLVED:
+            moved, free = (rates(self.jacobian, v)[..., 0] for v in (self.moved, self.free))
+            mine = self.arrives(found, "contact", self.gap, moved, free)
+        least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
         self.normals(
             "contact",
             found,
@@ -194,11 +230,17 @@ class _Steps:
 
     def sink(self, found: Findings, speed: Array) -> None:
         """Penetration that the schemes which bound the gap itself do not allow."""
-        if self.scheme not in (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT):
+        if self.scheme not in (
+            Scheme.GAP_LINEARISED,
+            Scheme.LINEARLY_IMPLICIT,
+            Scheme.IMPACT_RESOLVED,
+        ):
             return
         rows = self.rows
         moved = np.einsum("tpc,tpc->tp", np.diff(rows.center, axis=0), rows.normal[:-1])
-        turning = moved - self.h * speed
+        turning = moved - self.h * (
+            rates(self.jacobian, self.moved)[..., 0] if self.split.any() else speed
+        )
         deep = -rows.gap[1:] - np.maximum(-turning, 0.0)
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 
@@ -209,7 +251,10 @@ class _Steps:
         for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
             has = np.isfinite(limit)
             gap = side * (rows.q[:-1] - np.where(has, limit, -side * 1e9))
-            least, near = self.bound(gap, side * self.before, nothing)
+            mine = None
+            if self.scheme is Scheme.IMPACT_RESOLVED:
+                mine = self.arrives(found, f"{name} stop", gap, side * self.moved, side * self.free)
+            least, near = self.bound(gap, side * self.before, nothing, mine)
             self.normals(
                 f"{name} stop", found, np.maximum(side * self.stop, 0.0), side * self.after,
                 weight, least, near, rows.joints,

@@ -106,19 +106,26 @@ def residual(delassus: Floats, free: Floats, friction: Floats, impulse: Floats) 
     return float(worst)
 
 
-def solutions(delassus: Floats, free: Floats, friction: Floats) -> list[Floats]:
+def solutions(
+    delassus: Floats, free: Floats, friction: Floats, bound: Floats | None = None
+) -> list[Floats]:
     """All velocities that solve the problem, one for each that differs from the others."""
     found: list[Floats] = []
     unit = np.abs(free).max() or 1.0
-    for impulse in enumerated(delassus, free, friction):
+    for impulse in enumerated(delassus, free, friction, bound):
         velocity = delassus @ impulse + free
         if not any(np.allclose(velocity, other, atol=1e-7 * unit) for other in found):
             found.append(velocity)
     return found
 
 
-def enumerated(delassus: Floats, free: Floats, friction: Floats) -> Iterator[Floats]:
+def enumerated(
+    delassus: Floats, free: Floats, friction: Floats, bound: Floats | None = None
+) -> Iterator[Floats]:
     """Impulses that solve the problem, by force: one for each combination of modes that has some.
+
+    Where `bound` (nc,) is positive, the tangential impulse is in the interval up to it, and there
+    is no normal one.
 
     Every combination is a linear program, feasible to 1e-10 of the data's velocities. The equations
     among its conditions are then met by least squares as sharply as they can be.
@@ -129,7 +136,8 @@ def enumerated(delassus: Floats, free: Floats, friction: Floats) -> Iterator[Flo
     G = scale[:, None] * delassus * scale
     size = np.abs(scale * free).max() or 1.0
     b = scale * free / size
-    for modes in itertools.product(range(4), repeat=count):
+    width = np.zeros(count) if bound is None else np.asarray(bound)
+    for modes in itertools.product(*(range(STICK if w > 0.0 else OPEN, 4) for w in width)):
         equal, inequal, offset_equal, offset_inequal = [], [], [], []
 
         def demand(row: Floats, offset: float, rows: list, offsets: list) -> None:
@@ -139,6 +147,18 @@ def enumerated(delassus: Floats, free: Floats, friction: Floats) -> Iterator[Flo
         for k, mode in enumerate(modes):
             n, t = 2 * k, 2 * k + 1
             en, et = np.eye(2 * count)[n] * scale[n], np.eye(2 * count)[t] * scale[t]
+            if width[k] > 0.0:
+                side = {STICK: 0.0, FORWARD: 1.0, BACKWARD: -1.0}[mode]
+                limit = width[k] / size
+                demand(en, 0.0, equal, offset_equal)
+                if mode == STICK:
+                    demand(G[t], b[t], equal, offset_equal)
+                    demand(et, -limit, inequal, offset_inequal)
+                    demand(-et, -limit, inequal, offset_inequal)
+                else:
+                    demand(et, side * limit, equal, offset_equal)
+                    demand(-side * G[t], -side * b[t], inequal, offset_inequal)
+                continue
             if mode == OPEN:
                 demand(en, 0.0, equal, offset_equal)
                 demand(et, 0.0, equal, offset_equal)

@@ -18,6 +18,7 @@ from heelstrike.contact.modes import (
     RAY,
     SLIDING_BACKWARD,
     SLIDING_FORWARD,
+    SLIP_BACKWARD,
     SLIP_FORWARD,
     SOLVED,
     STICK,
@@ -105,6 +106,7 @@ def test_wrong_modes_do_no_harm(guess: int) -> None:
 
 def test_counters() -> None:
     caller = Caller()
+    caller.work.settings.amendments = 0
     G, b = np.eye(2), [-1.0, 0.2]
     caller.solve(G, b, [0.5])
     caller.solve(G, b, [0.5])
@@ -121,10 +123,34 @@ def test_counters() -> None:
 
 def test_no_solver_left_means_failure_not_zero_force_in_silence() -> None:
     caller = Caller()
+    caller.work.settings.amendments = 0
     assert caller.solve(np.eye(2), [-1.0, 0.2], [0.5], order=()) != SOLVED
     assert caller.work.tally.failures == 1
     assert caller.work.tally.shortcuts == 0
     assert caller.residual.max() > 1e-3
+
+
+def test_modes_that_nearly_fit_need_no_solver() -> None:
+    """The second point of a foot meets the ground, where the first slips the other way.
+
+    What answers for it is the guess, amended; the impulse is the one that a solver finds.
+    """
+    x, z = np.array([-0.6, -0.4, 0.4, 0.6]), np.full(4, -0.9)
+    root = np.zeros((8, 4))
+    root[0::2] = np.array([0.0 * x, 0.0 * x + 1.0, -x, 0.0 * x]).T
+    root[1::2] = np.array([0.0 * x + 1.0, 0.0 * x, z, [0.0, 0.0, 0.5, 0.5]]).T
+    G = root @ root.T
+    b = -G @ [0.0, 0.0, 0.0, 0.0, 1.0, 0.1, 0.7, 0.07] + np.tile([0.0, -0.3], 4)
+    b[[0, 2]] += 1.0
+    amended, asked = Caller(), Caller()
+    asked.work.settings.amendments = 0
+    for caller in (amended, asked):
+        caller.mode[:4] = [OPEN, OPEN, OPEN, SLIP_FORWARD]
+        assert caller.solve(G, b, [0.1] * 4) == SOLVED
+    assert (amended.work.tally.solver, asked.work.tally.solver) == (WARM_START, LEMKE)
+    assert amended.mode[:4].tolist() == [OPEN, OPEN, SLIP_BACKWARD, SLIP_BACKWARD]
+    assert 1 <= amended.work.tally.iterations <= 4
+    np.testing.assert_allclose(amended.impulse, asked.impulse, rtol=1e-14, atol=1e-14)
 
 
 def test_same_bits_every_time() -> None:

@@ -16,8 +16,10 @@ from synthetic_runs import box
 import heelstrike as hs
 from heelstrike.sim import (
     DONE,
+    FrictionLaw,
     Kernels,
     Method,
+    NormalLaw,
     Setting,
     UnknownMethod,
     add_pushes,
@@ -318,23 +320,95 @@ def test_compare(tmp_path: Path) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Turf(hs.KelvinVoigt):
-    """A law from outside: the force of a package's law, from numbers of its own."""
+class Turf(NormalLaw):
+    """A law from outside: blades that bend and give no more than so much, on an oily floor."""
 
-    depth: float = 2e-3
-    load: float = 5.0
+    stiffness: float = 5e4
+    most: float = 30.0
+    damping: float = 1e2
+    name: str = "grass"
 
-    def write(self, numbers: Any) -> None:
-        hs.KelvinVoigt(stiffness=self.load / self.depth, damping=self.damping).write(numbers)
+    @kernel
+    def force(self, gap: float, speed: float) -> tuple[float, float, float]:
+        blades = self.most * np.tanh(-self.stiffness * gap / self.most)
+        softer = 1.0 - (blades / self.most) ** 2
+        if blades <= self.damping * speed:
+            return 0.0, 0.0, 0.0
+        return blades - self.damping * speed, -self.stiffness * softer, -self.damping
 
 
-def test_a_contact_law_from_outside(tmp_path: Path) -> None:
-    """The weight of the box on its four corners, and how deep they sink in."""
-    law = Turf(damping=100.0, load=9.81 * 2.0 / 4, depth=2e-3)
-    run = drop(hs.Compliant(law=law), duration=1.0, pushes=[])
+@dataclass(frozen=True)
+class Oil(FrictionLaw):
+    """Friction that grows with the speed up to the cone's edge; it keeps no bend."""
+
+    drag: float = 20.0
+
+    @kernel
+    def force(self, friction: float, normal: float, speed: float, bend: float) -> Any:
+        limit = friction * normal
+        if self.drag * abs(speed) < limit:
+            return (-self.drag * speed, 0.0, -self.drag, 0.0), (0.0, 0.0, 0.0, 0.0), False
+        side = 1.0 if speed > 0.0 else -1.0
+        return (-side * limit, -side * friction, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), True
+
+
+@pytest.fixture(scope="module")
+def on_turf() -> hs.Run:
+    return drop(hs.Compliant(law=Turf(), friction=Oil(), step=1e-3), duration=1.0, pushes=[])
+
+
+def test_a_contact_law_from_outside(on_turf: hs.Run) -> None:
+    """The box stands as deep as its weight asks for, and oil stops it as it stops anything.
+
+    Four corners carry 9.81 m / 4 each, ``most tanh(k δ / most)``; the speed falls like
+    exp(−4 drag t / m) once no corner slides.
+    """
+    run = on_turf
     assert run.completed, run.message
-    deepest = -run.gap[-1].min()
-    assert deepest == pytest.approx(law.depth * 4 / np.sum(run.gap[-1] < 0.0), rel=1e-2)
-    path = run.save(tmp_path / "run.nc")
-    assert isinstance(hs.load_run(path).method, UnknownMethod)
-    assert hs.load_run(path, classes=[Turf]).method == run.method
+    mass = float(np.sum(run.robot.model.mass))
+    share = 9.81 * mass / np.sum(run.gap[-1] < 0.0)
+    law = Turf()
+    deep = law.most / law.stiffness * np.arctanh(share / law.most)
+    assert -run.gap[-1].min() == pytest.approx(deep, rel=1e-3)
+    kinds = [event.kind.name for event in run.events]
+    assert kinds.index("TOUCHDOWN") < kinds.index("SLIP")
+    slow = (run.time > 0.6) & (np.abs(run.velocity[:, 0]) > 1e-9)
+    closed = np.sum(run.gap[slow][0] < 0.0)
+    rate = np.polyfit(run.time[slow], np.log(np.abs(run.velocity[slow, 0])), 1)[0]
+    assert rate == pytest.approx(-closed * Oil().drag / mass, rel=1e-2)
+    assert "Turf" in run.solver.name
+
+
+def test_it_is_recorded_saved_loaded_and_compared(on_turf: hs.Run, tmp_path: Path) -> None:
+    path = on_turf.save(tmp_path / "run.nc")
+    assert hs.load_run(path, classes=[Turf, Oil]).method == on_turf.method
+    data = hs.load_run(path, classes=[Turf])
+    assert isinstance(data.method, UnknownMethod)
+    assert data.method.settings["law_most"] == 30.0
+    assert data.method.settings["friction_drag"] == 20.0
+    np.testing.assert_array_equal(data.contact_force, on_turf.contact_force)
+    robot = on_turf.robot
+    found = hs.compare(
+        robot, methods={"turf": on_turf.method, "foam": hs.Compliant(law=Turf(stiffness=2e3))},
+        state=hs.State(on_turf.position[0], on_turf.velocity[0]), duration=0.1,
+    )  # fmt: skip
+    turf, foam = found.runs.values()
+    assert foam.certificates.penetration > 1.2 * turf.certificates.penetration > 1e-4
+
+
+def test_a_law_that_is_none() -> None:
+    class Bare(NormalLaw):
+        pass
+
+    class Broken(NormalLaw):
+        @kernel
+        def force(self, gap: float, speed: float) -> Any:
+            return self.nothing * gap
+
+    for law, words in (
+        (dataclass(frozen=True)(Bare)(), "Bare has no kernel: write force"),
+        (dataclass(frozen=True)(Broken)(), "Broken cannot be compiled"),
+        (Oil(), "another normal law, got Oil"),
+    ):
+        with pytest.raises(hs.SimulationError, match=words):
+            drop(hs.Compliant(law=law))

@@ -23,7 +23,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.compensated import UNIT_ROUNDOFF, product_error, sum_error
 from heelstrike.contact.modes import Solver, SolveStatus
-from heelstrike.contact.sets import LINE, room
+from heelstrike.contact.sets import INTERVAL, LINE, room
 from heelstrike.contact.workspace import (
     ContactAnswer,
     ContactProblem,
@@ -120,7 +120,7 @@ def certify(
     prescribed to slide; its friction then lies on the given edge and its tangential velocity is not
     constrained.
 
-    Writes ``velocity`` and ``residual`` of the answer, and the rest of the yardstick.
+    Writes ``velocity``, ``residual`` and ``rest`` of the answer, and the rest of the yardstick.
     """
     count = problem.count
     impulse, velocity, residual = answer.impulse, answer.velocity, answer.residual
@@ -134,51 +134,43 @@ def certify(
     else:
         rounding = sum_velocities_sharply(problem, impulse, yardstick, velocity)
     yardstick.rounding = rounding
-    yardstick.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
+    answer.rest = REST_TOLERANCE * unit * (1.0 + yardstick.effort)
     inverse = 1.0 / unit if unit > 0.0 else 0.0
-
-    complementarity = 0.0
-    cone = 0.0
-    non_penetration = 0.0
+    complementarity = cone = non_penetration = 0.0
     nothing = 0.0 * unit  # and stays nothing unless a number is infinite or none
     for contact in range(count):
-        normal = 2 * contact
-        tangent = normal + 1
-        normal_impulse = impulse[normal]
-        tangent_impulse = impulse[tangent]
-        # What friction lacks to either edge.
+        normal, tangent = 2 * contact, 2 * contact + 1
+        normal_impulse, tangent_impulse = impulse[normal], impulse[tangent]
+        if problem.set[contact] == INTERVAL:
+            normal_impulse = problem.bound[contact]
         upper, lower = room(problem, contact, normal_impulse, tangent_impulse, sharply)
         nothing += 0.0 * velocity[normal] + 0.0 * velocity[tangent] + 0.0 * (upper + lower)
 
-        speed = relative_speed(velocity[normal], root[normal], inverse)
-        force_scale = root[normal] * inverse
-        if force_scale > 0.0:
-            force = normal_impulse * force_scale
-        else:  # it moves nothing
-            force = 1.0 if normal_impulse > 0.0 else (-1.0 if normal_impulse < 0.0 else 0.0)
-        non_penetration = max(non_penetration, -speed)
-        complementarity = max(complementarity, min(speed, force))
-        if force <= 0.0:
-            if problem.set[contact] == LINE:
-                non_penetration = max(non_penetration, speed)
-            else:
-                cone = max(cone, -force)
+        force_scale = 0.0
+        if problem.set[contact] != INTERVAL:
+            speed = relative_speed(velocity[normal], root[normal], inverse)
+            force_scale = root[normal] * inverse
+            # An impulse that moves nothing is no better for being small.
+            force = normal_impulse * force_scale if force_scale > 0.0 else sign(normal_impulse)
+            non_penetration = max(non_penetration, -speed)
+            complementarity = max(complementarity, min(speed, force))
+            if force <= 0.0:
+                if problem.set[contact] == LINE:
+                    non_penetration = max(non_penetration, speed)
+                else:
+                    cone = max(cone, -force)
 
-        friction = problem.friction[contact]
         if root[tangent] > 0.0:
             force_scale = root[tangent] * inverse
-        elif friction > 0.0 and force_scale > 0.0:
-            force_scale /= friction
         else:
-            both = abs(friction * normal_impulse) + abs(tangent_impulse)
-            force_scale = 1.0 / both if both > 0.0 else 0.0
+            force_scale = scale_beside(force_scale, upper, lower, problem.friction[contact])
         if slope[contact] != 0.0:
             cone = max(cone, abs(upper if slope[contact] > 0.0 else lower) * force_scale)
             continue
         cone = max(cone, -min(upper, lower) * force_scale)
         speed = relative_speed(velocity[tangent], root[tangent], inverse)
-        complementarity = max(complementarity, min(speed, lower * force_scale))
-        complementarity = max(complementarity, min(-speed, upper * force_scale))
+        slips = max(min(speed, lower * force_scale), min(-speed, upper * force_scale))
+        complementarity = max(complementarity, slips)
     # Impulses without any cause in the data count as much as numbers that are none.
     if nothing != 0.0 or not yardstick.effort + rounding < math.inf:
         non_penetration = math.inf
@@ -186,6 +178,24 @@ def certify(
     residual[1] = cone
     residual[2] = non_penetration
     return max(complementarity, max(cone, non_penetration)) + rounding
+
+
+@kernel
+def scale_beside(normal_scale: float, upper: float, lower: float, friction: float) -> float:
+    """What makes friction that moves nothing comparable: the normal impulse's unit, or its own.
+
+    ``upper`` and ``lower`` are what it lacks to the edges of its cone.
+    """
+    if friction > 0.0 and normal_scale > 0.0:
+        return normal_scale / friction
+    both = 0.5 * (abs(upper + lower) + abs(lower - upper))
+    return 1.0 / both if both > 0.0 else 0.0
+
+
+@kernel
+def sign(value: float) -> float:
+    """Return 1 above zero and -1 below; it has no unit."""
+    return 1.0 if value > 0.0 else (-1.0 if value < 0.0 else 0.0)
 
 
 @kernel
@@ -231,7 +241,7 @@ def relative_speed(velocity: float, root: float, inverse: float) -> float:
     """Return a velocity in units of the data's; one that no impulse can change counts fully."""
     if root > 0.0:
         return velocity / root * inverse
-    return 1.0 if velocity > 0.0 else (-1.0 if velocity < 0.0 else 0.0)
+    return sign(velocity)
 
 
 @kernel

@@ -17,6 +17,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
+from heelstrike.contact.sets import INTERVAL, press
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.known_modes import repeat
 from heelstrike.contact.workspace import (
@@ -42,6 +43,7 @@ def solve_contact_kernel(
     Parameters
     ----------
     problem : ContactProblem
+        Of intervals the normal rows are written here, and may hold anything.
     order : (any,) int64
         Solver codes to try in turn (:class:`~heelstrike.contact.modes.Solver`).
     work : ContactWorkspace
@@ -59,6 +61,8 @@ def solve_contact_kernel(
     tally.solver = WARM_START
     for contact in range(problem.count):
         yardstick.slope[contact] = 0.0
+        if problem.set[contact] == INTERVAL:
+            press(contact, problem)
     if settings.skewed == 0 and repeat(problem, settings, work.sticking, yardstick, answer):
         tally.shortcuts += 1
         return SOLVED
@@ -215,6 +219,7 @@ def run_solvers(
     work = _memory(count)
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
+    work.settings.amendments = 0  # nobody has guessed the modes
     work.settings.skewed = 0 if semidefinite else 1
     problem = ContactProblem.allocate(
         nc=count, count=count, delassus=matrix, free=offset, friction=friction

@@ -4,11 +4,12 @@
 ``CONE``              λ_n ≥ 0, ‖λ_t‖ ≤ μ λ_n      contact with friction: Coulomb's cone
 ``HALF_LINE``         λ_n ≥ 0                     contact without friction, joint stop
 ``LINE``              any λ_n                     closed loop, latch: the rows do not part at all
+``INTERVAL``          ‖λ_t‖ ≤ bound               dry friction of a joint
 ====================  ==========================  =========================================
 
-A group has two rows, normal and tangent. Only cones have friction; that of other sets is zero. An
-interval, ``|λ_t| ≤ l``, as dry friction has it, is the section of a cone at a normal impulse that
-is known (:func:`press`).
+A group has two rows, normal and tangent. Only cones have friction; that of half-lines and lines is
+zero. An interval is the section of a cone of friction 1 where the normal impulse is the bound, and
+has no normal row: what stands in its place belongs to the solvers (:func:`press`).
 """
 
 from __future__ import annotations
@@ -20,23 +21,25 @@ from heelstrike.contact.workspace import ContactProblem
 CONE = 0
 HALF_LINE = 1
 LINE = 2
+INTERVAL = 3
 
 
 @kernel
-def press(group: int, limit: float, problem: ContactProblem) -> None:
-    """Make a group's set the interval ``|λ_t| ≤ limit``.
+def press(group: int, problem: ContactProblem) -> None:
+    """Write the normal row of an interval for the solvers, to whom it is the section of a cone.
 
-    It is a cone whose normal row is coupled to nothing and pressed by just that::
+    The row is coupled to nothing and pressed by just the bound::
 
-        w_n = g λ_n − g limit ⟂ λ_n    so that λ_n = limit whatever else happens,  |λ_t| ≤ λ_n
+        w_n = g λ_n − g bound ⟂ λ_n    so that λ_n = bound whatever else happens,  |λ_t| ≤ λ_n
 
     where g, the Delassus diagonal of the tangent, makes both rows of one size.
     """
-    weight = problem.delassus[2 * group + 1, 2 * group + 1]
-    problem.set[group] = CONE
-    problem.friction[group] = 1.0
-    problem.delassus[2 * group, 2 * group] = weight
-    problem.free[2 * group] = -weight * limit
+    normal = 2 * group
+    weight = problem.delassus[normal + 1, normal + 1]
+    for i in range(2 * problem.count):
+        problem.delassus[normal, i] = problem.delassus[i, normal] = 0.0
+    problem.delassus[normal, normal] = weight
+    problem.free[normal] = -weight * problem.bound[group]
 
 
 @kernel
@@ -44,7 +47,9 @@ def projected(
     problem: ContactProblem, group: int, normal: float, tangent: float
 ) -> tuple[float, float]:
     """Return an impulse moved into its set, exactly, along the normal first."""
-    if normal < 0.0 and problem.set[group] != LINE:
+    if problem.set[group] == INTERVAL:
+        normal = problem.bound[group]
+    elif normal < 0.0 and problem.set[group] != LINE:
         normal = 0.0
     limit = problem.friction[group] * normal
     return normal, min(max(tangent, -limit), limit)
@@ -53,6 +58,8 @@ def projected(
 @kernel
 def contains(problem: ContactProblem, group: int, normal: float, tangent: float) -> bool:
     """Whether an impulse is in its set."""
+    if problem.set[group] == INTERVAL:
+        return abs(tangent) <= problem.bound[group]
     if normal < 0.0:
         return problem.set[group] == LINE and tangent == 0.0
     return abs(tangent) <= problem.friction[group] * normal

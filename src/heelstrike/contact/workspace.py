@@ -28,7 +28,9 @@ class ContactProblem(Bundle):
     free : (2 nc,) float
         Free velocity (or acceleration), the free term b.
     friction : (nc,) float
-        Friction coefficient of each contact, zero where its set is no cone.
+        Friction coefficient of each contact: 1 for an interval, zero for lines and half-lines.
+    bound : (nc,) float
+        Largest tangential impulse of each interval.
     set : (nc,) int
         Where its impulses may lie; see :mod:`heelstrike.contact.sets`.
     """
@@ -37,6 +39,7 @@ class ContactProblem(Bundle):
     delassus: Floats = array("2 nc", "2 nc")
     free: Floats = array("2 nc")
     friction: Floats = array("nc")
+    bound: Floats = array("nc")
     set: Integers = array("nc", of=int)
 
 
@@ -50,12 +53,15 @@ class ContactAnswer(Bundle):
     impulse, velocity : (2 nc,) float
     residual : (3,) float
         Complementarity, cone and penetration, relative (see ``Certificate``).
+    rest : float
+        Velocities below this times the yardstick's ``root`` count as zero.
     """
 
     mode: Integers = array("nc", of=int)
     impulse: Floats = array("2 nc")
     velocity: Floats = array("2 nc")
     residual: Floats = array(3)
+    rest: float = cell(float)
 
 
 class Settings(Bundle):
@@ -67,12 +73,16 @@ class Settings(Bundle):
         Largest residual that is certified, 1e-9 unless changed.
     floor : float
         Smallest size of the data that residuals are set against, zero unless changed.
+    amendments : int
+        How often the modes of the answer are amended before a solver is asked; zero where they are
+        no guess.
     skewed : int
         Not zero if the matrix may be asymmetric, as in a general complementarity problem.
     """
 
     tolerance: float = cell(float)
     floor: float = cell(float)
+    amendments: int = cell(int)
     skewed: int = cell(int)
 
 
@@ -111,8 +121,6 @@ class Yardstick(Bundle):
         The velocities that cancel, in units of the data's.
     rounding : float
         What rounding may hide from it.
-    rest : float
-        Velocities below this times ``root`` count as zero.
     """
 
     slope: Floats = array("nc")
@@ -120,7 +128,6 @@ class Yardstick(Bundle):
     unit: float = cell(float)
     effort: float = cell(float)
     rounding: float = cell(float)
-    rest: float = cell(float)
 
 
 class StickingRows(Bundle):
@@ -204,6 +211,8 @@ class Dictionary(Bundle):
 
     Attributes
     ----------
+    status : int
+        How the last pivots on it ended.
     tableau : (pairs, pairs + 2) float
         Constant and coefficients of each basic variable.
     row_label, column_label : (pairs,), (pairs + 2,) int
@@ -212,6 +221,7 @@ class Dictionary(Bundle):
         Row of each variable, or minus its column.
     """
 
+    status: int = cell(int)
     tableau: Floats = array("pairs", "pairs + 2")
     row_label: Integers = array("pairs", of=int)
     column_label: Integers = array("pairs + 2", of=int)

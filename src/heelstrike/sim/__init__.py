@@ -16,6 +16,8 @@ from heelstrike.sim.compliant.contact_law import (
     KelvinVoigt,
     RegularisedFriction,
 )
+from heelstrike.sim.compliant.law import FrictionLaw as FrictionLaw
+from heelstrike.sim.compliant.law import NormalLaw as NormalLaw
 from heelstrike.sim.contacts.geometry import contact_rows as contact_rows
 from heelstrike.sim.contacts.geometry import contact_velocity as contact_velocity
 from heelstrike.sim.contacts.geometry import evaluate_equations as evaluate_equations

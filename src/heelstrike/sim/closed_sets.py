@@ -73,6 +73,10 @@ class Scheme(enum.IntEnum):
     ``LINEARLY_IMPLICIT``
         ``GAP_LINEARISED`` with joint springs, dampers and controller gains at the end of the step,
         to first order (Anitescu and Potra 2002, the paper's [17]).
+    ``IMPACT_RESOLVED``
+        ``GAP_LINEARISED``, but a contact that closes within a step is an impact within that step,
+        of all contacts that touch, with Newton's restitution: positions arrive as there, velocities
+        are those behind the impact.
     """
 
     GAP_LINEARISED = 0
@@ -80,6 +84,7 @@ class Scheme(enum.IntEnum):
     PAPER_SYMPLECTIC = 2
     MOREAU_JEAN = 3
     LINEARLY_IMPLICIT = 4
+    IMPACT_RESOLVED = 5
 
     @property
     def label(self) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.errors import SimulationError
-from heelstrike.sim.compliant import contact_law as cl
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
     HuntCrossley,
@@ -16,23 +18,19 @@ from heelstrike.sim.compliant.contact_law import (
     RegularisedFriction,
 )
 
-normal_force = cl.normal_force.py_func
-friction_force = cl.friction_force.py_func
-
 NORMAL = [HuntCrossley(), HuntCrossley(exponent=1.0, dissipation=0.0), KelvinVoigt()]
 FRICTION = [RegularisedFriction(), BristleFriction()]
 
-depths = st.floats(-1e-3, 1e-3)
+depths = st.floats(-1e-3, -1e-9)
 speeds = st.floats(-2.0, 2.0)
 bends = st.floats(-1e-3, 1e-3)
 loads = st.floats(0.0, 1e4)
 coefficients = st.floats(0.0, 2.0)
 
 
-def numbers(law: object) -> np.ndarray:
-    values = np.zeros(cl.NUMBERS)
-    law.write(values)  # type: ignore[attr-defined]
-    return values
+def force_of(law: Any, *point: float) -> Any:
+    """What the kernel of a law says, in plain Python."""
+    return uncompiled(type(law).force)(law, *point)
 
 
 @pytest.mark.parametrize("law", NORMAL)
@@ -40,12 +38,9 @@ def numbers(law: object) -> np.ndarray:
 def test_the_ground_never_pulls_and_loses_what_it_does_not_store(
     law: HuntCrossley | KelvinVoigt, gap: float, speed: float
 ) -> None:
-    """F ≥ 0, zero above the ground, and the power taken is at least the growth of the energy."""
-    force = normal_force(law.kind, numbers(law), gap, speed, np.zeros(cl.PARTIALS))
+    """F ≥ 0, and the power taken is at least the growth of the energy."""
+    force, _, _ = force_of(law, gap, speed)
     assert force >= 0.0
-    if gap >= 0.0:
-        assert force == 0.0
-        return
     spring = law.stiffness * (-gap) ** getattr(law, "exponent", 1.0)
     assert (force - spring) * -speed >= -1e-12 * spring * abs(speed)
 
@@ -56,9 +51,7 @@ def test_friction_stays_in_the_cone_and_dissipates(
     law: RegularisedFriction | BristleFriction, mu: float, load: float, speed: float, bend: float
 ) -> None:
     """|F_t| ≤ μ F_n, and −F_t v ≥ d/dt (k s² / 2)."""
-    force, rate = friction_force(
-        law.kind, numbers(law), mu, load, speed, bend, np.zeros(cl.PARTIALS)
-    )
+    (force, *_), (rate, *_), _ = force_of(law, mu, load, speed, bend)
     assert abs(force) <= mu * load
     stored = law.stiffness * bend * rate if isinstance(law, BristleFriction) else 0.0
     size = abs(force * speed) + abs(stored)
@@ -71,12 +64,11 @@ def test_derivatives_of_the_normal_force(
     law: HuntCrossley | KelvinVoigt, gap: float, speed: float
 ) -> None:
     """Against central differences; skipped at the kink where the force vanishes."""
-    values, partial, scratch = numbers(law), np.zeros(cl.PARTIALS), np.zeros(cl.PARTIALS)
 
     def force(gap: float, speed: float) -> float:
-        return float(normal_force(law.kind, values, gap, speed, scratch))
+        return float(force_of(law, gap, speed)[0])
 
-    value = normal_force(law.kind, values, gap, speed, partial)
+    value, by_gap, by_speed = force_of(law, gap, speed)
     d = 1e-4 * abs(gap)
     e = 1e-5
     ends = (
@@ -87,12 +79,8 @@ def test_derivatives_of_the_normal_force(
     )
     if min(value, *ends) == 0.0:
         return
-    assert (ends[1] - ends[0]) / (2 * d) == pytest.approx(
-        partial[cl.NORMAL_BY_GAP], rel=1e-6, abs=1e-9 * value / d
-    )
-    assert (ends[3] - ends[2]) / (2 * e) == pytest.approx(
-        partial[cl.NORMAL_BY_SPEED], rel=1e-6, abs=1e-9 * value / e
-    )
+    assert (ends[1] - ends[0]) / (2 * d) == pytest.approx(by_gap, rel=1e-6, abs=1e-9 * value / d)
+    assert (ends[3] - ends[2]) / (2 * e) == pytest.approx(by_speed, rel=1e-6, abs=1e-9 * value / e)
 
 
 @pytest.mark.parametrize("law", [RegularisedFriction(speed=0.1), BristleFriction()])
@@ -101,14 +89,14 @@ def test_derivatives_of_friction(
     law: RegularisedFriction | BristleFriction, mu: float, load: float, speed: float, bend: float
 ) -> None:
     """Against central differences; skipped where the bristle is about to slide or to hold."""
-    values, partial, scratch = numbers(law), np.zeros(cl.PARTIALS), np.zeros(cl.PARTIALS)
     steps = np.array([1e-4 * load, 1e-4, 1e-8])
 
     def both(point: np.ndarray) -> np.ndarray:
-        return np.array(friction_force(law.kind, values, mu, *point, scratch))
+        said, rate, _ = force_of(law, mu, *point)
+        return np.array([said[0], rate[0]])
 
     at = np.array([load, speed, bend])
-    friction_force(law.kind, values, mu, *at, partial)
+    said, rate, _ = force_of(law, mu, *at)
     if isinstance(law, BristleFriction):
         wanted = abs(law.stiffness * bend + law.damping * speed)
         if abs(wanted - mu * load) < 0.01 * mu * load + 10.0:
@@ -120,13 +108,7 @@ def test_derivatives_of_friction(
         ]
     )
     sizes = np.abs(both(at))
-    given_partials = np.array(
-        [
-            [partial[cl.TANGENT_BY_NORMAL], partial[cl.BRISTLE_BY_NORMAL]],
-            [partial[cl.TANGENT_BY_SPEED], partial[cl.BRISTLE_BY_SPEED]],
-            [partial[cl.TANGENT_BY_BRISTLE], partial[cl.BRISTLE_BY_BRISTLE]],
-        ]
-    )
+    given_partials = np.array([said[1:], rate[1:]]).T
     rounding = 1e-12 * (sizes + 1.0)[None, :] / steps[:, None]
     smooth = 1e-5 * np.abs(given_partials) + 1e-3 * (sizes / 0.1)[None, :] * [[0.0], [1e-3], [0.0]]
     assert np.all(np.abs(found - given_partials) <= rounding + smooth)
@@ -169,11 +151,10 @@ def test_parameters_are_checked(make: object, words: str) -> None:
 @pytest.mark.parametrize(
     ("law", "gap", "speed", "expected"),
     [
-        # k δⁿ (1 + 3/2 a δ̇): going in, at rest, coming out, above the ground.
+        # k δⁿ (1 + 3/2 a δ̇): going in, at rest, coming out.
         (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=1.0), -1e-3, -0.5, 1300.0),
         (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=2.0), -1e-3, 0.0, 1.0),
         (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=1.0), -1e-3, 0.5, 700.0),
-        (HuntCrossley(stiffness=1e6, dissipation=0.4, exponent=1.0), 1e-3, -0.5, 0.0),
         (KelvinVoigt(stiffness=1e6, damping=200.0), -1e-3, -0.5, 1100.0),
         (KelvinVoigt(stiffness=1e6, damping=200.0), -1e-3, 0.5, 900.0),
         (KelvinVoigt(stiffness=1e6, damping=200.0), -1e-3, 6.0, 0.0),
@@ -182,7 +163,7 @@ def test_parameters_are_checked(make: object, words: str) -> None:
 def test_normal_force_by_hand(
     law: HuntCrossley | KelvinVoigt, gap: float, speed: float, expected: float
 ) -> None:
-    force = normal_force(law.kind, numbers(law), gap, speed, np.zeros(cl.PARTIALS))
+    force, _, _ = force_of(law, gap, speed)
     assert force == pytest.approx(expected, rel=1e-12)
 
 
@@ -204,5 +185,7 @@ def test_friction_by_hand(
     bend: float,
     expected: tuple[float, float],
 ) -> None:
-    found = friction_force(law.kind, numbers(law), 0.5, 100.0, speed, bend, np.zeros(cl.PARTIALS))
-    assert found == pytest.approx(expected, rel=1e-12)
+    (force, *_), (rate, *_), slides = force_of(law, 0.5, 100.0, speed, bend)
+    assert (force, rate) == pytest.approx(expected, rel=1e-12)
+    beyond = abs(speed) > law.speed if isinstance(law, RegularisedFriction) else abs(force) == 50.0
+    assert slides == beyond

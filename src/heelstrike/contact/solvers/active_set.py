@@ -13,7 +13,14 @@ import math
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.certificate import certify
-from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.modes import (
+    OPEN,
+    SLIP_BACKWARD,
+    SLIP_FORWARD,
+    SOLVED,
+    STICK,
+    UNCERTIFIED,
+)
 from heelstrike.contact.sets import LINE, projected
 from heelstrike.contact.solvers.least_norm import split
 from heelstrike.contact.workspace import (
@@ -33,6 +40,9 @@ SHARP = 1e-13
 
 PROMISING = 1e-6
 """Residuals below this, relative to the velocities that cancel, may be due to rounding."""
+
+EXCESS = 1e-11
+"""Impulses this far outside their cones, relative to the largest, are not on its edge."""
 
 REFINEMENTS = 5
 """Most steps of iterative refinement."""
@@ -104,21 +114,19 @@ def expand(
         impulse[row + 1] = 0.0
         if mode[contact] == OPEN:
             continue
-        sticks = tangent[contact] >= 0 and mode[contact] == STICK
-        across = point[place + 1] if sticks else 0.0
-        along, across = projected(problem, contact, point[place], across)
+        along = point[place]
         place += 1
-        if sticks:
-            impulse[row] = along
-            impulse[row + 1] = across
+        if tangent[contact] >= 0 and mode[contact] == STICK:
+            across = point[place]
             place += 1
-            continue
-        across = slope[contact]
-        if tangent[contact] >= 0:
-            limit = problem.friction[contact]
-            across = -limit if mode[contact] == SLIP_FORWARD else limit
-        impulse[row] = along / math.sqrt(1.0 + across * across)
-        impulse[row + 1] = across * impulse[row]
+        else:
+            lean = slope[contact]
+            if tangent[contact] >= 0:
+                limit = problem.friction[contact]
+                lean = -limit if mode[contact] == SLIP_FORWARD else limit
+            along /= math.sqrt(1.0 + lean * lean)
+            across = lean * along
+        impulse[row], impulse[row + 1] = projected(problem, contact, along, across)
 
 
 @kernel
@@ -195,29 +203,74 @@ def refine(reduced: ReducedProblem, velocity: Floats, equations: Equations) -> N
 
 
 @kernel
-def label(
-    count: int, velocity: Floats, reduced: ReducedProblem, yardstick: Yardstick, mode: Integers
-) -> bool:
+def mode_of_slip(velocity: float, rest: float) -> int:
+    """Name what a closed contact does by its tangential velocity."""
+    if velocity > rest:
+        return SLIP_FORWARD
+    return SLIP_BACKWARD if velocity < -rest else STICK
+
+
+@kernel
+def label(count: int, answer: ContactAnswer, reduced: ReducedProblem, yardstick: Yardstick) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any
-    impulse in its cone. Only with all of these admitted is the least-norm split unique. The
-    velocity is judged by what the last certificate calls rest.
+    impulse in its cone. Only with all of these admitted is the least-norm split unique.
     """
-    root, rest = yardstick.root, yardstick.rest
+    mode, velocity, root, rest = answer.mode, answer.velocity, yardstick.root, answer.rest
     changed = False
     for contact in range(count):
         row = 2 * contact
-        name = STICK
+        name = mode_of_slip(velocity[row + 1], rest * root[row + 1])
         if velocity[row] > rest * root[row] and reduced.set[contact] != LINE:
             name = OPEN
-        elif velocity[row + 1] > rest * root[row + 1]:
-            name = SLIP_FORWARD
-        elif velocity[row + 1] < -rest * root[row + 1]:
-            name = SLIP_BACKWARD
         if reduced.tangent[contact] >= 0:
             changed = changed or name != mode[contact]
         else:
             changed = changed or (name == OPEN) != (mode[contact] == OPEN)
         mode[contact] = name
     return changed
+
+
+@kernel
+def amend(problem: ContactProblem, work: ContactWorkspace) -> int:
+    """Change the modes under trial that their own answer contradicts.
+
+    What penetrates closes, and slips as it did; what pulls opens. Friction beyond its cone slips,
+    and slip against its friction sticks. Returns ``SOLVED``, or ``UNCERTIFIED`` if nothing is
+    changed.
+    """
+    mode, velocity, point = work.trial.mode, work.trial.velocity, work.equations.point
+    root, rest, tangent = work.yardstick.root, work.trial.rest, work.reduced.tangent
+    slack = 0.0
+    for place in range(work.equations.size):
+        slack = max(slack, EXCESS * abs(point[place]))
+    changed = False
+    place = 0
+    for contact in range(problem.count):
+        row = 2 * contact
+        before = mode[contact]
+        if before == OPEN:
+            if velocity[row] < -rest * root[row]:
+                mode[contact] = mode_of_slip(velocity[row + 1], rest * root[row + 1])
+        else:
+            along = point[place]
+            place += 1
+            frictional = tangent[contact] >= 0
+            if frictional and before == STICK:
+                across = point[place]
+                place += 1
+                limit = problem.friction[contact] * along + slack
+                if across > limit:
+                    mode[contact] = SLIP_BACKWARD
+                elif -across > limit:
+                    mode[contact] = SLIP_FORWARD
+            elif frictional:
+                slip = velocity[row + 1] if before == SLIP_FORWARD else -velocity[row + 1]
+                if slip < -rest * root[row + 1]:
+                    mode[contact] = STICK
+            if along < -slack and problem.set[contact] != LINE:
+                mode[contact] = OPEN
+        changed = changed or mode[contact] != before
+    work.tally.iterations += 1
+    return SOLVED if changed else UNCERTIFIED

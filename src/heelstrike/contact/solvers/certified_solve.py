@@ -23,7 +23,7 @@ from heelstrike.contact.modes import (
     UNDECIDABLE,
     WARM_START,
 )
-from heelstrike.contact.solvers.active_set import evaluate, label
+from heelstrike.contact.solvers.active_set import amend, evaluate, label
 from heelstrike.contact.solvers.combinations import (
     begin_combinations,
     next_combination,
@@ -33,7 +33,7 @@ from heelstrike.contact.solvers.elimination import LARGEST, elimination_programs
 from heelstrike.contact.solvers.fischer_burmeister import fischer_burmeister
 from heelstrike.contact.solvers.gauss_seidel import gauss_seidel
 from heelstrike.contact.solvers.known_modes import AS_GOOD, CLEAN
-from heelstrike.contact.solvers.lemke import PATHS, lemke
+from heelstrike.contact.solvers.lemke import lemke
 from heelstrike.contact.solvers.reduction import reduce_problem, scale_matrix
 from heelstrike.contact.workspace import (
     ContactAnswer,
@@ -50,6 +50,10 @@ from heelstrike.contact.workspace import (
 NEARLY_SINGULAR = 1e-10
 """Pivots of the unit-diagonal matrix below this allow of impulses 1e5 times the data."""
 
+AMENDMENTS = 4
+"""How often modes that were guessed are amended before a solver is asked: for a sixth of its price,
+and six in seven guesses of feet that are set down and lifted come right."""
+
 ROUNDS = 6
 """How often modes are named after the velocities and tried again."""
 
@@ -62,6 +66,7 @@ def keep(count: int, trial: ContactAnswer, answer: ContactAnswer) -> None:
         answer.velocity[i] = trial.velocity[i]
     for i in range(3):
         answer.residual[i] = trial.residual[i]
+    answer.rest = trial.rest
     for contact in range(count):
         answer.mode[contact] = trial.mode[contact]
 
@@ -132,6 +137,80 @@ def _signature() -> Any:
     )
 
 
+@kernel
+def propose(
+    solver: int, call: int, problem: ContactProblem, best: float, guess: Integers,
+    work: ContactWorkspace,
+) -> int:  # fmt: skip
+    """Write the modes that a solver would have tried next, its ``call``-th, to the trial.
+
+    Returns ``SOLVED``, or how it ended if there are no more. ``guess`` are the modes of the best
+    answer so far and ``best`` its residual.
+    """
+    count, reduced, tally, mode = problem.count, work.reduced, work.tally, work.trial.mode
+    if solver == WARM_START:
+        if call == 0:
+            return SOLVED
+        return amend(problem, work) if call <= work.settings.amendments else UNCERTIFIED
+    if solver == LEMKE:
+        return lemke(count, call, reduced, tally, work.lemke, mode)
+    if solver == FISCHER_BURMEISTER:
+        return fischer_burmeister(count, call, reduced, tally, work.iteration, mode)
+    if solver == GAUSS_SEIDEL:
+        return gauss_seidel(count, call, reduced, tally, work.iteration, mode)
+    if call == 0:
+        begin_combinations(count, guess, best, work.combinations)
+    found = next_combination(count, reduced.tangent, tally, work.combinations, mode)
+    return SOLVED if found else UNCERTIFIED
+
+
+@kernel
+def seek(
+    solver: int, problem: ContactProblem, best: float, work: ContactWorkspace, answer: ContactAnswer
+) -> tuple[int, float]:
+    """Try what a solver proposes until an answer is clean, and keep the best.
+
+    Returns how it ended, and the residual of the answer, which was ``best`` so far.
+    """
+    call = 0
+    while True:
+        outcome = propose(solver, call, problem, best, answer.mode, work)
+        if outcome != SOLVED:
+            return outcome, best
+        call += 1
+        worst = evaluate(problem, work)
+        if solver == COMBINATIONS:
+            note_residual(problem.count, worst, work.trial.mode, work.combinations)
+        if worst < best:
+            best = worst
+            keep(problem.count, work.trial, answer)
+        if worst <= min(work.settings.tolerance, CLEAN):
+            return SOLVED, best
+
+
+@kernel
+def release(
+    problem: ContactProblem, best: float, work: ContactWorkspace, answer: ContactAnswer
+) -> tuple[bool, float]:
+    """Let contacts at rest carry any impulse in their cone.
+
+    So the answer is the same whichever solver found it: the split is of least norm among all. And
+    a candidate that is not quite a solution may become one. Returns whether the modes are those of
+    the answer now, and its residual.
+    """
+    for _ in range(ROUNDS):
+        if not label(problem.count, answer, work.reduced, work.yardstick):
+            return True, best
+        for contact in range(problem.count):
+            work.trial.mode[contact] = answer.mode[contact]
+        worst = evaluate(problem, work)
+        if not (worst < best or worst <= AS_GOOD):
+            break
+        best = worst
+        keep(problem.count, work.trial, answer)
+    return False, best
+
+
 @separate_kernel(_signature)
 def try_solvers(
     problem: ContactProblem, order: Integers, work: ContactWorkspace, answer: ContactAnswer
@@ -140,19 +219,8 @@ def try_solvers(
 
     Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`.
     """
-    count, tally, reduced, trial = problem.count, work.tally, work.reduced, work.trial
-    mode = answer.mode
-    tolerance = work.settings.tolerance
-    clean = min(tolerance, CLEAN)
-    for contact in range(count):
-        trial.mode[contact] = mode[contact]
-    for i in range(2 * count):
-        answer.impulse[i] = 0.0
-        answer.velocity[i] = problem.free[i]
-    for i in range(3):
-        answer.residual[i] = math.inf
-    reduce_problem(problem, mode, work.yardstick.slope, reduced)
-
+    tally, reduced, tolerance = work.tally, work.reduced, work.settings.tolerance
+    begin(problem, work, answer)
     status = UNCERTIFIED
     best = math.inf
     with_fallbacks = order.shape[0] > 1
@@ -160,87 +228,52 @@ def try_solvers(
         solver = WARM_START
         if attempt >= 0:
             solver = order[attempt] if attempt < order.shape[0] else COMBINATIONS
-        outcome = UNCERTIFIED
-        if attempt >= 0:
-            if attempt == 0:
-                scale_matrix(problem, work.yardstick.slope, reduced)
-            elif status != SOLVED:
-                tally.fallbacks += 1
-                tally.last_fallbacks += 1
+        if attempt == 0:
+            scale_matrix(problem, work.yardstick.slope, reduced)
+        elif attempt > 0 and status != SOLVED:
+            tally.fallbacks += 1
+            tally.last_fallbacks += 1
         before = best
-        latest = False
-        call = count - count
-        proposing = True
-        while proposing:
-            if attempt < 0:
-                proposing = False
-            elif solver == LEMKE:
-                outcome = lemke(count, call, reduced, tally, work.lemke, trial.mode)
-                proposing = call + 1 < PATHS
-            elif solver == FISCHER_BURMEISTER:
-                outcome = fischer_burmeister(
-                    count, call, reduced, tally, work.iteration, trial.mode
-                )
-                proposing = outcome == SOLVED
-            elif solver == GAUSS_SEIDEL:
-                outcome = gauss_seidel(count, call, reduced, tally, work.iteration, trial.mode)
-                proposing = outcome == SOLVED
-            else:
-                if call == 0:
-                    begin_combinations(count, mode, best, work.combinations)
-                proposing = next_combination(
-                    count, reduced.tangent, tally, work.combinations, trial.mode
-                )
-                if not proposing:
-                    break
-            call += 1
-            worst = evaluate(problem, work)
-            if solver == COMBINATIONS:
-                note_residual(count, worst, trial.mode, work.combinations)
-            latest = worst < best
-            if latest:
-                best = worst
-                keep(count, trial, answer)
-            if worst <= clean:
-                break
-        found = best
-        if attempt >= 0 or found <= clean:
-            if not latest:
-                certify(problem, work.settings, work.yardstick, answer)
-            # The same answer whichever solver found it: contacts at rest are released to carry
-            # any impulse in their cone, so that the split is of least norm among all. And a
-            # candidate that is not quite a solution may become one.
-            for _ in range(ROUNDS):
-                if not label(count, answer.velocity, reduced, work.yardstick, mode):
-                    break
-                for contact in range(count):
-                    trial.mode[contact] = mode[contact]
-                worst = evaluate(problem, work)
-                if not (worst < best or worst <= AS_GOOD):
-                    break
-                best = worst
-                keep(count, trial, answer)
-        if best < before and attempt >= 0:
+        outcome, best = seek(solver, problem, best, work, answer)
+        clean = best <= min(tolerance, CLEAN)
+        if attempt < 0 and not clean:
+            continue
+        settled, best = release(problem, best, work, answer)
+        if attempt < 0 and not settled:
+            continue
+        if best < before:
             tally.solver = solver
-        if best <= tolerance and (attempt >= 0 or found <= clean):
+        if best <= tolerance:
             status = SOLVED
-            if found <= clean:
+            if clean:
+                tally.shortcuts += attempt < 0
                 break
         elif attempt == 0 or outcome == RAY:
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         tally.failures += 1
         worst = certify(problem, work.settings, work.yardstick, answer)
-        if is_doubtful(count, worst, tolerance, work.yardstick) or (
+        if is_doubtful(problem.count, worst, tolerance, work.yardstick) or (
             with_fallbacks and nearly_singular(problem, reduced)
         ):
             status = UNDECIDABLE
-    elif attempt < 0:
-        tally.shortcuts += 1
-    for contact in range(count):
-        if reduced.prescribed[contact] != OPEN and mode[contact] != OPEN:
-            mode[contact] = reduced.prescribed[contact]
+    for contact in range(problem.count):
+        if reduced.prescribed[contact] != OPEN and answer.mode[contact] != OPEN:
+            answer.mode[contact] = reduced.prescribed[contact]
     return status
+
+
+@kernel
+def begin(problem: ContactProblem, work: ContactWorkspace, answer: ContactAnswer) -> None:
+    """Put the modes of the answer on trial, and no impulse in their place."""
+    for contact in range(problem.count):
+        work.trial.mode[contact] = answer.mode[contact]
+    for i in range(2 * problem.count):
+        answer.impulse[i] = 0.0
+        answer.velocity[i] = problem.free[i]
+    for i in range(3):
+        answer.residual[i] = math.inf
+    reduce_problem(problem, answer.mode, work.yardstick.slope, work.reduced)
 
 
 def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
@@ -269,4 +302,5 @@ def contact_workspace(capacity: int, *, ready: bool = True) -> ContactWorkspace:
         solvers=try_solvers.address,
     )
     work.settings.tolerance = 1e-9
+    work.settings.amendments = AMENDMENTS
     return work

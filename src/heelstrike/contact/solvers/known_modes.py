@@ -299,7 +299,7 @@ def name_by_velocity(
     unique. One that would pull need not be admitted, if it is not quite at rest.
     """
     mode, velocity = answer.mode, answer.velocity
-    root, rest = yardstick.root, yardstick.rest
+    root, rest = yardstick.root, answer.rest
     pressed = 0
     for contact in range(problem.count):
         normal = 2 * contact

@@ -137,26 +137,26 @@ def split(
 
     If ``hold``, directions that would change a velocity are left out; returns whether any were.
     """
-    count, size, friction = problem.count, equations.size, problem.friction
-    tangent, point, step, weight = (
-        reduced.tangent,
-        equations.point,
-        equations.step,
-        equations.weight,
-    )
-    basis, edges, dual = equations.basis, equations.edge, equations.dual.tableau
-    nullity = free_directions(equations)
-    dropped = nullity
-    if hold:
-        nullity = keep_velocity(problem, nullity, reduced, equations)
-    dropped -= nullity
-    project(size, nullity, basis, point)
+    found = free_directions(equations)
+    nullity = keep_velocity(problem, found, reduced, equations) if hold else found
+    project(equations.size, nullity, equations.basis, equations.point)
+    longest = excess(problem, mode, reduced.tangent, equations)
+    if longest > 0.0:
+        number = list_edges(problem, mode, reduced.tangent, nullity, longest, equations)
+        step_inside(number, nullity, longest, tally, equations)
+    return nullity < found
 
-    longest = 0.0  # impulse
-    largest = 0.0  # scaled unknown
+
+@kernel
+def excess(
+    problem: ContactProblem, mode: Integers, tangent: Integers, equations: Equations
+) -> float:
+    """Return the largest impulse of the point, or zero if all of them are in their sets."""
+    point = equations.point
+    longest = 0.0
     inside = True
     place = 0
-    for contact in range(count):
+    for contact in range(problem.count):
         if mode[contact] == OPEN:
             continue
         first = place
@@ -165,19 +165,33 @@ def split(
         inside = inside and contains(problem, contact, point[first], across)
         for i in range(first, place):
             longest = max(longest, abs(point[i]))
-            largest = max(largest, abs(point[i]) / weight[i])
-    if inside:
-        return dropped > 0
+    return 0.0 if inside else longest
 
-    # Edge i of a cone: edges[i, :nullity] @ step + edges[i, nullity] >= 0, of unit length.
-    number = size - size
+
+@kernel
+def list_edges(
+    problem: ContactProblem, mode: Integers, tangent: Integers, nullity: int, longest: float,
+    equations: Equations,
+) -> int:  # fmt: skip
+    """Write the edges of the cones in terms of the free directions; return how many there are.
+
+    Edge i: ``edge[i, :nullity] @ step + edge[i, nullity] >= 0``, of unit length, steps in units of
+    the ``longest`` impulse; what is next to it opens the cone by a margin.
+    """
+    point, weight, basis, edges = (
+        equations.point, equations.weight, equations.basis, equations.edge,
+    )  # fmt: skip
+    largest = 0.0  # scaled unknown
+    for i in range(equations.size):
+        largest = max(largest, abs(point[i]) / weight[i])
+    number = 0
     place = 0
-    for contact in range(count):
+    for contact in range(problem.count):
         if mode[contact] == OPEN:
             continue
         sides = 2 if tangent[contact] >= 0 and mode[contact] == STICK else 1
         for side in range(0 if problem.set[contact] == LINE else sides):
-            along = friction[contact] if sides == 2 else 1.0
+            along = problem.friction[contact] if sides == 2 else 1.0
             across = 2.0 * side - 1.0 if sides == 2 else 0.0
             second = place + sides - 1
             length = 0.0
@@ -194,6 +208,16 @@ def split(
                 edges[number, nullity + 1] = largest * weight[place] / (length * longest)
                 number += 1
         place += sides
+    return number
+
+
+@kernel
+def step_inside(
+    number: int, nullity: int, longest: float, tally: Tally, equations: Equations
+) -> None:
+    """Move the point by the shortest step along the free directions that no edge holds back."""
+    point, step, basis = equations.point, equations.step, equations.basis
+    edges, dual = equations.edge, equations.dual.tableau
     margin = 0.0
     for attempt in range(4):
         for i in range(number):
@@ -207,7 +231,7 @@ def split(
         if pivot_to_solution(number, TIE, tally, equations.dual) == SOLVED:
             break
         if attempt == 3:
-            return dropped > 0
+            return
         margin = MARGIN if attempt == 0 else 100.0 * margin
     for k in range(nullity):
         step[k] = 0.0
@@ -217,6 +241,5 @@ def split(
             for k in range(nullity):
                 step[k] += longest * dual[row, 0] * edges[i, k]
     for k in range(nullity):
-        for j in range(size):
+        for j in range(equations.size):
             point[j] += step[k] * basis[k, j]
-    return dropped > 0

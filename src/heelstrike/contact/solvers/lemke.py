@@ -19,7 +19,7 @@ against, not that the method was unlucky.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, STICK
+from heelstrike.contact.modes import OPEN, SLIP_BACKWARD, SLIP_FORWARD, SOLVED, STICK, UNCERTIFIED
 from heelstrike.contact.sets import LINE
 from heelstrike.contact.solvers.pivoting import pivot_to_solution
 from heelstrike.contact.workspace import Dictionary, Floats, Integers, ReducedProblem, Tally
@@ -110,17 +110,21 @@ def lemke(
     dictionary: Dictionary,
     mode: Integers,
 ) -> int:
-    """Find the contact modes of the reduced problem by Lemke's method; return the status.
+    """Find the contact modes of the reduced problem by Lemke's method.
 
-    ``path``, from 0 to ``PATHS`` - 1, chooses the covering vector and how close a tie is.
+    ``path``, from 0, chooses the covering vector and how close a tie is. Returns ``SOLVED`` with a
+    proposal in ``mode``, whether it is a solution or how far the pivots came; after the last path,
+    how that one ended.
     """
+    if path == PATHS:
+        return dictionary.status if dictionary.status != SOLVED else UNCERTIFIED
     tie = 1e-11
     if path % 3 == 1:
         tie = 1e-13
     elif path % 3 == 2:
         tie = 1e-9
     pairs = load_frictional(count, path, reduced, dictionary.tableau)
-    status = pivot_to_solution(pairs, tie, tally, dictionary)
+    dictionary.status = pivot_to_solution(pairs, tie, tally, dictionary)
     place = dictionary.place
     row = 0
     for contact in range(count):
@@ -146,4 +150,4 @@ def lemke(
             elif backward and not forward:
                 mode[contact] = SLIP_BACKWARD
         row += 4 if frictional else faces_of(contact, reduced)
-    return status
+    return SOLVED

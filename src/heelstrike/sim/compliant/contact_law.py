@@ -5,11 +5,8 @@ problem. It says how hard the ground pushes for a given penetration and speed, s
 nothing to solve; in exchange every foot sinks in. Both halves are passive: the normal laws and the
 friction laws take energy out of the robot or store it, and never give back more than they stored.
 
-Signs: `gap` is negative in the ground, ``penetration = −gap``; `normal_speed` is the rate of the
+Signs: `gap` is negative in the ground, ``penetration = −gap``; `speed` is the rate of the
 gap, positive when leaving; forces act on the robot.
-
-A law from outside derives from one of these four, as a frozen dataclass with settings of its own,
-and says in `write` what numbers of that law they come to: the forces themselves are kernels here.
 """
 
 from __future__ import annotations
@@ -23,45 +20,18 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import SimulationError
+from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 
 Floats = NDArray[np.float64]
+Derived = tuple[float, float, float, float]
+Friction = tuple[Derived, Derived, bool]
 
 # Standard gravity (m/s²): turns the weight on a contact point into the mass that hits the ground.
 GRAVITY = 9.80665
 
-# Speed (rad/s, m/s) around which dry friction of the joints is smoothed beside a law that has none.
-JOINT_SPEED = 1e-4
-
-# What the kernels call the laws.
-HUNT_CROSSLEY = 0
-KELVIN_VOIGT = 1
-REGULARISED = 0
-BRISTLE = 1
-
-# Places in the numbers of a contact law.
-STIFFNESS = 0
-DISSIPATION = 1
-EXPONENT = 2
-SLIP_SCALE = 3
-BRISTLE_STIFFNESS = 4
-BRISTLE_DAMPING = 5
-JOINT_SCALE = 6
-NUMBERS = 7
-
-# Places in the partial derivatives of a contact's forces.
-NORMAL_BY_GAP = 0
-NORMAL_BY_SPEED = 1
-TANGENT_BY_NORMAL = 2
-TANGENT_BY_SPEED = 3
-TANGENT_BY_BRISTLE = 4
-BRISTLE_BY_NORMAL = 5
-BRISTLE_BY_SPEED = 6
-BRISTLE_BY_BRISTLE = 7
-PARTIALS = 8
-
 
 @dataclass(frozen=True, kw_only=True)
-class HuntCrossley:
+class HuntCrossley(NormalLaw):
     """Nonlinear spring whose damping grows with the penetration (the paper's [13]).
 
     ``F = k δⁿ (1 + 3/2 α δ̇)``, never pulling, with penetration δ. The force begins and ends at
@@ -206,26 +176,30 @@ class HuntCrossley:
         energy: Floats = self.stiffness * depth ** (self.exponent + 1.0) / (self.exponent + 1.0)
         return energy
 
-    @property
-    def kind(self) -> int:
-        """What the kernels call this law."""
-        return HUNT_CROSSLEY
-
-    def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them.
+    @kernel
+    def force(self, gap: float, speed: float) -> tuple[float, float, float]:
+        """Force of a point in the ground, and its derivatives.
 
         Parameters
         ----------
-        numbers : (k,) float
-            Out: the parameters in the order that the kernels know.
+        gap, speed : float
+            Gap (m), negative, and its rate (m/s).
+
+        Returns
+        -------
+        tuple of float
+            Force (N), and its derivatives by gap and speed.
         """
-        numbers[STIFFNESS] = self.stiffness
-        numbers[DISSIPATION] = 1.5 * self.dissipation
-        numbers[EXPONENT] = self.exponent
+        factor = 1.0 - 1.5 * self.dissipation * speed
+        if factor <= 0.0:
+            return 0.0, 0.0, 0.0
+        spring = self.stiffness * (-gap) ** self.exponent
+        by_gap = self.exponent * spring * factor / gap
+        return spring * factor, by_gap, -1.5 * self.dissipation * spring
 
 
 @dataclass(frozen=True, kw_only=True)
-class KelvinVoigt:
+class KelvinVoigt(NormalLaw):
     """Linear spring and damper side by side: ``F = max(0, k δ + c δ̇)`` with penetration δ.
 
     Parameters
@@ -363,25 +337,28 @@ class KelvinVoigt:
         energy: Floats = 0.5 * self.stiffness * depth**2
         return energy
 
-    @property
-    def kind(self) -> int:
-        """What the kernels call this law."""
-        return KELVIN_VOIGT
-
-    def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them.
+    @kernel
+    def force(self, gap: float, speed: float) -> tuple[float, float, float]:
+        """Force of a point in the ground, and its derivatives.
 
         Parameters
         ----------
-        numbers : (k,) float
-            Out: the parameters in the order that the kernels know.
+        gap, speed : float
+            Gap (m), negative, and its rate (m/s).
+
+        Returns
+        -------
+        tuple of float
+            Force (N), and its derivatives by gap and speed.
         """
-        numbers[STIFFNESS] = self.stiffness
-        numbers[DISSIPATION] = self.damping
+        push = -self.stiffness * gap - self.damping * speed
+        if push <= 0.0:
+            return 0.0, 0.0, 0.0
+        return push, -self.stiffness, -self.damping
 
 
 @dataclass(frozen=True, kw_only=True)
-class RegularisedFriction:
+class RegularisedFriction(FrictionLaw):
     """Coulomb friction smoothed around zero speed: ``F_t = −μ F_n v / √(v² + v_s²)``.
 
     It never holds: what should stick creeps, at ``v_s r / √(1 − r²)`` when it needs the fraction r
@@ -426,24 +403,34 @@ class RegularisedFriction:
         return self.speed * use / sqrt(1.0 - use * use)
 
     @property
-    def kind(self) -> int:
-        """What the kernels call this law."""
-        return REGULARISED
+    def joint_speed(self) -> float:
+        """Speed around which dry friction of the joints is smoothed beside it (rad/s, m/s)."""
+        return self.speed
 
-    def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them.
+    @kernel
+    def force(self, friction: float, normal: float, speed: float, bend: float) -> Friction:  # noqa: ARG002
+        """Force of a point, and its derivatives.
 
         Parameters
         ----------
-        numbers : (k,) float
-            Out: the parameters in the order that the kernels know.
+        friction, normal, speed, bend : float
+            Coefficient, normal force (N), sliding speed (m/s); the bend is not used.
+
+        Returns
+        -------
+        tuple
+            Force (N) and derivatives, the bend's rate, which is zero, and whether the point slides.
         """
-        numbers[SLIP_SCALE] = self.speed
-        numbers[JOINT_SCALE] = self.speed
+        limit = friction * normal
+        size = sqrt(speed * speed + self.speed * self.speed)
+        share = speed / size
+        rest = self.speed / size
+        said = (-limit * share, -friction * share, -limit * rest * rest / size, 0.0)
+        return said, (0.0, 0.0, 0.0, 0.0), abs(speed) > self.speed
 
 
 @dataclass(frozen=True, kw_only=True)
-class BristleFriction:
+class BristleFriction(FrictionLaw):
     """Coulomb friction with true stiction: a bristle that bends, and slides when bent too far.
 
     The bristle is a spring and damper between the contact point and an anchor on the ground. While
@@ -471,26 +458,33 @@ class BristleFriction:
         _positive("bristle stiffness", self.stiffness, "N/m")
         _positive("bristle damping", self.damping, "N s/m")
 
-    @property
-    def kind(self) -> int:
-        """What the kernels call this law."""
-        return BRISTLE
-
-    def write(self, numbers: Floats) -> None:
-        """Write the parameters where the kernels look for them.
+    @kernel
+    def force(self, friction: float, normal: float, speed: float, bend: float) -> Friction:
+        """Force of a point, rate of its bend, and their derivatives.
 
         Parameters
         ----------
-        numbers : (k,) float
-            Out: the parameters in the order that the kernels know.
+        friction, normal, speed, bend : float
+            Coefficient, normal force (N), sliding speed (m/s) and bend (m).
+
+        Returns
+        -------
+        tuple
+            Force (N) and derivatives, the bend's rate (m/s) and derivatives, and whether the point
+            slides.
         """
-        numbers[BRISTLE_STIFFNESS] = self.stiffness
-        numbers[BRISTLE_DAMPING] = self.damping
-        numbers[JOINT_SCALE] = JOINT_SPEED
-
-
-NormalLaw = HuntCrossley | KelvinVoigt
-FrictionLaw = RegularisedFriction | BristleFriction
+        limit = friction * normal
+        spring = self.stiffness * bend
+        wanted = spring + self.damping * speed
+        if abs(wanted) <= limit:
+            return (-wanted, 0.0, -self.damping, -self.stiffness), (speed, 0.0, 1.0, 0.0), False
+        side = 1.0 if wanted > 0.0 else -1.0
+        rate = (side * limit - spring) / self.damping
+        return (
+            (-side * limit, -side * friction, 0.0, 0.0),
+            (rate, side * friction / self.damping, 0.0, -self.stiffness / self.damping),
+            True,
+        )
 
 
 def _root(function: Callable[[float], float], low: float, high: float) -> float:
@@ -529,88 +523,3 @@ def _arc_over_root(ratio: float) -> float:
 
 def _linear_restitution(ratio: float) -> float:
     return exp(-2.0 * ratio * _arc_over_root(ratio))
-
-
-@kernel
-def normal_force(
-    kind: int, numbers: Floats, gap: float, normal_speed: float, partial: Floats
-) -> float:
-    """Normal force of a contact point; writes its derivatives by gap and speed."""
-    partial[NORMAL_BY_GAP] = 0.0
-    partial[NORMAL_BY_SPEED] = 0.0
-    if gap >= 0.0:
-        return 0.0
-    if kind == KELVIN_VOIGT:
-        force = -numbers[STIFFNESS] * gap - numbers[DISSIPATION] * normal_speed
-        if force <= 0.0:
-            return 0.0
-        partial[NORMAL_BY_GAP] = -numbers[STIFFNESS]
-        partial[NORMAL_BY_SPEED] = -numbers[DISSIPATION]
-        return force
-    factor = 1.0 - numbers[DISSIPATION] * normal_speed
-    if factor <= 0.0:
-        return 0.0
-    spring = numbers[STIFFNESS] * (-gap) ** numbers[EXPONENT]
-    partial[NORMAL_BY_GAP] = numbers[EXPONENT] * spring * factor / gap
-    partial[NORMAL_BY_SPEED] = -numbers[DISSIPATION] * spring
-    return spring * factor
-
-
-@kernel
-def friction_force(
-    kind: int,
-    numbers: Floats,
-    friction: float,
-    normal: float,
-    speed: float,
-    bristle: float,
-    partial: Floats,
-) -> tuple[float, float]:
-    """Tangential force of a contact point and the rate of its bristle; writes the derivatives.
-
-    Parameters
-    ----------
-    friction, normal, speed, bristle : float
-        Friction coefficient, normal force, tangential speed, bend of the bristle.
-    """
-    for i in range(TANGENT_BY_NORMAL, PARTIALS):
-        partial[i] = 0.0
-    limit = friction * normal
-    if kind == REGULARISED:
-        if normal <= 0.0:
-            return 0.0, 0.0
-        size = np.sqrt(speed * speed + numbers[SLIP_SCALE] * numbers[SLIP_SCALE])
-        share = speed / size
-        rest = numbers[SLIP_SCALE] / size
-        partial[TANGENT_BY_NORMAL] = -friction * share
-        partial[TANGENT_BY_SPEED] = -limit * rest * rest / size
-        return -limit * share, 0.0
-    spring = numbers[BRISTLE_STIFFNESS] * bristle
-    damper = numbers[BRISTLE_DAMPING]
-    wanted = spring + damper * speed
-    if abs(wanted) <= limit:
-        partial[TANGENT_BY_SPEED] = -damper
-        partial[TANGENT_BY_BRISTLE] = -numbers[BRISTLE_STIFFNESS]
-        partial[BRISTLE_BY_SPEED] = 1.0
-        return -wanted, speed
-    side = 1.0 if wanted > 0.0 else -1.0
-    partial[TANGENT_BY_NORMAL] = -side * friction
-    partial[BRISTLE_BY_NORMAL] = side * friction / damper
-    partial[BRISTLE_BY_BRISTLE] = -numbers[BRISTLE_STIFFNESS] / damper
-    return -side * limit, (side * limit - spring) / damper
-
-
-@kernel
-def slips(kind: int, numbers: Floats, limit: float, speed: float, bristle: float) -> bool:
-    """Whether a contact point slides: its anchor is dragged, or it is faster than v_s."""
-    if kind == REGULARISED:
-        return abs(speed) > numbers[SLIP_SCALE]
-    wanted = numbers[BRISTLE_STIFFNESS] * bristle + numbers[BRISTLE_DAMPING] * speed
-    return abs(wanted) > limit
-
-
-@kernel
-def joint_friction(limit: float, scale: float, speed: float) -> tuple[float, float]:
-    """Dry friction of a joint, smoothed around zero speed, and its derivative by the speed."""
-    size = np.sqrt(speed * speed + scale * scale)
-    return -limit * speed / size, -limit * (scale / size) ** 2 / size

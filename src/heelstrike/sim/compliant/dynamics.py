@@ -17,12 +17,16 @@ inertia of the whole robot.
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any
 
 import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.compiler.bundle_type import address_of
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.separate_kernel import call_at
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import (
     bias_force,
@@ -35,21 +39,7 @@ from heelstrike.dynamics.kernels import (
 )
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
-from heelstrike.sim.compliant.contact_law import (
-    BRISTLE_BY_BRISTLE,
-    BRISTLE_BY_NORMAL,
-    BRISTLE_BY_SPEED,
-    JOINT_SCALE,
-    NORMAL_BY_GAP,
-    NORMAL_BY_SPEED,
-    PARTIALS,
-    TANGENT_BY_BRISTLE,
-    TANGENT_BY_NORMAL,
-    TANGENT_BY_SPEED,
-    friction_force,
-    joint_friction,
-    normal_force,
-)
+from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 from heelstrike.sim.contacts.geometry import contact_rows, observe, row_product
 from heelstrike.sim.controller.asking import ask, consult
@@ -85,20 +75,45 @@ class Laws(Bundle):
 
     Attributes
     ----------
-    normal, friction : int
-        Which laws; constants of :mod:`heelstrike.sim.compliant.contact_law`.
-    numbers : (7,) float
-        Their parameters.
-    stop : int
-    stop_numbers : (7,) float
-        The law of the joint stops.
+    normal, friction, stop : Bundle
+        Their numbers.
+    normal_code, friction_code, stop_code : int
+        Where their machine code is.
+    joint_speed : float
+        Speed around which dry friction of the joints is smoothed (rad/s, m/s).
     """
 
-    normal: int = number(int)
-    friction: int = number(int)
-    numbers: Floats = array("numbers")
-    stop: int = number(int)
-    stop_numbers: Floats = array("numbers")
+    normal: Bundle = part(Bundle, address=True)
+    friction: Bundle = part(Bundle, address=True)
+    stop: Bundle = part(Bundle, address=True)
+    normal_code: int = number(int)
+    friction_code: int = number(int)
+    stop_code: int = number(int)
+    joint_speed: float = number(float)
+
+
+class Rates(Bundle):
+    """What acts at a state, and how fast the state changes.
+
+    Attributes
+    ----------
+    acceleration : (nv,) float
+        Rate of v.
+    normal, friction, stop : NormalForces, FrictionForces, NormalForces
+        Of contacts and joint stops; the bends of the bristles with their rates.
+    stop_force : (nv,) float
+        Forces of the joint stops, with their signs.
+    dry_force, dry_by_speed : (nv,) float
+        Dry friction in the joints, and its derivative.
+    """
+
+    acceleration: Floats = array("nv")
+    normal: NormalForces = part(NormalForces)
+    friction: FrictionForces = part(FrictionForces)
+    stop: NormalForces = part(NormalForces)
+    stop_force: Floats = array("nv")
+    dry_force: Floats = array("nv")
+    dry_by_speed: Floats = array("nv")
 
 
 class CompliantWorkspace(Bundle):
@@ -106,35 +121,22 @@ class CompliantWorkspace(Bundle):
 
     Attributes
     ----------
-    bristle : (nc,) float
-        Bend of each bristle now, in metres.
-    acceleration, bristle_rate : (nv,), (nc,) float
-        Rates of v and of the bristles at the state evaluated last.
+    now, base : Rates
+        At the state evaluated last, and at the start of the step.
     force : (nc, 2) float
-        Contact forces of the law at the state evaluated last, in newtons.
-    partial : (nc, 8) float
-        Their derivatives.
-    stop_force : (nv,) float
-        Forces of the joint stops at the state evaluated last.
-    dry_force : (nv,) float
-        Dry friction of the joints at the state evaluated last.
-    stop_partial : (nv, 2) float
-        Derivatives of both by q and v of the joint.
+        Contact forces at the state evaluated last, in newtons.
+    now_words, base_words : (any,) int
+        The memory of both.
     torque_by_q, torque_by_v : (nu, nv) float
         Derivatives of the controller's torques.
     age : int
         Steps since these were found.
     trial_torque : (nu,) float
         Torques of a perturbed state.
-    base_q, base_v, base_acceleration : (nv,) float
-    base_bristle, base_rate, base_gap : (nc,) float
-    base_force : (nc, 2) float
-    base_stop_force, base_dry_force : (nv,) float
-    base_stop_partial : (nv, 2) float
-    base_partial : (nc, 8) float
+    base_q, base_v : (nv,) float
     base_rows : (2 nc, nv) float
     base_matrix : (nv, nv) float
-        State, rates, gaps, forces, contact Jacobian and A at the start of the step.
+        State, contact Jacobian and A at the start of the step.
     force_by_q : (nv, nv) float
         ∂f/∂q of a step, bristles eliminated.
     system : (nv, nv) float
@@ -162,29 +164,17 @@ class CompliantWorkspace(Bundle):
         Row of the record for this sample, -1 for none.
     """
 
-    bristle: Floats = array("nc")
-    acceleration: Floats = array("nv")
-    bristle_rate: Floats = array("nc")
+    now: Rates = part(Rates)
+    base: Rates = part(Rates)
     force: Floats = array("nc", "components")
-    partial: Floats = array("nc", "partials")
-    stop_force: Floats = array("nv")
-    dry_force: Floats = array("nv")
-    stop_partial: Floats = array("nv", 2)
+    now_words: Integers = array("words", of=int, address=True)
+    base_words: Integers = array("words", of=int, address=True)
     torque_by_q: Floats = array("nu", "nv")
     torque_by_v: Floats = array("nu", "nv")
     trial_torque: Floats = array("nu")
     age: int = cell(int)
     base_q: Floats = array("nv")
     base_v: Floats = array("nv")
-    base_acceleration: Floats = array("nv")
-    base_bristle: Floats = array("nc")
-    base_rate: Floats = array("nc")
-    base_gap: Floats = array("nc")
-    base_force: Floats = array("nc", "components")
-    base_stop_force: Floats = array("nv")
-    base_dry_force: Floats = array("nv")
-    base_stop_partial: Floats = array("nv", 2)
-    base_partial: Floats = array("nc", "partials")
     base_rows: Floats = array("2 nc", "nv")
     base_matrix: Floats = array("nv", "nv")
     force_by_q: Floats = array("nv", "nv")
@@ -213,11 +203,28 @@ def compliant_workspace(
     robot: Robot, laws: Laws, step: float, rtol: float, atol: float
 ) -> CompliantWorkspace:
     """Allocate the scratch for a robot."""
+    extents = {"nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "stages": STAGES}
+    rates = Rates.allocate(
+        extents,
+        normal=NormalForces.allocate(n=robot.nc),
+        stop=NormalForces.allocate(n=robot.nv),
+    )
+    now, now_words = in_one_block(rates)
+    base, base_words = in_one_block(rates)
     return CompliantWorkspace.allocate(
-        nv=robot.nv, nu=robot.nu, nc=robot.nc, components=2, partials=PARTIALS, stages=STAGES,
+        extents, now=now, base=base, now_words=now_words, base_words=base_words,
         trial_torque=guarded(np.zeros(robot.nu)), age=GAINS_LAST, laws=laws, step=step, rtol=rtol,
         atol=atol, proposed=step,
     )  # fmt: skip
+
+
+def in_one_block(rates: Rates) -> tuple[Rates, Integers]:
+    """Copy the arrays into one block of words, to be copied at once; return both."""
+    sizes = [array.size for _, array in rates.storage()]
+    words = np.zeros(sum(sizes), dtype=np.int64)
+    places = iter(np.split(words, np.cumsum(sizes)[:-1]))
+    copy = rates.stored(lambda _, array: next(places).view(array.dtype).reshape(array.shape))
+    return copy, words
 
 
 @kernel
@@ -241,54 +248,34 @@ def find_gains(
     controller: Any, control: Control, time: float, model: Model, memory: Memory,
     work: CompliantWorkspace,
 ) -> None:  # fmt: skip
-    """Derivatives of the controller's torques at the start of the step, by differences."""
+    """Derivatives of the controller's torques at the start of the step, by differences.
+
+    The smaller of the differences to either side: where the torque jumps, as when a controller
+    changes its mind, the other would be the jump over the perturbation.
+    """
     for j in range(model.parent.shape[0]):
         memory.q[j] = work.base_q[j]
         memory.v[j] = work.base_v[j]
     forward_kinematics(model, memory.q, memory.equations.tree)
     link_velocities(model, memory.v, memory.equations.tree)
     try_command(controller, control, time, model, memory, memory.torque)
-    for j in range(model.parent.shape[0]):
-        difference(
-            controller, control, time, model, memory, memory.q, j, work.trial_torque,
-            work.torque_by_q,
-        )  # fmt: skip
-        difference(
-            controller, control, time, model, memory, memory.v, j, work.trial_torque,
-            work.torque_by_v,
-        )  # fmt: skip
+    for kind in range(2):
+        varied = memory.q if kind == 0 else memory.v
+        gains = work.torque_by_q if kind == 0 else work.torque_by_v
+        for j in range(model.parent.shape[0]):
+            kept = varied[j]
+            for side in range(2):
+                change = PERTURBATION if side == 0 else -PERTURBATION
+                varied[j] = kept + change
+                forward_kinematics(model, memory.q, memory.equations.tree)
+                link_velocities(model, memory.v, memory.equations.tree)
+                try_command(controller, control, time, model, memory, work.trial_torque)
+                for i in range(gains.shape[0]):
+                    slope = (work.trial_torque[i] - memory.torque[i]) / change
+                    if side == 0 or abs(slope) < abs(gains[i, j]):
+                        gains[i, j] = slope
+            varied[j] = kept
     work.age = 0
-
-
-@kernel
-def difference(
-    controller: Any,
-    control: Control,
-    time: float,
-    model: Model,
-    memory: Memory,
-    varied: Floats,
-    j: int,
-    trial: Floats,
-    gains: Floats,
-) -> None:
-    """Change of the torques per unit of component j of `varied`, ``memory.q`` or ``memory.v``.
-
-    The smaller of the differences to either side: where the torque jumps, as when a controller
-    changes its mind, the other would be the jump over the perturbation.
-    """
-    kept = varied[j]
-    for side in range(2):
-        change = PERTURBATION if side == 0 else -PERTURBATION
-        varied[j] = kept + change
-        forward_kinematics(model, memory.q, memory.equations.tree)
-        link_velocities(model, memory.v, memory.equations.tree)
-        try_command(controller, control, time, model, memory, trial)
-        for i in range(trial.shape[0]):
-            slope = (trial[i] - memory.torque[i]) / change
-            if side == 0 or abs(slope) < abs(gains[i, j]):
-                gains[i, j] = slope
-    varied[j] = kept
 
 
 @kernel
@@ -302,21 +289,20 @@ def evaluate(
     memory: Memory,
     work: CompliantWorkspace,
 ) -> None:
-    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.bristle``.
+    """Forces and rates of the state in ``memory.q``, ``memory.v`` and ``work.now.friction.bend``.
 
     A controller that acts continuously is called, unless its torques are ``HELD``: to see what it
     would do (``TRIED``), for good (``DECIDED``), or for good with the contact forces of this very
     state, which is ``ACCEPTED``.
     """
     observe(model, ground, memory.q, memory.v, memory)
-    push_contacts(model, work.laws, memory, work)
-    push_stops(model, work.laws, memory, work)
-    rub_joints(model, work.laws.numbers[JOINT_SCALE], memory, work)
+    now = work.now
+    push_contacts(model, memory, work)
+    push_stops(model, work.laws, memory, now)
+    rub_joints(model, work.laws.joint_speed, memory, now)
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
-            for contact in range(model.contact_link.shape[0]):
-                memory.contacts.force[contact, 0] = work.force[contact, 0]
-                memory.contacts.force[contact, 1] = work.force[contact, 1]
+            copy_words(work.force, memory.contacts.force)
         if how == TRIED:
             try_command(controller, control, time, model, memory, memory.torque)
         else:
@@ -328,14 +314,14 @@ def evaluate(
     add_pushes(model, memory.equations.tree, memory.pushes, memory.equations.force)
     for i in range(model.actuator_joint.shape[0]):
         memory.equations.force[model.actuator_joint[i]] += memory.torque[i]
-    rate = work.acceleration
+    rate = now.acceleration
     nv = model.parent.shape[0]
     for j in range(nv):
         rate[j] = (
             memory.equations.force[j]
             - memory.equations.rate[j]
-            + work.stop_force[j]
-            + work.dry_force[j]
+            + now.stop_force[j]
+            + now.dry_force[j]
         )
     for contact in range(model.contact_link.shape[0]):
         normal = work.force[contact, 0]
@@ -350,97 +336,75 @@ def evaluate(
 
 
 @kernel
-def push_contacts(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
+def push_contacts(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Forces of the contacts and rates of the bristles at the state now."""
-    jacobian = memory.assembly.jacobian
+    laws, normal, friction = work.laws, work.now.normal, work.now.friction
     for contact in range(model.contact_link.shape[0]):
-        partial = work.partial[contact]
-        gap = memory.contacts.gap[contact]
-        normal = 0.0
         memory.reaction.slip[contact] = 0.0
-        if gap < 0.0:
+        normal.gap[contact] = memory.contacts.gap[contact]
+        if normal.gap[contact] < 0.0:
             tree = memory.equations.tree
             contact_rows(model, tree, memory.contacts, contact, contact, memory.assembly)
-            memory.reaction.slip[contact] = row_product(jacobian, 2 * contact + 1, memory.v)
-            normal_speed = row_product(jacobian, 2 * contact, memory.v)
-            normal = normal_force(laws.normal, laws.numbers, gap, normal_speed, partial)
-        tangent, bristle_rate = friction_force(
-            laws.friction,
-            laws.numbers,
-            memory.surface.friction[contact],
-            normal,
-            memory.reaction.slip[contact],
-            work.bristle[contact],
-            partial,
-        )
-        work.force[contact, 0] = normal
-        work.force[contact, 1] = tangent
-        work.bristle_rate[contact] = bristle_rate
+            memory.reaction.slip[contact] = row_product(
+                memory.assembly.jacobian, 2 * contact + 1, memory.v
+            )
+            normal.speed[contact] = row_product(memory.assembly.jacobian, 2 * contact, memory.v)
+    call_at(laws.normal_code, (address_of(laws.normal), normal))
+    copy_words(normal.force, friction.normal)
+    copy_words(memory.surface.friction, friction.friction)
+    copy_words(memory.reaction.slip, friction.speed)
+    call_at(laws.friction_code, (address_of(laws.friction), friction))
+    for contact in range(model.contact_link.shape[0]):
+        work.force[contact, 0] = normal.force[contact]
+        work.force[contact, 1] = friction.force[contact]
 
 
 @kernel
-def push_stops(model: Model, laws: Laws, memory: Memory, work: CompliantWorkspace) -> None:
+def push_stops(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
     """Forces of the joint stops at the state now."""
+    stop = now.stop
     for j in range(model.parent.shape[0]):
-        work.stop_force[j] = 0.0
-        work.stop_partial[j, 0] = 0.0
-        work.stop_partial[j, 1] = 0.0
         below = memory.q[j] - model.lower[j]
         above = model.upper[j] - memory.q[j]
-        if below < 0.0:
-            work.stop_force[j] = normal_force(
-                laws.stop, laws.stop_numbers, below, memory.v[j], work.stop_partial[j]
-            )
-        elif above < 0.0:
-            work.stop_force[j] = -normal_force(
-                laws.stop, laws.stop_numbers, above, -memory.v[j], work.stop_partial[j]
-            )
+        stop.gap[j] = below if below < 0.0 else above
+        stop.speed[j] = memory.v[j] if below < 0.0 else -memory.v[j]
+    call_at(laws.stop_code, (address_of(laws.stop), stop))
+    for j in range(model.parent.shape[0]):
+        now.stop_force[j] = stop.force[j] if memory.q[j] < model.lower[j] else -stop.force[j]
 
 
 @kernel
-def rub_joints(model: Model, scale: float, memory: Memory, work: CompliantWorkspace) -> None:
-    """Dry friction of the joints at the state now, after :func:`push_stops`."""
+def rub_joints(model: Model, scale: float, memory: Memory, now: Rates) -> None:
+    """Dry friction of the joints, smoothed around zero speed."""
     for place in range(memory.dry_joint.shape[0]):
         j = memory.dry_joint[place]
-        work.dry_force[j], slope = joint_friction(model.dry_friction[j], scale, memory.v[j])
-        work.stop_partial[j, NORMAL_BY_SPEED] += slope
+        limit = model.dry_friction[j]
+        size = sqrt(memory.v[j] * memory.v[j] + scale * scale)
+        now.dry_force[j] = -limit * memory.v[j] / size
+        now.dry_by_speed[j] = -limit * (scale / size) ** 2 / size
 
 
 @kernel
 def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Make the state evaluated last the start of the next step."""
-    nv = model.parent.shape[0]
-    for i in range(nv):
-        work.base_q[i] = memory.q[i]
-        work.base_v[i] = memory.v[i]
-        work.base_acceleration[i] = work.acceleration[i]
-        work.base_stop_force[i] = work.stop_force[i]
-        work.base_dry_force[i] = work.dry_force[i]
-        for k in range(2):
-            work.base_stop_partial[i, k] = work.stop_partial[i, k]
-        for j in range(nv):
-            work.base_matrix[i, j] = memory.equations.mass_matrix[i, j]
-    for contact in range(model.contact_link.shape[0]):
-        work.base_bristle[contact] = work.bristle[contact]
-        work.base_rate[contact] = work.bristle_rate[contact]
-        work.base_gap[contact] = memory.contacts.gap[contact]
-        for k in range(2):
-            work.base_force[contact, k] = work.force[contact, k]
-            for j in range(nv):
-                work.base_rows[2 * contact + k, j] = memory.assembly.jacobian[2 * contact + k, j]
-        for k in range(PARTIALS):
-            work.base_partial[contact, k] = work.partial[contact, k]
+    copy_words(work.now_words, work.base_words)
+    copy_words(memory.q, work.base_q)
+    copy_words(memory.v, work.base_v)
+    copy_words(memory.equations.mass_matrix, work.base_matrix)
+    for row in range(2 * model.contact_link.shape[0]):
+        for j in range(model.parent.shape[0]):
+            work.base_rows[row, j] = memory.assembly.jacobian[row, j]
 
 
 @kernel
-def tangent_gains(partial: Floats, g: float) -> tuple[float, float, float]:
+def tangent_gains(friction: FrictionForces, contact: int, g: float) -> tuple[float, float, float]:
     """Change of the tangential force by normal force, by speed and by the bristle's residual.
 
     The bristle's own equation, ``(1/g − ∂S/∂s) u_s = r + ∂S/∂F_n dF_n + ∂S/∂v a``, is eliminated.
     """
-    bend = partial[TANGENT_BY_BRISTLE] / (1.0 / g - partial[BRISTLE_BY_BRISTLE])
-    by_normal = partial[TANGENT_BY_NORMAL] + bend * partial[BRISTLE_BY_NORMAL]
-    by_speed = partial[TANGENT_BY_SPEED] + bend * partial[BRISTLE_BY_SPEED]
+    bend = friction.by_bend[contact] / (1.0 / g - friction.rate_by_bend[contact])
+    by_normal = friction.by_normal[contact] + bend * friction.rate_by_normal[contact]
+    by_speed = friction.by_speed[contact] + bend * friction.rate_by_speed[contact]
     return by_normal, by_speed, bend
 
 
@@ -448,14 +412,13 @@ def tangent_gains(partial: Floats, g: float) -> tuple[float, float, float]:
 def factorize_step(model: Model, control: Control, g: float, work: CompliantWorkspace) -> None:
     """Factorise the linear system of all stages of a step of length g / γ."""
     nv = model.parent.shape[0]
-    system = work.system
-    by_q = work.force_by_q
+    system, by_q, base = work.system, work.force_by_q, work.base
     for i in range(nv):
         for j in range(nv):
             system[i, j] = work.base_matrix[i, j]
             by_q[i, j] = 0.0
-        system[i, i] += g * (model.damping[i] - work.base_stop_partial[i, NORMAL_BY_SPEED])
-        by_q[i, i] = work.base_stop_partial[i, NORMAL_BY_GAP] - model.stiffness[i]
+        system[i, i] += g * (model.damping[i] - (base.stop.by_speed[i] + base.dry_by_speed[i]))
+        by_q[i, i] = base.stop.by_gap[i] - model.stiffness[i]
     if control.continuous == 1:
         for i in range(model.actuator_joint.shape[0]):
             joint = model.actuator_joint[i]
@@ -463,10 +426,9 @@ def factorize_step(model: Model, control: Control, g: float, work: CompliantWork
                 system[joint, j] -= g * work.torque_by_v[i, j]
                 by_q[joint, j] += work.torque_by_q[i, j]
     for contact in range(model.contact_link.shape[0]):
-        if work.base_force[contact, 0] <= 0.0:
+        if base.normal.force[contact] <= 0.0:
             continue
-        partial = work.base_partial[contact]
-        by_normal, by_speed, _ = tangent_gains(partial, g)
+        by_normal, by_speed, _ = tangent_gains(base.friction, contact, g)
         normal_row = work.base_rows[2 * contact]
         tangent_row = work.base_rows[2 * contact + 1]
         for i in range(nv):
@@ -475,9 +437,10 @@ def factorize_step(model: Model, control: Control, g: float, work: CompliantWork
             rubbing = by_speed * tangent_row[i]
             for j in range(nv):
                 system[i, j] -= g * (
-                    pressing * partial[NORMAL_BY_SPEED] * normal_row[j] + rubbing * tangent_row[j]
+                    pressing * base.normal.by_speed[contact] * normal_row[j]
+                    + rubbing * tangent_row[j]
                 )
-                by_q[i, j] += pressing * partial[NORMAL_BY_GAP] * normal_row[j]
+                by_q[i, j] += pressing * base.normal.by_gap[contact] * normal_row[j]
     for i in range(nv):
         for j in range(nv):
             system[i, j] -= g * g * by_q[i, j]
@@ -538,14 +501,15 @@ def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) ->
     u_q = work.stage_q[stage]
     u_v = work.stage_v[stage]
     u_s = work.stage_bristle[stage]
+    base = work.base
     for i in range(nv):
         u_v[i] = g * (
             dot(work.base_matrix[i], work.right_v) + g * dot(work.force_by_q[i], work.right_q)
         )
     for contact in range(u_s.shape[0]):
-        if work.base_force[contact, 0] <= 0.0:
+        if base.normal.force[contact] <= 0.0:
             continue
-        _, _, bend = tangent_gains(work.base_partial[contact], g)
+        _, _, bend = tangent_gains(base.friction, contact, g)
         push = g * bend * work.right_bristle[contact]
         for j in range(nv):
             u_v[j] += push * work.base_rows[2 * contact + 1, j]
@@ -553,16 +517,15 @@ def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) ->
     for j in range(nv):
         u_q[j] = g * (work.right_q[j] + u_v[j])
     for contact in range(u_s.shape[0]):
-        partial = work.base_partial[contact]
         change = work.right_bristle[contact]
-        if work.base_force[contact, 0] > 0.0:
+        if base.normal.force[contact] > 0.0:
             normal_row = work.base_rows[2 * contact]
-            pressing = partial[NORMAL_BY_SPEED] * dot(normal_row, u_v) + partial[
-                NORMAL_BY_GAP
-            ] * dot(normal_row, u_q)
+            pressing = base.normal.by_speed[contact] * dot(normal_row, u_v)
+            pressing += base.normal.by_gap[contact] * dot(normal_row, u_q)
             sliding = dot(work.base_rows[2 * contact + 1], u_v)
-            change += partial[BRISTLE_BY_NORMAL] * pressing + partial[BRISTLE_BY_SPEED] * sliding
-        u_s[contact] = change / (1.0 / g - partial[BRISTLE_BY_BRISTLE])
+            change += base.friction.rate_by_normal[contact] * pressing
+            change += base.friction.rate_by_speed[contact] * sliding
+        u_s[contact] = change / (1.0 / g - base.friction.rate_by_bend[contact])
 
 
 @kernel
@@ -577,7 +540,7 @@ def attempt_step(
     work: CompliantWorkspace,
 ) -> float:
     """Go from the start of the step, at `time`, to its end; return the error over the tolerance."""
-    rtol, atol = work.rtol, work.atol
+    rtol, atol, now, base = work.rtol, work.atol, work.now, work.base
     how = DECIDED if h <= DECISIVE else TRIED
     nv = model.parent.shape[0]
     nc = model.contact_link.shape[0]
@@ -592,18 +555,18 @@ def attempt_step(
                     memory.q[i] += A[stage, k] * work.stage_q[k, i]
                     memory.v[i] += A[stage, k] * work.stage_v[k, i]
             for i in range(nc):
-                work.bristle[i] = work.base_bristle[i]
+                now.friction.bend[i] = base.friction.bend[i]
                 for k in range(stage):
-                    work.bristle[i] += A[stage, k] * work.stage_bristle[k, i]
+                    now.friction.bend[i] += A[stage, k] * work.stage_bristle[k, i]
             evaluate(controller, control, model, ground, how, time + TIMES[stage] * h, memory, work)
         for i in range(nv):
             work.right_q[i] = work.base_v[i] if stage == 0 else memory.v[i]
-            work.right_v[i] = work.base_acceleration[i] if stage == 0 else work.acceleration[i]
+            work.right_v[i] = base.acceleration[i] if stage == 0 else now.acceleration[i]
             for k in range(stage):
                 work.right_q[i] += C[stage, k] / h * work.stage_q[k, i]
                 work.right_v[i] += C[stage, k] / h * work.stage_v[k, i]
         for i in range(nc):
-            work.right_bristle[i] = work.base_rate[i] if stage == 0 else work.bristle_rate[i]
+            work.right_bristle[i] = base.friction.rate[i] if stage == 0 else now.friction.rate[i]
             for k in range(stage):
                 work.right_bristle[i] += C[stage, k] / h * work.stage_bristle[k, i]
         solve_stage(model, g, stage, work)
@@ -613,11 +576,11 @@ def attempt_step(
         worst = larger(worst, finish(work.base_v, work.stage_v, rtol, atol, memory.v, i))
     for i in range(nc):
         worst = larger(
-            worst, finish(work.base_bristle, work.stage_bristle, rtol, atol, work.bristle, i)
+            worst, finish(base.friction.bend, work.stage_bristle, rtol, atol, now.friction.bend, i)
         )
         # A bristle in the air goes to zero; spare the processor the numbers next to it.
-        if abs(work.bristle[i]) < NO_BEND:
-            work.bristle[i] = 0.0
+        if abs(now.friction.bend[i]) < NO_BEND:
+            now.friction.bend[i] = 0.0
     return worst
 
 

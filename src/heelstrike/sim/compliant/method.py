@@ -17,21 +17,13 @@ from typing import Any
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.compliant.contact_law import (
-    NUMBERS,
-    BristleFriction,
-    FrictionLaw,
-    HuntCrossley,
-    KelvinVoigt,
-    NormalLaw,
-    RegularisedFriction,
-    slips,
-)
+from heelstrike.sim.compliant.contact_law import BristleFriction, HuntCrossley, KelvinVoigt
 from heelstrike.sim.compliant.dynamics import (
     ACCEPTED,
     GAINS_LAST,
@@ -45,6 +37,7 @@ from heelstrike.sim.compliant.dynamics import (
     evaluate,
     find_gains,
 )
+from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.controller.control import Control
@@ -81,11 +74,11 @@ class Compliant(Method):
 
     Parameters
     ----------
-    law : HuntCrossley or KelvinVoigt
+    law : HuntCrossley, KelvinVoigt or another NormalLaw
         Normal force from penetration and its rate, for each contact point.
-    friction : RegularisedFriction or BristleFriction
+    friction : RegularisedFriction, BristleFriction or another FrictionLaw
         Tangential force; its coefficient μ is the ground's. Only a bristle holds a foot in place.
-    stop : HuntCrossley or KelvinVoigt
+    stop : HuntCrossley, KelvinVoigt or another NormalLaw
         Torque of a joint beyond the end of its range, from the angle and its rate (with N m and
         rad in the place of N and m for a hinge).
     step : float
@@ -130,11 +123,12 @@ class Compliant(Method):
     def __post_init__(self) -> None:
         for name in ("law", "stop"):
             law = getattr(self, name)
-            if not isinstance(law, HuntCrossley | KelvinVoigt):
+            if not isinstance(law, NormalLaw):
                 raise SimulationError(
-                    f"{name} must be HuntCrossley(...) or KelvinVoigt(...), got {law!r}"
+                    f"{name} must be HuntCrossley(...), KelvinVoigt(...) or another normal law, "
+                    f"got {law!r}"
                 )
-        if not isinstance(self.friction, RegularisedFriction | BristleFriction):
+        if not isinstance(self.friction, FrictionLaw):
             raise SimulationError(
                 f"friction must be RegularisedFriction(...) or BristleFriction(...), got "
                 f"{self.friction!r}; the coefficient μ belongs to the ground"
@@ -161,17 +155,13 @@ class Compliant(Method):
 
     def new_work(self, robot: Robot) -> CompliantWorkspace:
         """Allocate its scratch, with the numbers of the laws."""
-        numbers, stop_numbers = np.zeros(NUMBERS), np.zeros(NUMBERS)
-        self.law.write(numbers)
-        self.friction.write(numbers)
-        self.stop.write(stop_numbers)
+        numbers = {name: getattr(self, name).parameters() for name in ("law", "friction", "stop")}
+        code = {name: getattr(self, name).code(each) for name, each in numbers.items()}
         laws = Laws(
-            normal=self.law.kind,
-            friction=self.friction.kind,
-            numbers=numbers,
-            stop=self.stop.kind,
-            stop_numbers=stop_numbers,
-        )
+            normal=numbers["law"], normal_code=code["law"],
+            friction=numbers["friction"], friction_code=code["friction"],
+            stop=numbers["stop"], stop_code=code["stop"], joint_speed=self.friction.joint_speed,
+        )  # fmt: skip
         return compliant_workspace(robot, laws, self.step, self.rtol, self.atol)
 
     def room(self, robot: Robot) -> tuple[int, int]:
@@ -189,21 +179,22 @@ class Compliant(Method):
 
 @kernel
 def account(model: Model, since: float, h: float, memory: Memory, work: CompliantWorkspace) -> None:
-    """Add a step of length h, begun at time `since`, to impulses, extremes and crossings.
+    """Add a step of length h, begun at time `since`, to impulses, extremes, crossings and counts.
 
     The impulse is the trapezium of the forces of the law. As a sum of forces inside the friction
     cone with positive weights it lies in the cone itself.
     """
+    now, base = work.now, work.base
     for joint in range(model.parent.shape[0]):
-        work.stop_impulse[joint] += 0.5 * h * (work.base_stop_force[joint] + work.stop_force[joint])
-        work.dry_impulse[joint] += 0.5 * h * (work.base_dry_force[joint] + work.dry_force[joint])
+        work.stop_impulse[joint] += 0.5 * h * (base.stop_force[joint] + now.stop_force[joint])
+        work.dry_impulse[joint] += 0.5 * h * (base.dry_force[joint] + now.dry_force[joint])
     for contact in range(model.contact_link.shape[0]):
-        for k in range(2):
-            work.impulse[contact, k] += (
-                0.5 * h * (work.base_force[contact, k] + work.force[contact, k])
-            )
+        normal = base.normal.force[contact] + now.normal.force[contact]
+        tangent = base.friction.force[contact] + now.friction.force[contact]
+        work.impulse[contact, 0] += 0.5 * h * normal
+        work.impulse[contact, 1] += 0.5 * h * tangent
         gap = memory.contacts.gap[contact]
-        before = work.base_gap[contact]
+        before = work.base.normal.gap[contact]
         memory.tally.penetration = max(memory.tally.penetration, -gap)
         if memory.reported.closed[contact] == 0 and gap < 0.0:
             memory.reported.closed[contact] = 1
@@ -213,6 +204,10 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
             memory.reported.closed[contact] = 0
             share = before / (before - gap) if before < 0.0 else 0.0
             work.left[contact] = since + share * h
+    residual = memory.assembly.answer.residual
+    residual[1] = max(residual[1], cone_residual(memory.surface.friction, work))
+    memory.tally.steps += 1
+    work.age += 1
 
 
 @kernel
@@ -225,17 +220,17 @@ def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspac
     first = 1.0
     for contact in range(model.contact_link.shape[0]):
         gap = gap_now[contact]
-        before = work.base_gap[contact]
+        before = work.base.normal.gap[contact]
         if before > depth and gap < -depth:
             first = min(first, before / (before - gap))
     return first
 
 
 @kernel
-def cone_residual(model: Model, friction: Floats, work: CompliantWorkspace) -> float:
+def cone_residual(friction: Floats, work: CompliantWorkspace) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
-    for contact in range(model.contact_link.shape[0]):
+    for contact in range(work.touched.shape[0]):
         normal = work.force[contact, 0]
         tangent = abs(work.force[contact, 1])
         excess = max(-normal, tangent - friction[contact] * normal)
@@ -249,19 +244,8 @@ def sample(
     controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
     memory: Memory, work: CompliantWorkspace,
 ) -> int:  # fmt: skip
-    """Integrate from one sample to the next; return DONE or what was in the way.
-
-    ``memory.contacts.force`` receives the mean contact forces.
-    """
-    for contact in range(model.contact_link.shape[0]):
-        work.impulse[contact, 0] = 0.0
-        work.impulse[contact, 1] = 0.0
-        work.touched[contact] = -1.0
-        work.left[contact] = -1.0
-    for joint in range(model.parent.shape[0]):
-        work.stop_impulse[joint] = 0.0
-        work.dry_impulse[joint] = 0.0
-    memory.assembly.answer.residual[1] = cone_residual(model, memory.surface.friction, work)
+    """Integrate from one sample to the next; return DONE or what was in the way."""
+    begin_sample(memory, work)
     span = work.step
     elapsed = 0.0
     h = work.proposed
@@ -277,8 +261,7 @@ def sample(
             controller, control, model, ground, start + elapsed, taken, memory, work
         )
         shortest = taken <= SHORTEST
-        finite = error < np.inf
-        if not (error <= 1.0 or (shortest and finite)):
+        if not (error <= 1.0 or (shortest and error < np.inf)):
             if control.continuous == 1 and (work.age > 0 or shortest):
                 find_gains(controller, control, start + elapsed, model, memory, work)
             if shortest:
@@ -286,10 +269,7 @@ def sample(
                     memory.q[i] = work.base_q[i]
                     memory.v[i] = work.base_v[i]
                 return DIVERGED if limit_torque(model, memory) else BAD_CONTROLLER
-            factor = SHRINK
-            if finite:
-                factor = max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
-            h = max(taken * factor, SHORTEST)
+            h = max(taken * rescaled(error, SHRINK), SHORTEST)
             rejected = True
             continue
         observe(model, ground, memory.q, memory.v, memory)
@@ -301,30 +281,52 @@ def sample(
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
         account(model, start + elapsed, taken, memory, work)
-        memory.assembly.answer.residual[1] = max(
-            memory.assembly.answer.residual[1], cone_residual(model, memory.surface.friction, work)
-        )
-        memory.tally.steps += 1
-        work.age += 1
         begin_step(model, memory, work)
         elapsed = span if final else elapsed + taken
-        factor = GROW
-        if error > 0.0 and not shortest:
-            factor = min(GROW, SAFETY * error ** (-1.0 / ORDER))
+        factor = GROW if shortest else min(GROW, rescaled(error, GROW))
         if rejected and not shortest:
             factor = min(factor, 1.0)
             rejected = False
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
     work.proposed = min(h, span)
-    for contact in range(model.contact_link.shape[0]):
+    finish_sample(memory, work)
+    return DONE
+
+
+@kernel
+def rescaled(error: float, limit: float) -> float:
+    """How much longer a step of this error may be, or `limit` if that cannot be told."""
+    if not 0.0 < error < np.inf:
+        return limit
+    return max(SHRINK, SAFETY * error ** (-1.0 / ORDER))
+
+
+@kernel
+def begin_sample(memory: Memory, work: CompliantWorkspace) -> None:
+    """Forget the impulses and crossings of the sample before."""
+    for contact in range(work.touched.shape[0]):
+        work.impulse[contact, 0] = 0.0
+        work.impulse[contact, 1] = 0.0
+        work.touched[contact] = -1.0
+        work.left[contact] = -1.0
+    for joint in range(work.stop_impulse.shape[0]):
+        work.stop_impulse[joint] = 0.0
+        work.dry_impulse[joint] = 0.0
+    memory.assembly.answer.residual[1] = cone_residual(memory.surface.friction, work)
+
+
+@kernel
+def finish_sample(memory: Memory, work: CompliantWorkspace) -> None:
+    """Put the mean forces since the sample before into the memory."""
+    span = work.step
+    for contact in range(work.touched.shape[0]):
         for k in range(2):
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
-    for joint in range(model.parent.shape[0]):
+    for joint in range(work.stop_impulse.shape[0]):
         memory.reaction.stop_torque[joint] = work.stop_impulse[joint] / span
         memory.reaction.friction_torque[joint] = work.dry_impulse[joint] / span
     memory.tally.cone = max(memory.tally.cone, memory.assembly.answer.residual[1])
-    return DONE
 
 
 @kernel
@@ -349,19 +351,10 @@ def note_events(
             note_event(left, LIFTOFF, contact, work.step, force, record)
         if left >= 0.0 or work.force[contact, 0] <= 0.0:
             continue
-        sliding = slips(
-            work.laws.friction,
-            work.laws.numbers,
-            memory.surface.friction[contact] * work.force[contact, 0],
-            memory.reaction.slip[contact],
-            work.bristle[contact],
-        )
-        if sliding and memory.reported.slipping[contact] == 0:
-            memory.reported.slipping[contact] = 1
-            note_event(time, SLIP, contact, work.step, force, record)
-        elif not sliding and memory.reported.slipping[contact] == 1:
-            memory.reported.slipping[contact] = 0
-            note_event(time, STICK, contact, work.step, force, record)
+        if work.now.friction.slides[contact] != memory.reported.slipping[contact]:
+            memory.reported.slipping[contact] = work.now.friction.slides[contact]
+            kind = SLIP if work.now.friction.slides[contact] == 1 else STICK
+            note_event(time, kind, contact, work.step, force, record)
     for joint in range(model.parent.shape[0]):
         pressed = memory.reaction.stop_torque[joint] != 0.0
         if pressed and memory.reported.stopped[joint] == 0:
@@ -426,7 +419,8 @@ def report(
     """Append a row if one is due, with the forces of this instant."""
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
-        note_forces(work.row, work.force, work.stop_force, work.dry_force, memory, record)
+        now = work.now
+        note_forces(work.row, work.force, now.stop_force, now.dry_force, memory, record)
 
 
 @kernel
@@ -449,9 +443,7 @@ def move(
             memory, record,
         )  # fmt: skip
     if control.continuous == 1:
-        for contact in range(model.contact_link.shape[0]):
-            memory.contacts.force[contact, 0] = work.force[contact, 0]
-            memory.contacts.force[contact, 1] = work.force[contact, 1]
+        copy_words(work.force, memory.contacts.force)
     clock.time = clock.start + (clock.index + 1) * step
     return DONE
 

@@ -2,22 +2,15 @@
 
 Dry friction τ of a joint with velocity v and breakaway torque τ_c obeys Coulomb's law with a
 normal force that is known: ``|τ| ≤ τ_c``, and ``τ = −τ_c sign v`` where v is not zero. It enters
-the contact problem as a contact of its own. Its tangent is the joint, its normal is coupled to
-nothing::
-
-    w_n = g λ_n − g τ_c   ⟂ λ_n     so that λ_n = τ_c whatever else happens
-    w_t = v (or v̇),  |λ_t| ≤ λ_n    friction coefficient 1
-
-with τ_c times the length of the step where λ are impulses; g, the Delassus diagonal of the joint,
-makes both rows of one size. So a robot with dry joints, flat feet and joint stops is one problem
-with one certificate.
+the contact problem as a group of its own, whose set is the interval of these torques, or of what
+they come to over a step, and whose velocity or acceleration is the joint's. So a robot with dry
+joints, flat feet and joint stops is one problem with one certificate.
 """
 
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.sets import press
-from heelstrike.contact.workspace import ContactProblem
+from heelstrike.contact.sets import INTERVAL
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.geometry import write_unit_row
 from heelstrike.sim.memory import Assembly
@@ -25,31 +18,26 @@ from heelstrike.sim.memory import Assembly
 
 @kernel
 def select_dry_joints(
-    model: Model, count: int, dry_joint: Integers, guess: Integers, v: Floats, assembly: Assembly
-) -> int:
+    model: Model, step: float, count: int, dry_joint: Integers, guess: Integers, v: Floats,
+    assembly: Assembly,
+) -> int:  # fmt: skip
     """Append the joints with dry friction to the candidates of a step; return how many there are.
 
     They are numbered on from the joint stops; `guess` holds their contact modes.
     """
     first = model.nc + 2 * model.nv
+    problem = assembly.problem
     for place in range(dry_joint.shape[0]):
         joint = dry_joint[place]
         write_unit_row(joint, 2 * count + 1, 1.0, assembly)
-        assembly.problem.free[2 * count + 1] = v[joint]
+        problem.free[2 * count + 1] = v[joint]
+        problem.set[count] = INTERVAL
+        problem.friction[count] = 1.0
+        problem.bound[count] = step * model.dry_friction[joint]
         assembly.answer.mode[count] = guess[place]
         assembly.candidate[count] = first + place
         count += 1
     return count
-
-
-@kernel
-def press_dry_joints(
-    model: Model, step: float, count: int, dry_joint: Integers, problem: ContactProblem
-) -> None:
-    """Complete the problem of the candidates, of which the dry joints are the last."""
-    number = dry_joint.shape[0]
-    for place in range(number):
-        press(count - number + place, step * model.dry_friction[dry_joint[place]], problem)
 
 
 @kernel

@@ -5,6 +5,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Assembly
@@ -24,6 +25,7 @@ def solve_candidates(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
+        problem.set[place] = INTERVAL if contact >= phase.first_dry else CONE
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:

@@ -8,7 +8,6 @@ contact points, dry joints from the stops, and these kernels tell them apart.
 from __future__ import annotations
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.contact.sets import press
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.workspace import Workspace
@@ -63,8 +62,8 @@ def free_gap_acceleration(
     """Acceleration b = J v̇ + J̇ v of a contact, stop or dry joint, under ``equations.rate``.
 
     Of a contact point it is that of the gap and of the sliding velocity: for a rolling disc the
-    acceleration of its centre and not of the material point that touches the ground. A dry joint
-    gets the normal row that presses it, too. The Jacobian rows must be those of the candidates'
+    acceleration of its centre and not of the material point that touches the ground. Of a dry
+    joint the bound is written, too. The Jacobian rows must be those of the candidates'
     `place`.
     """
     along_normal = 0.0
@@ -87,4 +86,4 @@ def free_gap_acceleration(
     assembly.problem.free[2 * place + 1] = along_tangent
     if contact >= phase.first_dry:
         joint = phase.dry_joint[contact - phase.first_dry]
-        press(place, model.dry_friction[joint], assembly.problem)
+        assembly.problem.bound[place] = model.dry_friction[joint]

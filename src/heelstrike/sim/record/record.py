@@ -35,7 +35,7 @@ class Record(Bundle):
 def allocate_record(robot: Robot, rows: int, events: int) -> Record:
     """Allocate a record of `rows` instants and `events` events."""
     extents = robot.model.extents | ROW_EXTENTS
-    return Record.allocate(nt=rows, ne=events, **extents)
+    return Record.allocate(extents, nt=rows, ne=events)
 
 
 ROW_EXTENTS = {"components": 2, "conditions": 3}

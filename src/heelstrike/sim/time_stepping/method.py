@@ -22,7 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
@@ -36,7 +36,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.dry_friction import press_dry_joints, select_dry_joints
+from heelstrike.sim.contacts.dry_friction import select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -59,12 +59,25 @@ from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
+from heelstrike.sim.time_stepping.impact import (
+    NEVER,
+    TOUCHING,
+    Impact,
+    allocate_impact,
+    begin_step,
+    call,
+    find_impact,
+    note_touching,
+    pose_impact,
+    solve_impact,
+)
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
 PAPER_EXPLICIT = int(Scheme.PAPER_EXPLICIT)
 PAPER_SYMPLECTIC = int(Scheme.PAPER_SYMPLECTIC)
 MOREAU_JEAN = int(Scheme.MOREAU_JEAN)
 LINEARLY_IMPLICIT = int(Scheme.LINEARLY_IMPLICIT)
+IMPACT_RESOLVED = int(Scheme.IMPACT_RESOLVED)
 
 # A contact point enters the problem when it could close within a step at this speed (m/s) or at
 # twice its free speed. Those that stay open get zero impulse from the solver, so that the choice
@@ -87,12 +100,15 @@ class Stepping(Bundle):
         Gap up to which a contact point takes part, for schemes that decide by it (m).
     order : (solvers,) int
         Contact solvers in the order in which they are tried.
+    impact : Impact
+        What closes in a step.
     """
 
     step: float = number(float)
     scheme: int = number(int)
     activation: float = number(float)
     order: Integers = array("solvers", of=int)
+    impact: Impact = part(Impact)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +141,7 @@ class TimeStepping(Method):
     """
 
     step: float = 1e-3
-    scheme: Scheme = Scheme.GAP_LINEARISED
+    scheme: Scheme = Scheme.IMPACT_RESOLVED
     solver: str = "lemke"
     activation: float = 0.0
 
@@ -158,28 +174,38 @@ class TimeStepping(Method):
         """Contact solver tried first."""
         return self.solver
 
-    def new_work(self, robot: Robot) -> Stepping:  # noqa: ARG002
+    def new_work(self, robot: Robot) -> Stepping:
         """Return what its kernels read."""
         return Stepping(
             step=self.step,
             scheme=int(self.scheme),
             activation=self.activation,
             order=solver_order(self.solver),
+            impact=allocate_impact(robot),
         )
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
         return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names)
 
+    def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
+        """What touched other ground says nothing of this one."""
+        work.impact.touching[: robot.nc] = NEVER
+
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
-        if self.scheme is not Scheme.MOREAU_JEAN and np.any(
-            setting.ground.model().restitution > 0.0
-        ):
+        bounces = self.scheme in (Scheme.MOREAU_JEAN, Scheme.IMPACT_RESOLVED)
+        if not bounces and np.any(setting.ground.model().restitution > 0.0):
             raise SimulationError(
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
-                f"restitution; use Scheme.MOREAU_JEAN"
+                f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
             )
+
+
+@dissolved_kernel
+def is_linearised(scheme: int) -> bool:
+    """Whether a scheme bounds the gap at the end of the step."""
+    return scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT, IMPACT_RESOLVED)
 
 
 @dissolved_kernel
@@ -256,7 +282,7 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
     """List the contact points that could act in this step, with their free terms."""
     contacts, assembly, step = memory.contacts, memory.assembly, work.step
     candidate, problem = assembly.candidate, assembly.problem
-    linearised = work.scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    linearised, calls = is_linearised(work.scheme), work.impact.calls
     farthest = FAR_STEPS * CLOSING_SPEED * step
     if work.scheme in (PAPER_EXPLICIT, PAPER_SYMPLECTIC):
         farthest = work.activation
@@ -277,7 +303,8 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
         gap = contacts.gap[contact]
         normal = velocity[contact, 0]
         if linearised:
-            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+            far = gap > step * max(CLOSING_SPEED, -2.0 * normal)
+            if far and (calls == 0 or work.impact.called[contact] == 0):
                 continue
             normal += gap / step
         elif work.scheme == MOREAU_JEAN:
@@ -299,7 +326,7 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
 def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
-    linearised = work.scheme in (GAP_LINEARISED, LINEARLY_IMPLICIT)
+    linearised, calls = is_linearised(work.scheme), work.impact.calls
     for joint in range(model.nv):
         for end in range(2):
             sign = 1.0 - 2.0 * end
@@ -308,7 +335,9 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
             normal = sign * memory.next_v[joint]
             before = sign * memory.v[joint]
             if linearised:
-                if not gap < step * max(CLOSING_RATE, -2.0 * normal):
+                far = not gap < step * max(CLOSING_RATE, -2.0 * normal)
+                place = model.nc + 2 * joint + end
+                if far and (calls == 0 or work.impact.called[place] == 0):
                     continue
                 normal += gap / step
             elif work.scheme == MOREAU_JEAN:
@@ -447,38 +476,124 @@ def push_candidates(
             v[j] += impulse[row] * assembly.jacobian[row, j]
 
 
+@kernel
+def push_all(
+    model: Model, near: int, count: int, straight: bool, contacts: Contacts, assembly: Assembly,
+    equations: Equations, usual: UsualPoints, v: Floats,
+) -> None:  # fmt: skip
+    """Add what the impulses of the candidates do to a velocity."""
+    if straight:
+        push_candidates(model, contacts, assembly, near, count, equations, usual, v)
+    else:
+        add_impulse(model, assembly, count, equations, v)
+
+
 @dissolved_kernel
-def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
-    """Turn the free velocity into the velocity at the end of the step; return success."""
+def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory: Memory) -> bool:
+    """Find the impulses of the candidates and add what they do to the velocity; return success."""
     assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
-    near = select_candidates(model, work, memory)
-    joints = select_stops(model, work, near, memory)
-    count = select_dry_joints(
-        model, joints, dry_joint, memory.reaction.dry_mode, memory.next_v, assembly
-    )
-    for i in range(3):
-        assembly.answer.residual[i] = 0.0
-    if count == 0:
-        note_answer(model, work.step, 0, memory)
-        return True
+    impact, step = work.impact, work.step
     straight = are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
+        joints = count - dry_joint.shape[0]
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, equations, count, assembly)
-    press_dry_joints(model, work.step, count, dry_joint, problem)
     problem.count = count
-    status = solve_contact_kernel(problem, work.order, assembly.solver, assembly.answer)
-    if straight:
-        push_candidates(model, contacts, assembly, near, count, equations, usual, memory.next_v)
-    else:
-        add_impulse(model, assembly, count, equations, memory.next_v)
+    solved = solve_contact_kernel(problem, work.order, assembly.solver, assembly.answer) == SOLVED
+    if work.scheme == IMPACT_RESOLVED:
+        members = find_impact(model, step, memory.q, contacts.gap, problem, assembly, impact)
+        if members > 0:
+            impact.happens = 1
+            arriving = impact.arriving
+            for j in range(model.nv):
+                arriving[j] = impact.free[j]
+            push_all(model, near, count, straight, contacts, assembly, equations, usual, arriving)
+            pose_impact(
+                model, step, members, memory.q, equations, contacts, memory.surface, problem,
+                assembly, impact,
+            )  # fmt: skip
+            solved = solve_impact(work.order, members, problem, impact, assembly) and solved
+    push_all(model, near, count, straight, contacts, assembly, equations, usual, memory.next_v)
+    return solved
+
+
+@dissolved_kernel
+def may_go_through(model: Model, step: float, near: int, v: Floats, memory: Memory) -> bool:
+    """Whether the velocity that was found could take something through a stop or the ground."""
+    q, gap = memory.q, memory.contacts.gap
+    beyond = 0
+    for joint in range(model.nv):
+        after = q[joint] + step * v[joint]
+        low, high = model.lower[joint] - TOUCHING, model.upper[joint] + TOUCHING
+        beyond += (after < low) | (after > high)
+    within = 0
+    for contact in range(model.nc):
+        within += gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
+    return beyond > 0 or within > near
+
+
+@kernel
+def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Impact) -> bool:
+    """Call what would go through at the velocity that was found; return if any is new."""
+    calls = impact.calls
+    usual, contacts = memory.usual, memory.contacts
+    point_velocities(
+        model, usual.every_point, contacts, v, memory.equations.tree, usual.point_velocity
+    )
+    for contact in range(model.nc):
+        if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -TOUCHING:
+            call(contact, impact)
+    for joint in range(model.nv):
+        after = memory.q[joint] + step * v[joint]
+        if after < model.lower[joint] - TOUCHING:
+            call(model.nc + 2 * joint, impact)
+        if after > model.upper[joint] + TOUCHING:
+            call(model.nc + 2 * joint + 1, impact)
+    return impact.calls > calls
+
+
+@dissolved_kernel
+def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
+    """Turn the free velocity into the velocity at the end of the step; return success.
+
+    What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
+    a candidate, is called and the step solved again.
+    """
+    assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
+    begin_step(memory.next_v, impact)
+    again = True
+    solved = True
+    count = 0
+    while again:
+        impact.happens = 0
+        for i in range(3):
+            assembly.answer.residual[i] = 0.0
+        near = select_candidates(model, work, memory)
+        count = select_stops(model, work, near, memory)
+        count = select_dry_joints(
+            model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
+        )
+        if count > 0:
+            solved = solve_candidates(model, near, count, work, memory)
+        v = impact.arriving if impact.happens == 1 else memory.next_v
+        again = (
+            is_linearised(work.scheme)
+            and solved
+            and may_go_through(model, work.step, near, v, memory)
+            and call_missed(model, work.step, v, memory, impact)
+        )
+        if again:
+            for j in range(model.nv):
+                memory.next_v[j] = impact.free[j]
+    if work.scheme == IMPACT_RESOLVED:
+        note_touching(model, assembly.candidate, count, impact)
     note_answer(model, work.step, count, memory)
-    return status == SOLVED
+    return solved
 
 
 @dissolved_kernel
@@ -546,7 +661,10 @@ def move(
             v[i] += next_v[i]
         integrate(model, q, v, 0.5 * work.step, q)
     else:
-        integrate(model, q, v if work.scheme == PAPER_EXPLICIT else next_v, work.step, q)
+        along = v if work.scheme == PAPER_EXPLICIT else next_v
+        if work.impact.happens == 1:
+            along = work.impact.arriving
+        integrate(model, q, along, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
     clock.time = clock.start + (clock.index + 1) * work.step

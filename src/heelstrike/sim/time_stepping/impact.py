@@ -1,0 +1,225 @@
+"""Impacts that are whole within the step they fall into.
+
+The gap at the end of a step, linearised, lets a contact that comes down arrive and no more: what is
+left of its speed is taken by the next step, from where the first one left it. One contact alone
+loses nothing by that. Two problems one after the other are not one problem, though, once other
+contacts or friction take part, and the state behind such an impact does not converge.
+
+So position and velocity part ways in a step in which a contact closes. Both start from the same
+free velocity v_f and Delassus matrix::
+
+    position   gap + h (J_n v_f + …)_n ≥ 0       the robot moves on with this velocity: it arrives
+    velocity   w = G λ + J v_f ≥ −e J_n v        of the contacts that touch: Newton's impact law
+
+The contacts of the impact are those that touch now and touched before or would close if they were
+free. It is for the contact that is *new* to say that there is an impact at all: one that touches at
+the end of this step, did not at the end of the last one, and is not there already. Elsewhere the
+two velocities are the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.contact.modes import OPEN, SOLVED
+from heelstrike.contact.problem import solve_contact_kernel
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.memory import Assembly, Equations, Surface, contact_capacity
+
+Floats = NDArray[np.float64]
+
+# A contact touches when its gap is no more than this (m).
+TOUCHING = 1e-9
+NEVER = -1
+
+
+class Impact(Bundle):
+    """What a step has to know of the contacts that close in it.
+
+    Attributes
+    ----------
+    happens : int
+        Whether an impact falls into this step.
+    step : int
+        Number of this step.
+    touching : (places,) int
+        The last step at whose end each contact point, and then each end of each joint, touched.
+    touches : (capacity,) int
+        Whether each candidate touches at the end of this step.
+    called : (places,) int
+        What takes part although it seemed too far away; `calls` tells whether there is any.
+    calls : int
+    free : (nv,) float
+        The free velocity.
+    arriving : (nv,) float
+        Where there is an impact, the velocity that positions move with.
+    member : (capacity,) int
+        The candidates that take part.
+    problem, answer : ContactProblem, ContactAnswer
+        The impact.
+    """
+
+    happens: int = cell(int)
+    step: int = cell(int)
+    touching: Integers = array("places", of=int)
+    touches: Integers = array("capacity", of=int)
+    called: Integers = array("places", of=int)
+    calls: int = cell(int)
+    free: Floats = array("nv")
+    arriving: Floats = array("nv")
+    member: Integers = array("capacity", of=int)
+    problem: ContactProblem = part(ContactProblem)
+    answer: ContactAnswer = part(ContactAnswer)
+
+
+def allocate_impact(robot: Robot) -> Impact:
+    """Allocate what the steps of a robot need, with nothing known yet."""
+    capacity = contact_capacity(robot)
+    places = robot.nc + 2 * robot.nv
+    return Impact.allocate(
+        nv=robot.nv,
+        capacity=capacity,
+        places=places,
+        touching=np.full(places, NEVER),
+        problem=ContactProblem.allocate(nc=capacity),
+        answer=ContactAnswer.allocate(nc=capacity),
+    )
+
+
+@kernel
+def gap_of(model: Model, q: Floats, gap: Floats, candidate: int) -> float:
+    """Gap of a contact point or a joint stop."""
+    stop = candidate - model.nc
+    if stop < 0:
+        return gap[candidate]
+    if stop % 2 == 1:
+        return model.upper[stop // 2] - q[stop // 2]
+    return q[stop // 2] - model.lower[stop // 2]
+
+
+@dissolved_kernel
+def begin_step(velocity: Floats, impact: Impact) -> None:
+    """Keep the free velocity; nothing is called yet."""
+    for j in range(velocity.shape[0]):
+        impact.free[j] = velocity[j]
+    impact.step += 1
+    if impact.calls > 0:
+        impact.calls = 0
+        for place in range(impact.called.shape[0]):
+            impact.called[place] = 0
+
+
+@dissolved_kernel
+def call(place: int, impact: Impact) -> None:
+    """Call a contact point or stop to take part."""
+    impact.calls += 1 - impact.called[place]
+    impact.called[place] = 1
+
+
+@dissolved_kernel
+def note_touching(model: Model, candidate: Integers, count: int, impact: Impact) -> None:
+    """Keep which of the candidates touch at the end of this step."""
+    closable = model.nc + 2 * model.nv
+    touches, touching = impact.touches, impact.touching
+    for place in range(count):
+        if touches[place] == 1 and candidate[place] < closable:
+            touching[candidate[place]] = impact.step
+
+
+@dissolved_kernel
+def find_impact(
+    model: Model, step: float, q: Floats, gap: Floats, problem: ContactProblem,
+    assembly: Assembly, impact: Impact,
+) -> int:  # fmt: skip
+    """Find what touches at the end of the step; return how many take part in an impact.
+
+    Zero if there is none. `problem` is that of the positions, solved. Writes `impact`.
+    """
+    closable = model.nc + 2 * model.nv
+    touches, member = impact.touches, impact.member
+    members = 0
+    happens = False
+    for place in range(problem.count):
+        candidate = assembly.candidate[place]
+        if candidate >= closable:  # dry friction is always there
+            member[members] = place
+            members += 1
+            continue
+        # With the linearised gap in the free term these are gaps at the end, divided by the step.
+        arrives = step * assembly.answer.velocity[2 * place] <= TOUCHING
+        closes = problem.free[2 * place] < 0.0
+        now = gap_of(model, q, gap, candidate)
+        there = now <= TOUCHING
+        touched = impact.touching[candidate] == impact.step - 1
+        new = closes and not touched and not there
+        happens = happens or (arrives and (new or now < -TOUCHING))
+        touches[place] = arrives
+        if there or (arrives and (touched or closes)):
+            member[members] = place
+            members += 1
+    return members if happens else 0
+
+
+@kernel
+def pose_impact(
+    model: Model, step: float, members: int, q: Floats, equations: Equations, contacts: Contacts,
+    surface: Surface, problem: ContactProblem, assembly: Assembly, impact: Impact,
+) -> None:  # fmt: skip
+    """Write the problem of the impact: what takes part, without the gaps, with restitution."""
+    its = impact.problem
+    for place in range(members):
+        source = impact.member[place]
+        for other in range(members):
+            column = 2 * impact.member[other]
+            for i in range(2):
+                for j in range(2):
+                    entry = problem.delassus[2 * source + i, column + j]
+                    its.delassus[2 * place + i, 2 * other + j] = entry
+        candidate = assembly.candidate[source]
+        normal = problem.free[2 * source]
+        if candidate < model.nc + 2 * model.nv:
+            normal -= gap_of(model, q, contacts.gap, candidate) / step
+        if candidate < model.nc:
+            before, _ = contact_velocity(model, equations.tree, contacts, candidate)
+            normal += surface.restitution[candidate] * before
+        its.free[2 * place] = normal
+        its.free[2 * place + 1] = problem.free[2 * source + 1]
+        its.friction[place] = problem.friction[source]
+        its.set[place] = problem.set[source]
+        its.bound[place] = problem.bound[source]
+        impact.answer.mode[place] = assembly.answer.mode[source]
+    its.count = members
+
+
+@kernel
+def solve_impact(
+    order: Integers, members: int, problem: ContactProblem, impact: Impact, assembly: Assembly
+) -> bool:
+    """Put the answer of the impact in the place of that of the positions; return success."""
+    status = solve_contact_kernel(impact.problem, order, assembly.solver, impact.answer)
+    answer, its = assembly.answer, impact.answer
+    for place in range(problem.count):
+        answer.mode[place] = OPEN
+        answer.impulse[2 * place] = 0.0
+        answer.impulse[2 * place + 1] = 0.0
+    for place in range(members):
+        source = impact.member[place]
+        answer.mode[source] = its.mode[place]
+        answer.impulse[2 * source] = its.impulse[2 * place]
+        answer.impulse[2 * source + 1] = its.impulse[2 * place + 1]
+    for place in range(problem.count):
+        row = 2 * place + 1
+        slip = problem.free[row]
+        for column in range(2 * problem.count):
+            slip += problem.delassus[row, column] * answer.impulse[column]
+        answer.velocity[row] = slip
+    for i in range(3):
+        answer.residual[i] = max(answer.residual[i], its.residual[i])
+    return status == SOLVED
