@@ -113,7 +113,9 @@ def test_how_a_file_is_read(tmp_path: Path) -> None:
     """A robot that walks along y, in another pose: as it is along x."""
     path = load_robot("bravo7").save(tmp_path / "r.xml")
     text = path.read_text("utf-8")
-    turned = text.replace('<body name="trunk"', '<body name="trunk" euler="0 0 1.5707963267948966"', 1)
+    turned = text.replace(
+        '<body name="trunk"', '<body name="trunk" euler="0 0 1.5707963267948966"', 1
+    )
     assert turned != text
     path.write_text(turned, "utf-8")
     options = ["--forward", "y", "--pose", "left_knee=23deg"]

@@ -13,6 +13,7 @@ import numpy as np
 from heelstrike.errors import RobotError, WriteError
 from heelstrike.robot.assembly import LARGEST_NUMBER, link_origins
 from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
+from heelstrike.robot.files.shapes import PREFIX
 from heelstrike.robot.model import PROPERTIES, Floats, Integers, label
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
@@ -60,10 +61,14 @@ def mjcf(robot: Robot) -> Element:
     SubElement(root, "compiler", angle="radian", autolimits="true")
     SubElement(root, "option", gravity=_numbers((model.gravity[0], 0.0, model.gravity[1])))
     custom = [(name, joint) for name in CUSTOM for joint in _given(robot, name)]
-    holder = SubElement(root, "custom") if custom else root
+    holder = SubElement(root, "custom") if custom or robot.outlines else root
     for name, joint in custom:
         data = _number(getattr(model, name)[joint])
         SubElement(holder, "numeric", name=f"{name}:{robot.joint_names[joint]}", data=data)
+    for count, outline in enumerate(robot.outlines):
+        name = f"{PREFIX}:{count}:{robot.joint_names[outline.link]}"
+        data = _numbers((outline.radius, *outline.corners.ravel()))
+        SubElement(holder, "numeric", name=name, data=data)
     default = SubElement(root, "default")
     SubElement(default, "geom", contype="0", conaffinity="0", rgba="0.55 0.60 0.68 1")
     world = SubElement(root, "worldbody")
@@ -277,6 +282,8 @@ def _warn_of_what_urdf_cannot_hold(robot: Robot) -> None:
         for what, joints in lost.items()
         if len(joints)
     ]
+    if robot.outlines:
+        said.append("outlines, for pictures")
     if said:
         warn(
             f"{robot.name}: a URDF file cannot hold everything this robot has. Left out: "
