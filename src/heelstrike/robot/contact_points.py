@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.convex import lowest_chain
+from heelstrike.robot.convex import lowest_chain, touches_first
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
@@ -68,7 +68,8 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     lowest edge in the reference configuration. Its upper corners are left out: they meet flat
     ground only when the robot has fallen, and every contact point costs time in every step. Whoever
     needs them adds spheres of radius 1e-6 there. Of a mesh it is the corners of its convex outline
-    on which it stands and rolls; see :func:`~heelstrike.robot.convex.lowest_chain`.
+    on which it stands and rolls, but for those that others of its link always keep off the ground;
+    see :mod:`heelstrike.robot.convex`.
 
     Parameters
     ----------
@@ -88,6 +89,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
         If they are more than `MOST_POINTS`.
     """
     points: list[ContactPoint] = []
+    of_meshes: set[ContactPoint] = set()
     skipped: list[str] = []
     model, pose = file.model, file.pose
     for geom in _geoms_that_touch(file, links):
@@ -107,13 +109,15 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
         friction = float(model.geom_friction[geom, 0])
         for x, z in centers - links.origin[link]:
             points.append(ContactPoint(link, float(x), float(z), radius, friction))
+            if model.geom_type[geom] == MESH:
+                of_meshes.add(points[-1])
     if skipped:
         warn(
             f"{file.source}: these geoms cannot touch the ground here, because their shape "
             f"(ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
             "spheres, capsules or boxes where the robot meets the ground."
         )
-    points = in_order(points)
+    points = in_order(_without_idle(points, of_meshes))
     if len(points) > MOST_POINTS:
         raise file.error(
             f"the robot has {len(points)} contact points, and heelstrike takes up to "
@@ -121,6 +125,17 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
             'conaffinity="0".'
         )
     return points
+
+
+def _without_idle(points: list[ContactPoint], some: set[ContactPoint]) -> list[ContactPoint]:
+    """Leave out those of some points that never come first where their link meets the ground."""
+    kept = []
+    for link in sorted({point.link for point in points}):
+        own = [point for point in points if point.link == link]
+        place = np.array([(point.x, point.z) for point in own])
+        first = touches_first(place, np.array([point.radius for point in own]))
+        kept += [p for p, touches in zip(own, first, strict=True) if touches or p not in some]
+    return kept
 
 
 def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:

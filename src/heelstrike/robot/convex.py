@@ -68,6 +68,16 @@ def lowest_chain(points: Floats) -> Floats:
     return np.concatenate((behind, ahead[front == back :]))
 
 
+def touches_first(points: Floats, radius: Floats) -> NDArray[np.bool_]:
+    """Which of the discs about points (n, 2) flat ground meets first at some tilt up to 45 degrees.
+
+    Those that come as near as the lowest of them do, to `LEVEL`, count.
+    """
+    tilt = np.arctan(STEEPEST) * np.linspace(-1.0, 1.0, 91)
+    depth = points @ np.array([np.sin(tilt), -np.cos(tilt)]) + radius[:, None]
+    return np.any(depth >= depth.max(axis=0) - LEVEL, axis=1)
+
+
 def _outwards(chain: Floats, least: float) -> Floats:
     """Corners of a chain that rises from its first, up to the steepest, the outstanding ones."""
     steps = np.diff(chain, axis=0)

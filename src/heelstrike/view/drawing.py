@@ -1,9 +1,9 @@
 """The shape of a robot as line segments: what figures, animations and portraits are made of.
 
 A robot is drawn by the outlines of its links (`Robot.outlines`). Links without outlines, and the
-drawings of a terminal, are made from the tree alone: a bone from every link to the links it carries, a sole
-through the contact points (or spokes to them, where they lie around the joint), and a bone to twice
-the distance of the centre of mass where a link ends, so that a trunk has a height.
+drawings of a terminal, are made from the tree alone: a bone from every link to the links it
+carries, a sole through the contact points (or spokes to them, where they lie around the joint), and
+a bone to twice the distance of the centre of mass where a link ends, so that a trunk has a height.
 Massless links, the carriers of a floating base, are not drawn.
 """
 
