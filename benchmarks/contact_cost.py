@@ -36,7 +36,7 @@ def solve_many(repeats: int, problem: Any, order: Any, first: Any, work: Any, an
     for _ in range(repeats):
         for i in range(problem.count):
             answer.mode[i] = first[i]
-        failures += solve_contact_kernel(problem, order, work, answer) != 0
+        failures += solve_contact_kernel(order, problem, work, answer) != 0
     return failures
 
 
@@ -86,7 +86,7 @@ def measure(number: int = 200, repeats: int = 20) -> dict[str, dict[str, float]]
             problem = ContactProblem.allocate(
                 nc=count, count=count, delassus=delassus, free=free, friction=friction
             )
-            solve_contact_kernel(problem, order, work, answer)
+            solve_contact_kernel(order, problem, work, answer)
             first = answer.mode.copy() if name == "warm" else cold
             rest = (problem, order, first, work, answer)
             if solve_many(1, *rest) != 0:

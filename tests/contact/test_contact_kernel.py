@@ -62,7 +62,7 @@ class Caller:
         problem.free[: 2 * count] = b
         problem.friction[:count] = friction
         codes = np.array(order, np.int64)
-        return int(solve_contact_kernel(problem, codes, self.work, self.answer))
+        return int(solve_contact_kernel(codes, problem, self.work, self.answer))
 
 
 def test_only_the_leading_blocks_are_touched() -> None:

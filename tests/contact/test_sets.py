@@ -66,7 +66,7 @@ def with_line(seed: int) -> ContactProblem:
 def solved(problem: ContactProblem, solver: int) -> Floats:
     work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
     work.settings.amendments = 0
-    assert solve_contact_kernel(problem, np.array([solver]), work, answer) == SOLVED
+    assert solve_contact_kernel(np.array([solver]), problem, work, answer) == SOLVED
     return answer.impulse
 
 
@@ -149,7 +149,7 @@ def test_intervals_against_enumeration(solver: int, slack: int) -> None:
         found = solutions(*given, problem.bound)
         work, answer = contact_workspace(4), ContactAnswer.allocate(nc=4)
         work.settings.amendments = 0
-        if solve_contact_kernel(problem, np.array([solver]), work, answer) != SOLVED:
+        if solve_contact_kernel(np.array([solver]), problem, work, answer) != SOLVED:
             continue
         rows = [0, 1, 3, 4, 5, 7]
         velocity = answer.velocity[rows]

@@ -234,6 +234,8 @@ class Bundle:
             elif not isinstance(value, member.kind):
                 raise TypeError(f"{type(self).__name__}.{name} is a {member.kind.__name__}")
             own[name] = value
+        for name in members:
+            raise TypeError(f"{type(self).__name__} has no {name}")
 
     def __setattr__(self, name: str, value: Any) -> None:
         member = self.declared.get(name)

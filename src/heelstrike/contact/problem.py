@@ -32,7 +32,7 @@ from heelstrike.errors import ContactProblemError
 
 @kernel
 def solve_contact_kernel(
-    problem: ContactProblem, order: Integers, work: ContactWorkspace, answer: ContactAnswer
+    order: Integers, problem: ContactProblem, work: ContactWorkspace, answer: ContactAnswer
 ) -> int:
     """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
 
@@ -42,10 +42,10 @@ def solve_contact_kernel(
 
     Parameters
     ----------
-    problem : ContactProblem
-        Of intervals the normal rows are written here, and may hold anything.
     order : (any,) int64
         Solver codes to try in turn (:class:`~heelstrike.contact.modes.Solver`).
+    problem : ContactProblem
+        Of intervals the normal rows are written here, and may hold anything.
     work : ContactWorkspace
         Buffers; ``tally`` is updated, ``settings`` are read.
     answer : ContactAnswer
@@ -225,7 +225,7 @@ def run_solvers(
         nc=count, count=count, delassus=matrix, free=offset, friction=friction
     )
     answer = ContactAnswer.allocate(nc=count, mode=mode)
-    status = SolveStatus(solve_contact_kernel(problem, order, work, answer))
+    status = SolveStatus(solve_contact_kernel(order, problem, work, answer))
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.
     worst = certify(problem, work.settings, work.yardstick, answer)
     error = velocity_error(worst, friction, work.yardstick)

@@ -8,8 +8,8 @@ from heelstrike.robot.inspection import Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import JointProperties, Model
-from heelstrike.robot.plausibility import Finding, FindingKind
 from heelstrike.robot.outlines import Outline
+from heelstrike.robot.plausibility import Finding, FindingKind
 from heelstrike.robot.robot import Foot, LockedJoint, Robot
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import RobotWarning
@@ -23,9 +23,9 @@ __all__ = [
     "JointProperties",
     "LoadOptions",
     "LockedJoint",
-    "Outline",
     "Mirror",
     "Model",
+    "Outline",
     "Robot",
     "RobotBuilder",
     "RobotWarning",

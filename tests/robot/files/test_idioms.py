@@ -203,6 +203,30 @@ def test_a_mass_that_is_none_needs_no_inertia() -> None:
     assert_judged(read_mjcf(changed(walker(), ('<link name="lift"/>', bare))), walker())
 
 
+TILTED = """<mujoco><compiler {}/><worldbody><body><joint axis="0 1 0"/>
+  <inertial pos="0 0 -1" mass="2" diaginertia="0.1 {} 0.1"/><geom size="0.1" mass="3"/>
+  </body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("compiler", "moment", "expected"),
+    [
+        ('settotalmass="6"', 0.9, 2.7),
+        ('inertiafromgeom="true"', 0.9, 0.4 * 3 * 0.1**2),
+        ('boundinertia="0.3"', 0.0001, 0.3),
+        ('balanceinertia="true"', 0.9, 1.1 / 3.0),
+    ],
+)
+def test_what_the_compiler_of_an_mjcf_asks_for_holds(
+    compiler: str, moment: float, expected: float
+) -> None:
+    """MuJoCo's own attributes change moments that are possible, and those that are not alike."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        robot = read_mjcf(TILTED.format(compiler, moment))
+    np.testing.assert_allclose(robot.model.inertia, expected, rtol=1e-13)
+
+
 # Links, joints, shapes
 
 

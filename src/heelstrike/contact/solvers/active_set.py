@@ -211,7 +211,7 @@ def mode_of_slip(velocity: float, rest: float) -> int:
 
 
 @kernel
-def label(count: int, answer: ContactAnswer, reduced: ReducedProblem, yardstick: Yardstick) -> bool:
+def label(count: int, reduced: ReducedProblem, yardstick: Yardstick, answer: ContactAnswer) -> bool:
     """Name every contact's mode from its velocity; return whether that is another problem.
 
     A contact that a solver calls open or slipping, but whose velocity is zero, may carry any

@@ -199,7 +199,7 @@ def release(
     the answer now, and its residual.
     """
     for _ in range(ROUNDS):
-        if not label(problem.count, answer, work.reduced, work.yardstick):
+        if not label(problem.count, work.reduced, work.yardstick, answer):
             return True, best
         for contact in range(problem.count):
             work.trial.mode[contact] = answer.mode[contact]

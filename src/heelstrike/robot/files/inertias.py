@@ -46,9 +46,14 @@ def take_out(spec: Any) -> list[tuple[Any, Floats]]:
     Returns
     -------
     list of (mujoco.MjsBody, (3, 3) float)
-        The bodies and their tensors.
+        The bodies and their tensors; none if the file asks for others than it states.
     """
-    taken = []
+    import mujoco
+
+    taken: list[tuple[Any, Floats]] = []
+    weighed = spec.compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+    if weighed or spec.compiler.balanceinertia:
+        return taken
     for body in spec.bodies:
         tensor = stated_tensor(body)
         if tensor is None or not np.all(np.isfinite(tensor)):
@@ -62,7 +67,9 @@ def take_out(spec: Any) -> list[tuple[Any, Floats]]:
     return taken
 
 
-def put_back(model: Any, pose: Any, taken: list[tuple[Any, Floats]], label: str) -> None:
+def put_back(
+    model: Any, pose: Any, taken: list[tuple[Any, Floats]], least: float, label: str
+) -> None:
     """Give bodies the moments about the plane's normal that their file states.
 
     Parameters
@@ -73,6 +80,8 @@ def put_back(model: Any, pose: Any, taken: list[tuple[Any, Floats]], label: str)
         Its pose, in which y is the normal.
     taken : list
         What `take_out` returned.
+    least : float
+        The least moment that the file lets a body have.
     label : str
         What to call the file in messages.
 
@@ -98,7 +107,7 @@ def put_back(model: Any, pose: Any, taken: list[tuple[Any, Floats]], label: str)
             )
         # What the parser made of the stand-in: a file may ask for another mass of the whole.
         share = float(model.body_inertia[place, 0]) / _size(tensor)
-        model.body_inertia[place] = max(moment, 0.0) * share
+        model.body_inertia[place] = max(moment, least) * share
         if not is_possible(tensor) and not _is_planar(tensor, normal, moment):
             impossible.append(name)
     if impossible:

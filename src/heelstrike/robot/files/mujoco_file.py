@@ -141,12 +141,12 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
             spec = _parsed(source, file, label, options.packages)
             if options.lenient:
                 let_massless_links_pass(spec)
-            taken = [] if spec.compiler.balanceinertia else take_out(spec)
+            taken = take_out(spec)
             model = compiled(spec, remarks)
             held = not urdf or any(link.get("name") == WORLD for link in xml.iterfind("link"))
             plane = flatten(model, options, label, hanging=not held)
             refuse_missing(plane.model, plane.pose, missing, label)
-            put_back(plane.model, plane.pose, taken, label)
+            put_back(plane.model, plane.pose, taken, spec.compiler.boundinertia, label)
     except RobotError:
         raise
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:

@@ -13,7 +13,7 @@ import numpy as np
 from heelstrike.errors import RobotError, WriteError
 from heelstrike.robot.assembly import LARGEST_NUMBER, link_origins
 from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
-from heelstrike.robot.files.shapes import PREFIX
+from heelstrike.robot.files.shapes import COUNT, PREFIX
 from heelstrike.robot.model import PROPERTIES, Floats, Integers, label
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
@@ -61,10 +61,11 @@ def mjcf(robot: Robot) -> Element:
     SubElement(root, "compiler", angle="radian", autolimits="true")
     SubElement(root, "option", gravity=_numbers((model.gravity[0], 0.0, model.gravity[1])))
     custom = [(name, joint) for name in CUSTOM for joint in _given(robot, name)]
-    holder = SubElement(root, "custom") if custom or robot.outlines else root
+    holder = SubElement(root, "custom")
     for name, joint in custom:
         data = _number(getattr(model, name)[joint])
         SubElement(holder, "numeric", name=f"{name}:{robot.joint_names[joint]}", data=data)
+    SubElement(holder, "numeric", name=COUNT, data=str(len(robot.outlines)))
     for count, outline in enumerate(robot.outlines):
         name = f"{PREFIX}:{count}:{robot.joint_names[outline.link]}"
         data = _numbers((outline.radius, *outline.corners.ravel()))

@@ -8,12 +8,15 @@ from heelstrike.robot.convex import Floats, convex_hull, with_fewer_corners
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.outlines import Outline, without_hidden
+from heelstrike.robot.warning import warn
 
 SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(2, 8)  # MuJoCo's mjtGeom
 
 PREFIX = "outline"
 """Outlines that were saved are custom data ``outline:NUMBER:JOINT``: radius, then x and z of each
 corner in the frame of the link that the joint moves."""
+COUNT = "outlines"
+"""The custom number of them, which is zero for a robot that has none."""
 
 TURN = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(TURN), np.sin(TURN)))
@@ -26,8 +29,8 @@ def read_outlines(file: MujocoFile, links: Links) -> tuple[Outline, ...]:
     which are there to be seen, or the others if there are none.
     """
     saved = _saved(file)
-    if saved:
-        return tuple(saved)
+    if saved is not None:
+        return saved
     model = file.model
     shown = (model.geom_contype | model.geom_conaffinity) == 0
     found: list[Outline] = []
@@ -80,15 +83,21 @@ def mesh_corners(file: MujocoFile, geom: int) -> Floats:
     return np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
 
 
-def _saved(file: MujocoFile) -> list[Outline]:
+def _saved(file: MujocoFile) -> tuple[Outline, ...] | None:
+    """Outlines that were saved with a robot, None if it was not saved by us."""
     model = file.model
     link = {one.name: index for index, one in enumerate(file.coordinates)}
+    count = None
     found = []
     for numeric in range(model.nnumeric):
         held, _, name = file.given_name("numeric", numeric).partition(":")
         joint = name.partition(":")[2]
-        first, count = int(model.numeric_adr[numeric]), int(model.numeric_size[numeric])
-        data = np.array(model.numeric_data[first : first + count])
-        if held == PREFIX and joint in link and count % 2 and count > 1:
+        first, size = int(model.numeric_adr[numeric]), int(model.numeric_size[numeric])
+        data = np.array(model.numeric_data[first : first + size])
+        if held == COUNT:
+            count = data[0]
+        elif held == PREFIX and joint in link and size % 2 and size > 1:
             found.append(Outline(link[joint], data[1:].reshape(-1, 2), float(data[0])))
-    return found
+    if count is not None and count != len(found):
+        warn(f"{file.source}: {count:g} outlines were saved, of which {len(found)} are there.")
+    return None if count is None else tuple(found)

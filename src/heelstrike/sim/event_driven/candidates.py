@@ -36,7 +36,7 @@ def solve_candidates(
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
     problem.count = count
-    return int(solve_contact_kernel(problem, phase.order, assembly.solver, assembly.answer))
+    return int(solve_contact_kernel(phase.order, problem, assembly.solver, assembly.answer))
 
 
 @kernel

@@ -203,7 +203,7 @@ def solve_impact(
     order: Integers, members: int, problem: ContactProblem, impact: Impact, assembly: Assembly
 ) -> bool:
     """Put the answer of the impact in the place of that of the positions; return success."""
-    status = solve_contact_kernel(impact.problem, order, assembly.solver, impact.answer)
+    status = solve_contact_kernel(order, impact.problem, assembly.solver, impact.answer)
     answer, its = assembly.answer, impact.answer
     for place in range(problem.count):
         answer.mode[place] = OPEN

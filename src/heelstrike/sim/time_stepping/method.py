@@ -504,7 +504,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, equations, count, assembly)
     problem.count = count
-    solved = solve_contact_kernel(problem, work.order, assembly.solver, assembly.answer) == SOLVED
+    solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
     if work.scheme == IMPACT_RESOLVED:
         members = find_impact(model, step, memory.q, contacts.gap, problem, assembly, impact)
         if members > 0:
