@@ -52,11 +52,7 @@ def test_a_finding_is_said_and_counts(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["inspect", str(path)])
     assert result.exit_code == 1
     assert "feet of different friction: right_foot 0.5 and 0.75, left_foot 0.75" in result.stdout
-<<<<<<< HEAD
-    assert "left and right differ" not in result.stdout  # for the ground has the last word
-=======
     assert "left and right differ" not in result.stdout  # the ground's friction acts
->>>>>>> house
     assert result.stderr == ""
     told = json.loads(CliRunner().invoke(app, ["inspect", str(path), "--json"]).stdout)
     assert len(told["findings"]) == 1
@@ -76,11 +72,7 @@ def test_a_robot_in_space(tmp_path: Path) -> None:
     assert not picture.exists()
     result = CliRunner().invoke(app, ["inspect", str(path), "--projected"])
     assert "right_ankle" in result.stdout
-<<<<<<< HEAD
-    assert "locked: roll. Robot.locked is their table" in result.stdout
-=======
     assert "1 joint is locked: roll" in result.stdout
->>>>>>> house
 
 
 @pytest.mark.parametrize(

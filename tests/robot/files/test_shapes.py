@@ -94,3 +94,27 @@ def test_saved_and_loaded_without_loss(name: str, tmp_path: Path) -> None:
 def test_urdf_says_that_it_drops_them(tmp_path: Path) -> None:
     with pytest.warns(hs.RobotWarning, match="outlines, for pictures"):
         hs.load_robot("rabbit").save(tmp_path / "rabbit.urdf")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (('data="0.07 ', 'data="-0.07 '), "outline:0:root_pitch must be a radius >= 0"),
+        (('data="0.07 ', 'data="nan '), "outline:0:root_pitch must be a radius >= 0"),
+    ],
+)
+def test_spoilt_outlines(change: tuple[str, str], said: str, tmp_path: Path) -> None:
+    path = hs.load_robot("bravo7").save(tmp_path / "robot.xml")
+    text = path.read_text(encoding="utf-8")
+    assert change[0] in text
+    path.write_text(text.replace(*change, 1), encoding="utf-8")
+    with pytest.raises(hs.RobotError, match=said):
+        hs.load_robot(path)
+
+
+def test_lost_outlines_are_missed(tmp_path: Path) -> None:
+    path = hs.load_robot("rabbit").save(tmp_path / "robot.xml")
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace('name="outline:0:', 'name="note:0:', 1), encoding="utf-8")
+    with pytest.warns(hs.RobotWarning, match="5 outlines were saved, of which 4 are there"):
+        hs.load_robot(path)

@@ -283,7 +283,11 @@ def _warn_of_what_urdf_cannot_hold(robot: Robot) -> None:
         for what, joints in lost.items()
         if len(joints)
     ]
-    if robot.outlines:
+    seen = zip(
+        model.contact_link, map(tuple, model.contact_position), model.contact_radius, strict=True
+    )
+    discs = set(seen)  # which are spheres there
+    if any((o.link, *map(tuple, o.corners), o.radius) not in discs for o in robot.outlines):
         said.append("outlines, for pictures")
     if said:
         warn(

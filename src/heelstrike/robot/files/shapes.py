@@ -84,7 +84,13 @@ def mesh_corners(file: MujocoFile, geom: int) -> Floats:
 
 
 def _saved(file: MujocoFile) -> tuple[Outline, ...] | None:
-    """Outlines that were saved with a robot, None if it was not saved by us."""
+    """Outlines that were saved with a robot, None if it was not saved by us.
+
+    Raises
+    ------
+    RobotError
+        If one has numbers that are impossible.
+    """
     model = file.model
     link = {one.name: index for index, one in enumerate(file.coordinates)}
     count = None
@@ -97,6 +103,10 @@ def _saved(file: MujocoFile) -> tuple[Outline, ...] | None:
         if held == COUNT:
             count = data[0]
         elif held == PREFIX and joint in link and size % 2 and size > 1:
+            if not (np.all(np.isfinite(data)) and data[0] >= 0.0):
+                raise file.error(
+                    f"the {PREFIX}:{name} must be a radius >= 0 and places of corners."
+                )
             found.append(Outline(link[joint], data[1:].reshape(-1, 2), float(data[0])))
     if count is not None and count != len(found):
         warn(f"{file.source}: {count:g} outlines were saved, of which {len(found)} are there.")
