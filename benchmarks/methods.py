@@ -377,7 +377,7 @@ def orders() -> Iterator[Line]:
                      hs.Ground(friction=0.5), hs.TimeStepping(step=h)).position[-1, 0] - 4.0 / G)
         for h in STEPS
     ]  # fmt: skip
-    yield at_least("order: sliding stop, gap-linearised", order(STEPS, errors), 0.9)
+    yield at_least("order: sliding stop", order(STEPS, errors), 0.9)
     end = 3.0 / (3.0 * 0.2 * G)
     exact = (3.0 - 0.1 * G * end) * end + 2.0 * end
     steps = [end / (count + 0.5) for count in (250, 500, 1000, 2000)]
@@ -387,7 +387,7 @@ def orders() -> Iterator[Line]:
             - exact)
         for h in steps
     ]  # fmt: skip
-    yield at_least("order: disc that comes to roll, gap-linearised", order(steps, errors), 0.9)
+    yield at_least("order: disc that comes to roll", order(steps, errors), 0.9)
 
 
 # --- Walks ---------------------------------------------------------------------------------------
@@ -414,6 +414,7 @@ def walks() -> Iterator[Line]:
         **{
             f"{scheme.name.lower()}, h = {h:g}": hs.TimeStepping(step=h, scheme=scheme)
             for scheme, h in (
+                (Scheme.IMPACT_RESOLVED, 1e-3),
                 (Scheme.GAP_LINEARISED, 1e-3),
                 (Scheme.LINEARLY_IMPLICIT, 1e-3),
                 (Scheme.MOREAU_JEAN, 1e-4),

@@ -182,6 +182,13 @@ def urdf_truth(text: str, names: tuple[str, ...], q: np.ndarray) -> Truth:
                     friction[index] = float(dyn.get("friction", "0"))
             child = joint.find("child").attrib["link"]  # type: ignore[union-attr]
             pending.append((child, there, moved))
+    if gears := list(root.iterfind("transmission")):
+        driven = [gear.find("joint").attrib["name"] for gear in gears]  # type: ignore[union-attr]
+        torque[[name not in driven for name in names]] = 0.0
+        for name, gear in zip(driven, gears, strict=True):
+            ratio = float(gear.findtext("actuator/mechanicalReduction", "1"))
+            rotor = float(gear.findtext("actuator/motorInertia", "0"))
+            mass_matrix[names.index(name), names.index(name)] += ratio**2 * rotor
     return {
         "mass matrix": mass_matrix,
         "gravity": gravity_force,

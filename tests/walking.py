@@ -27,7 +27,7 @@ def gait() -> hs.Gait:
 
 
 @cache
-def walk(*, steps: int = 20, step: float = 1e-3, scheme: Scheme = Scheme.GAP_LINEARISED) -> hs.Run:
+def walk(*, steps: int = 20, step: float = 1e-3, scheme: Scheme = Scheme.IMPACT_RESOLVED) -> hs.Run:
     """Walk the reference gait by computed torque."""
     return hs.simulate(
         bravo7(),

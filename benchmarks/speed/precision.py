@@ -86,7 +86,7 @@ def _settings(scenario: Scenario, *, quick: bool, peers: Sequence[str]) -> Itera
     for rtol in (1e-5, 1e-8) if quick else (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
         adaptive = EventDriven(rtol=rtol, atol=1e-2 * rtol, output_period=None)
         yield _own(scenario, "EventDriven", f"rtol {rtol:.0e}", adaptive)
-    schemes = [Scheme.GAP_LINEARISED]
+    schemes = [Scheme.IMPACT_RESOLVED]
     if not quick:
         schemes += [Scheme.LINEARLY_IMPLICIT, Scheme.MOREAU_JEAN]
     for scheme in schemes:

@@ -172,6 +172,8 @@ def _entries(path: str | PathLike[str], kind: str, error: type[HeelstrikeError])
         if file.stat().st_size > LARGEST_FILE:
             raise error(f"larger than {LARGEST_FILE // 2**20} MB; is it a {kind}?")
         data = json.loads(file.read_text(encoding="utf-8-sig"), parse_constant=refuse)
+    except error:  # which may be a ValueError, too
+        raise
     except OSError as cause:
         raise error(f"cannot be read: {cause.strerror or cause}.") from cause
     except UnicodeDecodeError as cause:

@@ -78,7 +78,7 @@ def test_every_claim_has_a_verdict_that_is_tested() -> None:
 
 
 def test_default_scheme_walks_at_both_steps(evidence: Evidence) -> None:
-    walked = {row.step: row for row in evidence.refinement if row.scheme is Scheme.GAP_LINEARISED}
+    walked = {row.step: row for row in evidence.refinement if row.scheme is Scheme.IMPACT_RESOLVED}
     for step, tracking in ((1e-3, 2e-3), (1e-4, 1e-3)):
         found = walked[step].summary
         assert found.status == "completed"
@@ -123,7 +123,7 @@ def test_order_is_that_of_made_up_errors(
 
 def test_orders_count_where_the_ground_is_kept(evidence: Evidence) -> None:
     """Whatever comes of a scheme that loses it, which rounding decides."""
-    default = next(c for c in evidence.convergence if c.scheme is Scheme.GAP_LINEARISED)
+    default = next(c for c in evidence.convergence if c.scheme is Scheme.IMPACT_RESOLVED)
     assert default.lost == 0.0
     for order, lost, verdict in (
         (4.9, 0.1, Verdict.HOLDS),

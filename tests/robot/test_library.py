@@ -364,7 +364,7 @@ def test_what_is_no_robot_file(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="directory"):
         load_robot(tmp_path / "robots.xml")
     (tmp_path / "robot.txt").write_text(PENDULUM)
-    with pytest.raises(RobotError, match=r"expected an MJCF file \(.xml\) or a URDF"):
+    with pytest.raises(RobotError, match=r"expected an MJCF file \(.xml\), a URDF file"):
         load_robot(tmp_path / "robot.txt")
     with pytest.raises(RobotError):
         load_robot("a\0b.xml")

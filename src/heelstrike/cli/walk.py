@@ -66,6 +66,7 @@ class Scheme(StrEnum):
     PAPER_SYMPLECTIC = "paper-symplectic"
     MOREAU_JEAN = "moreau-jean"
     LINEARLY_IMPLICIT = "linearly-implicit"
+    IMPACT_RESOLVED = "impact-resolved"
 
 
 class Animation(StrEnum):
@@ -101,7 +102,7 @@ def walk(
     scheme: Annotated[
         Scheme | None,
         typer.Option(
-            help="Discretisation of time stepping.", show_default=Scheme.GAP_LINEARISED.value
+            help="Discretisation of time stepping.", show_default=Scheme.IMPACT_RESOLVED.value
         ),
     ] = None,
     step: Annotated[

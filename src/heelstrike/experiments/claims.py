@@ -330,7 +330,8 @@ def first_order(evidence: Evidence) -> Claim:
         ),
         "schemes that keep the stance foot on the ground, the default among them, have an order "
         "between 0.8 and 1.2",
-        Scheme.GAP_LINEARISED in standing and all(0.8 < order < 1.2 for order in standing.values()),
+        Scheme.IMPACT_RESOLVED in standing
+        and all(0.8 < order < 1.2 for order in standing.values()),
         "The paper's orderings lose and regain contact by round-off. Their errors are uneven and "
         "another processor's are others, so that no order is read from them.",
     )

@@ -16,6 +16,7 @@ from heelstrike.errors import GaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.polynomials import evaluated
+from heelstrike.robot.model import NUMBERS
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
@@ -454,13 +455,20 @@ def actuated_joints(robot: Robot) -> tuple[str, ...]:
     return tuple(robot.joint_names[j] for j in robot.model.actuator_joint)
 
 
+YOUNGER = frozenset({"stall_torque", "no_load_speed", "winding_resistance"})
+"""Numbers of a robot that are younger than the first gaits in files."""
+
+
 def fingerprint(robot: Robot) -> str:
     """Short text that tells robots with different numbers apart.
 
-    Numbers enter with nine digits, so that it is the same on every machine.
+    Numbers enter with nine digits, so that it is the same on every machine; those that are younger
+    than files only where a robot has them, so that files of robots without them stay good.
     """
     digest = hashlib.sha256()
     for field, value in robot.model.members().items():
+        if field in YOUNGER and np.all(np.asarray(value) == NUMBERS[field].default):
+            continue
         numbers = " ".join(f"{x + 0.0:.9g}" for x in np.ravel(np.asarray(value, dtype=np.float64)))
         digest.update(f"{field} {numbers};".encode())
     return digest.hexdigest()[:16]

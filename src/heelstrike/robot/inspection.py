@@ -17,9 +17,9 @@ from heelstrike.robot.assembly import DIFFERENT, UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions, Options
-from heelstrike.robot.files.saving import body_links
+from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
-from heelstrike.robot.library import builtin_robots, load_robot
+from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import (
     Finding,
@@ -126,7 +126,7 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
                 raise
             refused, found = error, None
         if path is not None:
-            findings += _of_inertias(path)
+            findings += _of_inertias(path, how)
         if refused is not None and path is not None:
             try:
                 found = read_mjcf(path, lenient=True, **how)
@@ -138,11 +138,15 @@ def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptio
     findings += [
         Finding(FindingKind.FILE, words)
         for words in said
-        if not any(told in words for told in (DIFFERENT, UNLIKELY))  # told below
+        if not any(told in words for told in TOLD)
     ]
     if found is not None:
         findings += _of_robot(found)
     return Inspection(str(robot), found, tuple(dict.fromkeys(findings)), refused is None)
+
+
+TOLD = (DIFFERENT, UNLIKELY, NO_MOTORS, NO_CONTACTS)
+"""Remarks of the reader that inspection makes by itself."""
 
 
 def _file(robot: str | os.PathLike[str]) -> Path | None:
@@ -153,11 +157,12 @@ def _file(robot: str | os.PathLike[str]) -> Path | None:
     return path if is_readable(path) else None
 
 
-def _of_inertias(path: Path) -> Iterator[Finding]:
+def _of_inertias(path: Path, how: LoadOptions) -> Iterator[Finding]:
     """Inertias that the file states in three dimensions and no body can have; masses of zero."""
     from heelstrike.robot.files.mujoco_file import parsed_bodies
+    from heelstrike.robot.files.options import Options
 
-    for name, mass, tensor in parsed_bodies(path):
+    for name, mass, tensor in parsed_bodies(path, Options(**how)):
         if not mass >= MASSLESS:
             yield Finding(FindingKind.MASS, f"body {name!r} has the mass {mass:g} kg.")
         # Who states no other moment than one means a planar robot.
@@ -272,6 +277,7 @@ def _description(robot: Robot) -> str:
         f"{robot.nc} contact points",
         "base: " + ("floats (x, z, pitch)" if robot.floating else "does not float as x, z, pitch"),
         f"left and right: {'alike' if robot.mirror is not None else 'not alike, or not named'}",
+        f"drives: {_drives(robot)}",
         "",
         *_table(robot),
         "",
@@ -289,6 +295,14 @@ def _description(robot: Robot) -> str:
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
+
+
+def _drives(robot: Robot) -> str:
+    """What moves the joints, in a line."""
+    sprung = [robot.joint_names[joint] for joint in np.flatnonzero(robot.model.stiffness)]
+    told = f"motors at {robot.nu} joints" if robot.nu else "no motors"
+    told += f"; springs at {', '.join(sprung)}" if sprung else ""
+    return told + ("" if robot.nc else "; no contact points, so it can swing or fly but not stand")
 
 
 def _of_locked(robot: Robot) -> list[str]:

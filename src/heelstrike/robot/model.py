@@ -73,6 +73,7 @@ def of(*shape: str | int, kind: type = float, **about: Any) -> Any:
 _POSE: dict[str, Any] = {"default": 0.0, "given": True}
 _PART: dict[str, Any] = {"default": 0.0, "given": True, "least": 0.0, "alike": True}
 _LIMIT: dict[str, Any] = {"infinite": True}
+_UNKNOWN: dict[str, Any] = {"default": math.inf}
 
 
 class Model(Bundle):
@@ -117,6 +118,14 @@ class Model(Bundle):
     speed_limit : (nv,) float
         Greatest speed that the drive of the joint stands (rad/s, m/s), which gaits keep to;
         infinite where there is none.
+    stall_torque : (nv,) float
+        Torque of the motor (N m; N of a slide) at rest and full voltage, seen at the joint;
+        infinite if unknown.
+    no_load_speed : (nv,) float
+        Speed of the joint (rad/s, m/s) at which that torque is zero, falling along a straight line;
+        infinite if unknown.
+    winding_resistance : (nv,) float
+        Electrical resistance of the motor (ohm); zero if unknown.
     gravity : (axes,) float
         Acceleration of free fall (m/s²), (0, -9.81) on earth.
     contact_link : (nc,) int
@@ -161,8 +170,11 @@ class Model(Bundle):
         unit="rad/s, m/s",
         later=True,
         called="speed",
-        **_LIMIT | _PART | {"default": math.inf},
+        **_LIMIT | _PART | _UNKNOWN,
     )
+    stall_torque: Floats = of("nv", unit="N m, N", later=True, **_LIMIT | _PART | _UNKNOWN)
+    no_load_speed: Floats = of("nv", unit="rad/s, m/s", later=True, **_LIMIT | _PART | _UNKNOWN)
+    winding_resistance: Floats = of("nv", unit="ohm", later=True, **_PART)
     gravity: Floats = of("axes", unit="m/s²")
     contact_link: Integers = of("nc", kind=int, points="nl", least=0)
     contact_position: Floats = of("nc", "axes", unit="m")
@@ -222,6 +234,12 @@ class JointProperties(TypedDict, total=False):
         for a motor without limits. A joint without it has no motor.
     speed : float
         Greatest speed that the drive stands (rad/s, m/s).
+    stall_torque, no_load_speed : float
+        The motor's straight line from its torque at rest (N m, N) to its speed without load (rad/s,
+        m/s), both at full voltage and seen at the joint. They are data of the robot, kept in files;
+        `torque` alone limits what a simulation lets the motor do.
+    winding_resistance : float
+        Electrical resistance of the motor (ohm).
     gear, motor_inertia : float
         Ratio of the gear, and the inertia of the motor before it: they add
         ``gear**2 * motor_inertia`` to the armature. Torque and speed are those at the joint.
@@ -239,6 +257,9 @@ class JointProperties(TypedDict, total=False):
     armature: float
     torque: Limits
     speed: float
+    stall_torque: float
+    no_load_speed: float
+    winding_resistance: float
     gear: float
     motor_inertia: float
 

@@ -464,11 +464,12 @@ class Robot:
         return load_state(self, path)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF (``.urdf``) most.
+        """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF and SDF most.
 
-        What is read back has the same dynamics, on the same coordinates. URDF cannot hold springs,
-        armature (so no motor inertia) and torque limits that differ between the two senses; and its
-        zero configuration becomes the robot's reference.
+        What is read back has the same dynamics, on the same coordinates. URDF (``.urdf``) cannot
+        hold springs, armature of joints without a motor, and torque limits that differ between the
+        two senses; SDF (``.sdf``) cannot hold the last. The zero configuration of either becomes
+        the robot's reference.
 
         Parameters
         ----------
@@ -490,7 +491,7 @@ class Robot:
         RobotWarning
             With everything that the format cannot hold, joint by joint.
         """
-        from heelstrike.robot.files.saving import save_robot
+        from heelstrike.robot.files.saving.saving import save_robot
 
         return save_robot(self, path)
 

@@ -108,7 +108,7 @@ def test_what_cannot_drive_a_joint_is_refused(actuators: str, words: str) -> Non
 
 
 def test_a_servo_becomes_a_motor_and_says_so() -> None:
-    with pytest.warns(RobotWarning, match="'servo'.*motor"):
+    with pytest.warns(RobotWarning, match=r"motors.*'servo': position servo \(kp 9, kv 0\)"):
         model = driven('<position name="servo" joint="a" kp="9" forcerange="-6 6"/>').model
     np.testing.assert_array_equal(model.torque_upper, [6.0])
 

@@ -247,7 +247,10 @@ REFUSED: dict[str, tuple[Files, str]] = {
         mjcf("<asset><mesh name='m' vertex='{}'/></asset>".format("nan " * 300_000)),
         "no finite number",
     ),
-    "mesh that is not there": (mjcf('<asset><mesh file="gone.stl"/></asset>'), "'gone.stl'"),
+    "mesh that is not there": (
+        mjcf('<asset><mesh file="gone.stl"/></asset>', WORLD.replace('size="0.1"', 'mesh="gone"')),
+        "'gone.stl'",
+    ),
     "mesh without end": (mjcf('<asset><mesh file="/dev/zero"/></asset>'), "/dev/zero"),
     "long name": (
         mjcf("", WORLD.replace('"g"', '"' + "g" * 3_000_000 + '"')),

@@ -24,6 +24,7 @@ from heelstrike.robot import (
     load_robot,
     read_mjcf,
 )
+from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS
 
 TOLERANCE = 1e-10  # of a few hundred products, relative to the largest entry
 
@@ -95,6 +96,7 @@ def assert_judged(robot: Robot, text: str, *, tolerance: float = TOLERANCE) -> N
 @pytest.fixture(autouse=True)
 def _loud() -> None:
     warnings.simplefilter("error")
+    warnings.filterwarnings("ignore", message=f".*({NO_MOTORS}|{NO_CONTACTS})")
 
 
 def changed(text: str, *changes: tuple[str, str], times: int = -1) -> str:

@@ -12,6 +12,7 @@ from random_trees import random_tree
 
 from heelstrike.errors import RobotError
 from heelstrike.robot import Model, RobotWarning, read_mjcf
+from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS
 
 Floats = NDArray[np.float64]
 
@@ -302,6 +303,7 @@ def test_what_is_not_simulated_is_said(content: str, more: str, words: str) -> N
 def test_a_tendon_that_only_measures_is_silent() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=f".*({NO_MOTORS}|{NO_CONTACTS})")
         read_mjcf(
             one_body(
                 '<joint name="a" axis="0 1 0"/>',

@@ -22,6 +22,7 @@ from heelstrike.robot import (
     load_robot,
     read_mjcf,
 )
+from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS
 
 TOLERANCE = 1e-12  # relative; all digits are written, so that only sums in another order differ
 
@@ -36,6 +37,7 @@ def again(robot: Robot, path: Path) -> Robot:
     """Save and load, without a warning but those that a random tree earns at any rate."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", message=f".*({NO_MOTORS}|{NO_CONTACTS})")
         warnings.filterwarnings("ignore", message=".*gaits and walking controllers need them so")
         return load_robot(robot.save(path))
 
@@ -81,23 +83,22 @@ def test_library_through_mjcf(name: str, tmp_path: Path) -> None:
     assert np.all(np.isfinite(data.qacc))
 
 
+@pytest.mark.parametrize("ending", ["urdf", "sdf"])
 @pytest.mark.parametrize("name", builtin_robots())
-def test_library_through_urdf(name: str, tmp_path: Path) -> None:
-    robot = replace(load_robot(name), outlines=())  # which URDF cannot hold
-    if name == "walker2d":  # the one robot with motor inertia
-        with pytest.warns(RobotWarning, match=r"walker2d: .* armature .* of right_hip, .*MJCF"):
-            robot.save(tmp_path / "r.urdf")
-        none = np.zeros(robot.nv)
-        robot = replace(robot, model=_changed(robot, armature=none))
-    back = again(robot, tmp_path / "r.urdf")
+def test_library_through_urdf_and_sdf(name: str, ending: str, tmp_path: Path) -> None:
+    """walker2d has motor inertia: URDF holds it as a transmission, SDF as Drake writes it."""
+    robot = replace(load_robot(name), outlines=())  # which neither can hold
+    back = again(robot, tmp_path / f"r.{ending}")
     assert_same_dynamics(robot, back)
     for field in (*EXACT, *ALSO_EXACT, "parent", "gravity"):
         np.testing.assert_array_equal(
             getattr(back.model, field), getattr(robot.model, field), err_msg=field
         )
-    for field in ("name", "joint_names", "actuator_names", "contact_names", "floating"):
+    for field in ("name", "joint_names", "actuator_names", "floating"):
         assert getattr(back, field) == getattr(robot, field), field
-    assert [foot.name for foot in back.feet] == [foot.name for foot in robot.feet]
+    if (name, ending) != ("compass_gait", "sdf"):  # whose links are called as joints are
+        assert back.contact_names == robot.contact_names
+        assert [foot.name for foot in back.feet] == [foot.name for foot in robot.feet]
     assert (back.mirror is None) == (robot.mirror is None)
 
 
@@ -106,7 +107,7 @@ def _changed(robot: Robot, **fields: np.ndarray) -> object:
 
 
 @pytest.mark.parametrize("seed", range(200))
-def test_random_trees_through_mjcf_and_urdf(seed: int, tmp_path: Path) -> None:
+def test_random_trees_through_all_formats(seed: int, tmp_path: Path) -> None:
     robot = with_all_properties(quiet(random_tree(seed)), seed)
     back = again(robot, tmp_path / "r.xml")
     assert_same_dynamics(robot, back, states=2)
@@ -120,21 +121,30 @@ def test_random_trees_through_mjcf_and_urdf(seed: int, tmp_path: Path) -> None:
         )
     assert back.contact_friction == robot.contact_friction
     none = np.zeros(robot.nv)
-    # What URDF cannot hold: outlines, springs, armature, motors that pull unequally to two sides.
+    # What neither SDF nor URDF can hold: outlines, motors that pull unequally to two sides.
+    pulling = _changed(robot, torque_lower=-robot.model.torque_upper)
+    even = replace(robot, model=pulling, outlines=())
+    _same_through_zero(even, again(even, tmp_path / "r.sdf"), ("axis",))
+    # Nor URDF: springs, armature of what has no motor.
+    driven = np.isin(np.arange(robot.nv), robot.model.actuator_joint)
     without = replace(
-        robot,
-        model=_changed(
-            robot, armature=none, stiffness=none, torque_lower=-robot.model.torque_upper
-        ),
-        outlines=(),
+        even,
+        model=_changed(even, armature=np.where(driven, robot.model.armature, 0.0), stiffness=none),
     )
-    back = again(without, tmp_path / "r.urdf")
+    _same_through_zero(without, again(without, tmp_path / "r.urdf"), ("rest", "axis"))
+
+
+def _same_through_zero(without: Robot, back: Robot, lost: tuple[str, ...]) -> None:
+    """Compare a robot with what came back through a format that begins at the zero configuration.
+
+    Slides are seen there in another reference; of springs that are not there is no rest.
+    """
     # The order of a link's points is that of x in the reference configuration, which URDF moves.
     sorted_alike = _with_contacts_of(without, back)
     assert_same_dynamics(sorted_alike, back, states=2)
     for field in (*EXACT, *ALSO_EXACT):
-        if field in ("rest", "axis"):
-            continue  # of springs there are not; of slides, as seen in another reference
+        if field in lost:
+            continue
         np.testing.assert_allclose(
             getattr(back.model, field),
             getattr(sorted_alike.model, field),
@@ -191,7 +201,7 @@ def test_limits_of_one_side_and_motors_without_limits(tmp_path: Path) -> None:
     )
     build.slide("b", link, direction=(1, 0), mass=1, inertia=0.1, limits=(0.1, np.inf), torque=3)
     robot = build.build()
-    for path in (tmp_path / "r.xml", tmp_path / "r.urdf"):
+    for path in (tmp_path / "r.xml", tmp_path / "r.urdf", tmp_path / "r.sdf"):
         back = again(robot, path)
         assert_same_dynamics(robot, back)
         for field in (*EXACT, *ALSO_EXACT, "gravity"):
@@ -245,20 +255,20 @@ def test_everything_a_joint_and_a_motor_have(tmp_path: Path) -> None:
 
 def test_a_human_through_files(tmp_path: Path) -> None:
     robot = human(62, 1.7)
-    for path in (tmp_path / "h.xml", tmp_path / "h.urdf"):
+    for path in (tmp_path / "h.xml", tmp_path / "h.urdf", tmp_path / "h.sdf"):
         assert_same_dynamics(robot, again(robot, path))
 
 
 def test_names_that_xml_must_quote(tmp_path: Path) -> None:
     build = RobotBuilder('<a & "b">')
     build.hinge("l'é <1>", None, mass=1, inertia=1)
-    for path in (tmp_path / "r.xml", tmp_path / "r.urdf"):
+    for path in (tmp_path / "r.xml", tmp_path / "r.urdf", tmp_path / "r.sdf"):
         back = again(build.build(), path)
         assert (back.name, back.joint_names) == ('<a & "b">', ("l'é <1>",))
 
 
 def test_another_ending(tmp_path: Path) -> None:
-    with pytest.raises(RobotError, match=r"MJCF \(.xml\) or URDF \(.urdf\), not as '.json'"):
+    with pytest.raises(RobotError, match=r"URDF \(.urdf\) or SDF \(.sdf\), not as '.json'"):
         load_robot("bravo7").save(tmp_path / "r.json")
 
 

@@ -85,11 +85,12 @@ def fall(robot: Robot, method: hs.TimeStepping | hs.EventDriven) -> hs.Run:
     "method",
     [
         TimeStepping(),
+        TimeStepping(scheme=Scheme.GAP_LINEARISED),
         TimeStepping(scheme=Scheme.LINEARLY_IMPLICIT),
         TimeStepping(scheme=Scheme.MOREAU_JEAN),
         hs.EventDriven(),
     ],
-    ids=["gap linearised", "linearly implicit", "Moreau-Jean", "event driven"],
+    ids=["impact resolved", "gap linearised", "linearly implicit", "Moreau-Jean", "event driven"],
 )
 def test_loops_and_programs_simulate_the_same(
     method: hs.TimeStepping | hs.EventDriven, monkeypatch: pytest.MonkeyPatch

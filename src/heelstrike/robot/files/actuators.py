@@ -8,6 +8,7 @@ import numpy as np
 
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import BALL
+from heelstrike.robot.files.ros.drives import EFFORT, Drive, drives_of
 from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.warning import warn
@@ -59,7 +60,7 @@ def read_actuators(file: MujocoFile) -> Actuators:
     model = file.model
     place = {one.joint: index for index, one in enumerate(file.coordinates) if one.joint >= 0}
     if file.is_urdf and model.nu == 0:
-        return _from_effort_limits(file, place)
+        return _from_urdf(file, place)
     driven: list[int] = []  # coordinates
     actuators: list[int] = []
     gears: list[float] = []
@@ -85,6 +86,7 @@ def read_actuators(file: MujocoFile) -> Actuators:
         gears.append(gear)
         limits.append(_torque_limits(file, actuator, joint, gear))
         names.append(file.given_name("actuator", actuator) or file.coordinates[index].name)
+    _tell_of_laws(file, actuators)
     squared = np.square(gears)
     return _assembled(
         file,
@@ -96,14 +98,64 @@ def read_actuators(file: MujocoFile) -> Actuators:
     )
 
 
-def _from_effort_limits(file: MujocoFile, place: dict[int, int]) -> Actuators:
-    """Drive every joint of a URDF that has an effort limit: the format has no actuators."""
-    joints = [int(joint) for joint in np.flatnonzero(file.model.jnt_actfrclimited)]
-    joints = sorted((joint for joint in joints if joint in place), key=lambda joint: place[joint])
-    driven = [place[joint] for joint in joints]
-    names = [file.name("joint", joint) for joint in joints]
-    none = np.zeros(len(driven))
-    return _assembled(file, driven, file.model.jnt_actfrcrange[joints], names, none, none)
+def _from_urdf(file: MujocoFile, place: dict[int, int]) -> Actuators:
+    """Drive what the transmissions of a URDF name, without any every joint with an effort limit."""
+    model = file.model
+    drives = drives_of(file.xml, file.source)
+    index = {file.given_name("joint", joint): joint for joint in place}
+    known = {joint.get("name", "") for joint in file.xml.iterfind("joint")}
+    unknown = [name for name in drives if name not in known]
+    if unknown:
+        raise file.error(f"a transmission drives joint {unknown[0]!r}, but there is none.")
+    limited = {name for name, joint in index.items() if model.jnt_actfrclimited[joint]}
+    named = [name for name in index if name in drives] if drives else []
+    joints = sorted(named or limited, key=lambda name: place[index[name]])
+    limits, used = [], []
+    for name in joints:
+        drive = drives.get(name) or Drive()
+        torque = np.array([drive.lower, drive.upper])
+        if name in limited:
+            torque = _intersect(torque, model.jnt_actfrcrange[index[name]])
+        if not torque[0] < torque[1]:
+            raise file.error(f"the limits of the torque of joint {name!r} contradict each other.")
+        limits.append(torque)
+        used.append(drive)
+    _tell_of_drives(file, joints, used, limits, limited if named else set())
+    return _assembled(
+        file,
+        [place[index[name]] for name in joints],
+        np.array(limits, dtype=np.float64).reshape(-1, 2),
+        joints,
+        armature=np.array([drive.armature for drive in used]),
+        damping=np.zeros(len(joints)),
+    )
+
+
+def _tell_of_drives(
+    file: MujocoFile, joints: list[str], drives: list[Drive], limits: list[Floats], idle: set[str]
+) -> None:
+    """Say what the file means otherwise than it is taken, or leaves open."""
+    told = {
+        "are commanded by position or velocity in the file. They are loaded as motors that exert "
+        "the torque a heelstrike controller asks for": [
+            name
+            for name, drive in zip(joints, drives, strict=True)
+            if drive.commands and EFFORT not in drive.commands
+        ],
+        "are driven by several transmissions: one motor is made of them, with the inertia of all": [
+            name for name, drive in zip(joints, drives, strict=True) if drive.motors > 1
+        ],
+        "have a motor and no effort limit: its torque is unlimited": [
+            name
+            for name, torque in zip(joints, limits, strict=True)
+            if not np.isfinite(torque).any()
+        ],
+        "have an effort limit and no transmission, in a file that gives others one: no motor "
+        "drives them": sorted(idle.difference(joints)),
+    }
+    for what, names in told.items():
+        if names:
+            warn(f"{file.source}: joints {', '.join(names)} {what}.")
 
 
 def _assembled(
@@ -155,24 +207,49 @@ def _driven_joint(file: MujocoFile, actuator: int) -> int:
     return int(model.actuator_trnid[actuator, 0])
 
 
+def _law(file: MujocoFile, actuator: int) -> str:
+    """Return what an actuator is if it is no motor, in words; the empty string for a motor."""
+    model = file.model
+    gain = float(model.actuator_gainprm[actuator, 0])
+    _, stiffness, damping = (float(number) for number in model.actuator_biasprm[actuator, :3])
+    filtered = model.actuator_dyntype[actuator] != NO_ACTIVATION
+    if model.actuator_gaintype[actuator] == FIXED_GAIN and stiffness == -gain != 0.0:
+        law = f"position servo (kp {gain:g}, kv {0.0 - damping:g})"
+    elif model.actuator_gaintype[actuator] == FIXED_GAIN and damping == -gain != 0.0:
+        law = f"velocity servo (kv {gain:g})"
+    elif (
+        model.actuator_gaintype[actuator] != FIXED_GAIN
+        or model.actuator_biastype[actuator] != NO_BIAS
+    ):
+        law = "actuator with a law of its own"
+    else:
+        return "motor behind a filter" if filtered else ""
+    return law + (" behind a filter" if filtered else "")
+
+
+def _tell_of_laws(file: MujocoFile, actuators: list[int]) -> None:
+    """Say what drives the robot in MuJoCo and is taken as a motor here."""
+    laws: dict[str, list[str]] = {}
+    for actuator in actuators:
+        if law := _law(file, actuator):
+            laws.setdefault(law, []).append(repr(file.name("actuator", actuator)))
+    if laws:
+        told = "; ".join(f"{', '.join(names)}: {law}" for law, names in laws.items())
+        warn(
+            f"{file.source}: these actuators have a control law of their own. They are loaded as "
+            "motors that exert the torque a heelstrike controller asks for; only their force "
+            f"limits are kept. {told}."
+        )
+
+
 def _torque_limits(file: MujocoFile, actuator: int, joint: int, gear: float) -> tuple[float, float]:
     """Range of the torque at the joint that control, force and joint limits leave."""
     model, name = file.model, file.name("actuator", actuator)
     if gear == 0.0:
         raise file.error(f"actuator {name!r} has gear 0 and can exert no torque.")
-    plain = (
-        model.actuator_gaintype[actuator] == FIXED_GAIN
-        and model.actuator_biastype[actuator] == NO_BIAS
-        and model.actuator_dyntype[actuator] == NO_ACTIVATION
-    )
     force = np.array([-np.inf, np.inf])
-    if not plain:
-        warn(
-            f"{file.source}: actuator {name!r} has a control law of its own (a position or "
-            "velocity servo, or a filter). It is loaded as a motor that exerts the torque a "
-            "heelstrike controller asks for; only its force limits are kept."
-        )
-    elif model.actuator_ctrllimited[actuator] and not file.disabled("clampctrl"):
+    plain = _law(file, actuator) == ""
+    if plain and model.actuator_ctrllimited[actuator] and not file.disabled("clampctrl"):
         gain = float(model.actuator_gainprm[actuator, 0])
         force = np.sort(gain * model.actuator_ctrlrange[actuator])
     if model.actuator_forcelimited[actuator]:

@@ -6,7 +6,7 @@ import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -18,9 +18,12 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.flattening import Coordinate, flatten
 from heelstrike.robot.files.inertias import put_back, refuse_missing, stated_tensor, take_out
 from heelstrike.robot.files.options import Options
+from heelstrike.robot.files.ros.xacro import expanded
 from heelstrike.robot.files.screening.screening import Screened, screen
 from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
 from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
+from heelstrike.robot.files.screening.xml_tree import xml_text
+from heelstrike.robot.files.sdf.translation import as_mjcf
 from heelstrike.robot.files.urdf import (
     WORLD,
     let_massless_links_pass,
@@ -125,7 +128,7 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     """
     options = options or Options()
     label = str(source) if isinstance(source, Path) else "XML string"
-    file = screen(source, label)
+    file = _screened(source, options, label)
     xml = file.xml
     import mujoco
 
@@ -160,7 +163,21 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
     )
 
 
-def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
+def _screened(source: Path | str, options: Options, label: str) -> Screened:
+    """Return a file that may be parsed, as MJCF or URDF."""
+    written = source
+    if options.arguments is not None and isinstance(source, Path):
+        written = expanded(source, options.arguments, options.packages, label)
+    file = screen(written, label)
+    if file.xml.tag != "sdf":
+        return file
+    directory = source.parent if isinstance(source, Path) else Path()
+    mjcf = as_mjcf(file.xml, directory, options.packages, label)
+    meshes = mjcf.find("asset/mesh") is not None
+    return replace(file, xml=mjcf, text=xml_text(mjcf), delicate=meshes, massless=True)
+
+
+def parsed_bodies(path: Path, options: Options) -> list[tuple[str, float, NDArray[np.float64]]]:
     """Name, mass and inertia tensor (about the centre of mass, kg m²) as a file states them.
 
     Bodies that do not move, and those that leave their inertia to their geoms, are not among them.
@@ -173,11 +190,11 @@ def parsed_bodies(path: Path) -> list[tuple[str, float, NDArray[np.float64]]]:
     import mujoco
 
     label = str(path)
-    file = screen(path, label)
+    file = _screened(path, options, label)
     try:
         with _warnings_into([]), warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            spec = _parsed(path, file, label)
+            spec = _parsed(path, file, label, options.packages)
     except (ValueError, RuntimeError, MemoryError, mujoco.FatalError) as error:
         raise _unreadable(label, error) from error
     return _stated(spec)
@@ -234,9 +251,10 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False
-    if urdf:
+    if urdf or file.massless:
         let_massless_links_pass(spec)
         let_thin_meshes_pass(spec)
+    if urdf:
         spec.compiler.balanceinertia = False  # which replaces moments that URDF states
     lift_sizes(spec)
     return spec

@@ -43,6 +43,10 @@ class LoadOptions(TypedDict, total=False):
     mirror : {"average"}
         Make left and right equal, by the mean of their numbers, where they differ by more than
         rounding, and say by how much.
+    xacro : bool or mapping of str to str
+        Expand the macros of a xacro file, with these values of its arguments. Such a file is a
+        program, which runs in a process of its own for a minute at most: expand files of people
+        whom you trust. Needs the package xacro.
     """
 
     floating: bool
@@ -51,6 +55,7 @@ class LoadOptions(TypedDict, total=False):
     pose: Mapping[str, float] | None
     package_path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]
     mirror: str | None
+    xacro: bool | Mapping[str, str]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +64,7 @@ class Options:
 
     Attributes
     ----------
-    floating, projected, forward, pose, package_path, mirror
+    floating, projected, forward, pose, package_path, mirror, xacro
         See :class:`LoadOptions`.
     lenient : bool
         Let masses pass that MuJoCo refuses, to look at the robot; see `inspect_robot`.
@@ -76,6 +81,7 @@ class Options:
     pose: Mapping[str, float] | None = field(default_factory=dict)
     package_path: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = ()
     mirror: str | None = None
+    xacro: bool | Mapping[str, str] = False
     lenient: bool = False
 
     def __post_init__(self) -> None:
@@ -86,6 +92,13 @@ class Options:
         for joint, value in (self.pose or {}).items():
             if not isinstance(value, int | float) or not math.isfinite(value):
                 raise RobotError(f"pose of joint {joint!r} is {value!r}, not a number.")
+
+    @property
+    def arguments(self) -> Mapping[str, str] | None:
+        """Arguments of a xacro file, None where it is not to be expanded."""
+        if isinstance(self.xacro, Mapping):
+            return self.xacro
+        return {} if self.xacro else None
 
     @property
     def packages(self) -> tuple[Path, ...]:

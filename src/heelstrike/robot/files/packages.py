@@ -44,6 +44,21 @@ def find_file(name: str, directory: Path, packages: Sequence[Path]) -> Path | No
     return None
 
 
+def find_package(name: str, directory: Path, packages: Sequence[Path]) -> Path | None:
+    """Return the folder of a package, None if it is not there.
+
+    Parameters
+    ----------
+    name : str
+        Name of the package.
+    directory : Path
+        Folder of the file that names it.
+    packages : sequence of Path
+        Folders of packages, or that hold such, which are sought first.
+    """
+    return next((p for p in _package_folders(name, directory, packages) if p.is_dir()), None)
+
+
 def _package_folders(name: str, directory: Path, packages: Sequence[Path]) -> Iterator[Path]:
     """Folders that may be a package: asked for, around the robot file, and those of ROS."""
     for folder in packages:

@@ -12,9 +12,14 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.warning import warn
+
+NO_MOTORS = "no joint has a motor"
+NO_CONTACTS = "it has no contact points"
+"""What is said of a robot from a file that cannot be driven, or cannot stand."""
 
 _HERE = Path(__file__).parent
-_FILE_TYPES = (".xml", ".mjcf", ".urdf")
+_FILE_TYPES = (".xml", ".mjcf", ".urdf", ".sdf", ".world", ".xacro")
 
 
 def builtin_robots() -> tuple[str, ...]:
@@ -30,14 +35,15 @@ def builtin_robots() -> tuple[str, ...]:
 
 
 def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions]) -> Robot:
-    """Load a built-in robot by its name, or a planar robot from an MJCF or URDF file.
+    """Load a built-in robot by its name, or a planar robot from an MJCF, URDF or SDF file.
 
     Parameters
     ----------
     name_or_path : str or path
-        A name of `builtin_robots`, or the path of an ``.xml`` (MJCF) or ``.urdf`` file.
+        A name of `builtin_robots`, or the path of an ``.xml`` (MJCF), ``.urdf`` or ``.sdf`` file;
+        of a ``.xacro`` file with ``xacro=True``.
     **how : LoadOptions
-        How a file is read: floating, projected, forward, pose, package_path, mirror.
+        How a file is read: floating, projected, forward, pose, package_path, mirror, xacro.
 
     Returns
     -------
@@ -54,7 +60,7 @@ def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions])
     -----
     RobotWarning
         If the file says something that is not simulated, its left and right differ, axes are
-        turned into the plane, or joints are locked.
+        turned into the plane, joints are locked, or it has no motors or contact points.
 
     Examples
     --------
@@ -74,10 +80,25 @@ def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions])
         return read_mjcf(_HERE / f"{name}.xml", name=name, **how)
     path = Path(name)
     if path.suffix.lower() in _FILE_TYPES:
-        return read_mjcf(path, **how)
+        robot = read_mjcf(path, **how)
+        _tell_of_what_is_missing(robot)
+        return robot
     if name and _exists(path):
-        raise RobotError(f"{path}: expected an MJCF file (.xml) or a URDF file (.urdf).")
+        raise RobotError(
+            f"{path}: expected an MJCF file (.xml), a URDF file (.urdf) or an SDF file (.sdf)."
+        )
     raise RobotError(_unknown(name))
+
+
+def _tell_of_what_is_missing(robot: Robot) -> None:
+    """Warn of a robot from elsewhere that cannot be driven, or cannot stand."""
+    if not robot.nu:
+        warn(f"{robot.source}: {NO_MOTORS}: gravity, springs and pushes alone move this robot.")
+    if not robot.nc:
+        warn(
+            f"{robot.source}: {NO_CONTACTS}: it can swing or fly, but not stand. Give its feet "
+            "boxes, or spheres at heel and toe, that collide."
+        )
 
 
 def _exists(path: Path) -> bool:
@@ -93,5 +114,5 @@ def _unknown(name: str) -> str:
     guess = f" Did you mean {near[0]!r}?" if near else ""
     return (
         f"there is no robot called {reprlib.repr(name)}.{guess} Built in are {', '.join(known)}; "
-        "any other robot is loaded by the path of its .xml (MJCF) or .urdf file."
+        "any other robot is loaded by the path of its .xml (MJCF), .urdf or .sdf file."
     )

@@ -30,8 +30,7 @@ from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.memory import Assembly, Equations, Surface, contact_capacity
+from heelstrike.sim.memory import Assembly, Memory, contact_capacity
 
 Floats = NDArray[np.float64]
 
@@ -169,11 +168,10 @@ def find_impact(
 
 @kernel
 def pose_impact(
-    model: Model, step: float, members: int, q: Floats, equations: Equations, contacts: Contacts,
-    surface: Surface, problem: ContactProblem, assembly: Assembly, impact: Impact,
-) -> None:  # fmt: skip
+    model: Model, step: float, members: int, problem: ContactProblem, memory: Memory, impact: Impact
+) -> None:
     """Write the problem of the impact: what takes part, without the gaps, with restitution."""
-    its = impact.problem
+    assembly, contacts, its = memory.assembly, memory.contacts, impact.problem
     for place in range(members):
         source = impact.member[place]
         for other in range(members):
@@ -185,10 +183,10 @@ def pose_impact(
         candidate = assembly.candidate[source]
         normal = problem.free[2 * source]
         if candidate < model.nc + 2 * model.nv:
-            normal -= gap_of(model, q, contacts.gap, candidate) / step
+            normal -= gap_of(model, memory.q, contacts.gap, candidate) / step
         if candidate < model.nc:
-            before, _ = contact_velocity(model, equations.tree, contacts, candidate)
-            normal += surface.restitution[candidate] * before
+            before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
+            normal += memory.surface.restitution[candidate] * before
         its.free[2 * place] = normal
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]

@@ -478,10 +478,11 @@ def push_candidates(
 
 @kernel
 def push_all(
-    model: Model, near: int, count: int, straight: bool, contacts: Contacts, assembly: Assembly,
-    equations: Equations, usual: UsualPoints, v: Floats,
-) -> None:  # fmt: skip
+    model: Model, near: int, count: int, straight: bool, memory: Memory, v: Floats
+) -> None:
     """Add what the impulses of the candidates do to a velocity."""
+    contacts, assembly = memory.contacts, memory.assembly
+    equations, usual = memory.equations, memory.usual
     if straight:
         push_candidates(model, contacts, assembly, near, count, equations, usual, v)
     else:
@@ -512,13 +513,10 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
             arriving = impact.arriving
             for j in range(model.nv):
                 arriving[j] = impact.free[j]
-            push_all(model, near, count, straight, contacts, assembly, equations, usual, arriving)
-            pose_impact(
-                model, step, members, memory.q, equations, contacts, memory.surface, problem,
-                assembly, impact,
-            )  # fmt: skip
+            push_all(model, near, count, straight, memory, arriving)
+            pose_impact(model, step, members, problem, memory, impact)
             solved = solve_impact(work.order, members, problem, impact, assembly) and solved
-    push_all(model, near, count, straight, contacts, assembly, equations, usual, memory.next_v)
+    push_all(model, near, count, straight, memory, memory.next_v)
     return solved
 
 

@@ -120,8 +120,8 @@ def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
     root = xml_tree(text, label)
     # MuJoCo takes <INCLUDE> for <include>.
     parents = [e for e in root.iter() if any(c.tag.lower() == "include" for c in e)]
-    if root.tag.lower() == "robot":
-        return root  # URDF includes nothing
+    if root.tag.lower() in ("robot", "sdf"):
+        return root  # they include nothing of this kind
     for parent in parents:
         for index in range(len(parent) - 1, -1, -1):
             if parent[index].tag.lower() == "include":

@@ -8,9 +8,12 @@ from xml.etree.ElementTree import Element, SubElement
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.screening.inclusion import Place, is_readable, is_there, resolved
+from heelstrike.robot.warning import warn
 
 LARGEST_MESHES = 256 * 2**20
 """Bytes of all mesh files of a robot together."""
+
+SHOWN = 6  # bodies that a message names before it counts the rest
 
 MOST_FACES = 200_000
 """Most faces of an .stl file that MuJoCo reads."""
@@ -24,7 +27,8 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
     Raises
     ------
     RobotError
-        If a file is not there, is a directory, device or pipe, or they are too large together.
+        If a file that a body is weighed by is not there, one is a directory, device or pipe, or
+        they are too large together.
     """
     meshes = [mesh for asset in root.iter("asset") for mesh in asset.iter("mesh")]
     meshes = [mesh for mesh in meshes if mesh.get("file")]
@@ -37,6 +41,7 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
         assetdir = compiler.attrib.pop("assetdir", assetdir)
         stripped = compiler.attrib.pop("strippath", str(stripped)).lower() == "true"
     size = 0
+    missing: dict[str, str] = {}
     for mesh in meshes:
         name = mesh.get("file", "")
         name = PurePath(name.replace("\\", "/")).name if stripped else name
@@ -44,15 +49,15 @@ def name_mesh_files(root: Element, label: str, place: Place) -> bool:
         path = next((path for path in sought if is_there(path)), None)
         where = f"{label}: line {getattr(mesh, 'line', 0)}: <mesh>"
         if path is None:
-            raise RobotError(
-                f"{where} names {name[:200]!r}, which is not there. It is sought from the folder of"
-                " the robot file, through the 'meshdir' of its <compiler>."
-            )
+            missing[mesh.get("name") or PurePath(name).stem] = f"{where} names {name[:200]!r}"
+            continue
         if not is_readable(path):
             raise RobotError(f"{where} names {str(path)!r}, which is not a regular file.")
         size += path.stat().st_size
         mesh.set("file", str(resolved(path)))
     refuse_large_meshes(size, label)
+    if missing:
+        _leave_out(root, missing)
     # One more compiler element: MuJoCo reads them all, the last one last.
     SubElement(root, "compiler", {"strippath": "false"})
     return True
@@ -71,6 +76,52 @@ def is_mesh(file: Path) -> bool:
         return False
     faces = int.from_bytes(header[80:84], "little")
     return len(header) == 84 and 0 < faces <= MOST_FACES and size >= 84 + 50 * faces
+
+
+def _leave_out(root: Element, missing: dict[str, str]) -> None:
+    """Leave out geoms whose meshes are not there, on bodies that state their inertia themselves.
+
+    Raises
+    ------
+    RobotError
+        If a body is weighed by such a geom.
+
+    Warns
+    -----
+    RobotWarning
+        Of the bodies that cannot touch the ground with them.
+    """
+    first = next(iter(missing.values()))
+    weighed = any(each.get("inertiafromgeom") == "true" for each in root.iter("compiler"))
+    for default in root.iter("default"):
+        if any(geom.get("mesh") in missing for geom in default.iterfind("geom")):
+            raise RobotError(f"{first}, which is not there, for a class of geoms.")
+    bare = []
+    for body in root.iter():
+        gone = [each for each in body if each.tag == "geom" and each.get("mesh") in missing]
+        if not gone:
+            continue
+        if body.tag == "body" and (weighed or body.find("inertial") is None):
+            raise RobotError(
+                f"{first}, which is not there, and the body {body.get('name', '')!r} has its mass "
+                "from meshes. Meshes are sought from the folder of the robot file, through the "
+                "'meshdir' of its <compiler>. Give the body an <inertial>, or the mesh."
+            )
+        for each in gone:
+            body.remove(each)
+        bare.append(body.get("name") or body.tag)
+    for asset in root.iter("asset"):
+        for mesh in asset.findall("mesh"):
+            name = mesh.get("name") or PurePath(mesh.get("file", "").replace("\\", "/")).stem
+            if name in missing:
+                asset.remove(mesh)
+    if bare:
+        shown = ", ".join(bare[:SHOWN]) + (f" and {len(bare) - SHOWN} more" if bare[SHOWN:] else "")
+        warn(
+            f"{first}, which is not there: {len(missing)} meshes are missing, and {shown} cannot "
+            "touch the ground with them. If one is a foot, give it a box, or spheres at heel and "
+            "toe."
+        )
 
 
 def refuse_large_meshes(size: int, label: str) -> None:

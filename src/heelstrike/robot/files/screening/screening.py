@@ -18,6 +18,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.files.screening.inclusion import Place, Reading, read_model, read_tree
 from heelstrike.robot.files.screening.mechanics_only import leave_mechanics
 from heelstrike.robot.files.screening.mesh_files import name_mesh_files
+from heelstrike.robot.files.screening.retired import renew
 from heelstrike.robot.files.screening.xml_tree import DEEPEST, MOST_ELEMENTS, Node, xml_text
 
 MOST_BODIES = 4000
@@ -73,6 +74,8 @@ class Screened:
         Whether it holds what parsers have died of, so that it should be tried apart first.
     flexible : bool
         Whether it had flexible bodies.
+    massless : bool
+        Whether bodies without mass may move, as in formats other than MJCF.
     """
 
     xml: Node
@@ -80,6 +83,7 @@ class Screened:
     models: dict[str, bytes]
     delicate: bool
     flexible: bool
+    massless: bool = False
 
 
 class _Weight(NamedTuple):
@@ -112,10 +116,10 @@ def screen(source: Path | str, label: str) -> Screened:
     """
     reading = Reading(label)
     root, place, text = read_tree(source, reading)
-    if root.tag not in ("mujoco", "robot"):
+    if root.tag not in ("mujoco", "robot", "sdf"):
         raise RobotError(
             f"{label}: it begins with <{root.tag[:60]}>; MJCF begins with <mujoco>, URDF with "
-            "<robot>."
+            "<robot>, SDF with <sdf>."
         )
     tags: set[str] = set()
     changed, _ = _screen_tree(root, label, place, reading, tags)
@@ -151,6 +155,7 @@ def _screen_tree(
     weight = _Weight(count, count, DEEPEST)
     if place.above[1:] or reading.elements or count > MOST_BODIES or not tags.isdisjoint(_WEIGHED):
         weight = _weigh(root, label, weights)
+    changed |= renew(root, names, label)
     changed |= leave_mechanics(root, tags, names)
     if "mesh" in tags and root.tag == "mujoco":
         changed |= name_mesh_files(root, label, place)

@@ -94,7 +94,7 @@ def check_urdf(root: Element, label: str) -> None:
         if element.tag.startswith("xacro:"):
             raise RobotError(
                 f"{label}: <{element.tag}> is a macro of xacro, so this is not a URDF file yet. "
-                "Expand it first: xacro robot.xacro > robot.urdf"
+                "Load it with xacro=True, if you trust it: expanding a macro runs what it says."
             )
     for kind in ("link", "joint"):
         counts = Counter(element.get("name", "") for element in root.iterfind(kind))

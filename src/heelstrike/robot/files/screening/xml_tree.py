@@ -23,6 +23,9 @@ MOST_ELEMENTS = 20_000
 """Most elements of a robot, copies included; the largest we know has some 2000."""
 
 
+WRITTEN = ("sdf", "robot")
+"""Roots of formats in which something stands between tags."""
+
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 
 
@@ -45,9 +48,10 @@ class Node(Element):
 
 
 def xml_tree(text: str, label: str) -> Node:
-    """Return the tree of an XML text, without the text between its tags, which means nothing.
+    """Return the tree of an XML text.
 
-    Prefixes of tags stay in the tags.
+    The text between its tags is kept in SDF and URDF only, for elsewhere it means nothing. Prefixes
+    of tags stay in the tags.
 
     Raises
     ------
@@ -75,11 +79,13 @@ def xml_tree(text: str, label: str) -> Node:
 def _tree(text: str, label: str) -> Node:
     builder: TreeBuilder = TreeBuilder(element_factory=Node)
     depth = count = 0
+    written = False
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth, count
+        nonlocal depth, count, written
         depth += 1
         count += 1
+        written = written or (depth == 1 and tag in WRITTEN)
         if depth > DEEPEST:
             refuse(f"more than {DEEPEST} elements inside one another, which no robot needs.")
         if count > MOST_ELEMENTS:
@@ -90,6 +96,10 @@ def _tree(text: str, label: str) -> Node:
         nonlocal depth
         depth -= 1
         builder.end(tag)
+
+    def words(text: str) -> None:
+        if written:
+            builder.data(text)
 
     def declaration(*_: object) -> None:
         refuse(
@@ -103,6 +113,7 @@ def _tree(text: str, label: str) -> Node:
     parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler = start
     parser.EndElementHandler = end
+    parser.CharacterDataHandler = words
     parser.StartDoctypeDeclHandler = declaration
     parser.EntityDeclHandler = declaration
     try:

@@ -1,0 +1,1 @@
+"""What robot files take from ROS: macros of xacro, transmissions and ros2_control."""

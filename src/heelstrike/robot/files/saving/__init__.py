@@ -1,0 +1,1 @@
+"""Robots written to files: MJCF, which holds everything, URDF and SDF, which do not."""
