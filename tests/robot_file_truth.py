@@ -88,7 +88,9 @@ def mjcf_truth(text: str, names: tuple[str, ...], q: np.ndarray) -> Truth:
         torque[model.actuator_trnid[actuator, 0]] = np.sort(limits)
     speed = np.full(model.nv, np.inf)
     for k in range(model.nnumeric):
-        name = model.numeric(k).name.removeprefix("speed_limit:")
+        held, _, name = model.numeric(k).name.partition(":")
+        if held != "speed_limit":  # outlines, which move nothing
+            continue
         speed[model.joint(name).id] = model.numeric_data[model.numeric_adr[k]]
     limited = model.jnt_limited.astype(bool)[:, None]
     moving = [g for g in range(model.ngeom) if model.body_weldid[model.geom_bodyid[g]] > 0]

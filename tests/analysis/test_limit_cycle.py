@@ -175,6 +175,19 @@ def test_a_robot_that_does_not_walk() -> None:
         )
 
 
+def test_no_solver_certifies_the_first_instant() -> None:
+    """A run without rows is a step that is not completed, told in words.
+
+    The mass matrix of a wheel with next to no inertia is singular to working precision.
+    """
+    with pytest.raises(hs.LimitCycleError, match=r"did not complete a step \(no contact solver"):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=1e-12),
+            wheel_state(0.15, 1.5),
+            ground=hs.Ground(friction=3.0, slope=-0.15),
+        )
+
+
 def test_a_search_that_is_given_no_time() -> None:
     speed, _ = wheel_cycle(9.81, 0.08, 0.01)
     with pytest.raises(hs.LimitCycleError, match="in 0 iterations"):

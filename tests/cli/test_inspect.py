@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -82,6 +83,13 @@ def test_a_robot_in_space(tmp_path: Path) -> None:
         (["."], "expected an MJCF file"),
         (["bravo7", "--out", "no/such/folder/x.png"], "there is no folder"),
         (["bravo7", "--out", "x.doc"], ".png, .pdf or .svg"),
+        (["bravo7", "--ground", "slope:3"], "say into which file"),
+        (["bravo7", "--push", "trunk:60:1:0.1"], "say into which file"),
+        (["bravo7", "--push", "head:60:1:0.1", "--out", "x.png"], "its links are trunk"),
+        (["bravo7", "--ground", "slop:3", "--out", "x.png"], "Did you mean slope:DEGREES"),
+        (["bravo7", "--pose", "left_kne=0.4"], "Did you mean 'left_knee'?"),
+        (["bravo7", "--pose", "left_knee"], "write joint=value"),
+        (["bravo7", "--forward", "z"], "is not one of 'x', 'y'"),
     ],
 )
 def test_mistakes(arguments: list[str], said: str) -> None:
@@ -89,6 +97,33 @@ def test_mistakes(arguments: list[str], said: str) -> None:
     assert result.exit_code == 2
     assert said in " ".join(result.stderr.split())
     assert "Traceback" not in result.stderr
+
+
+def test_a_picture_on_a_ground_with_a_push(tmp_path: Path) -> None:
+    pictures = []
+    for options in ([], ["--ground", "slope:10"], ["--push", "trunk:60:1:0.1"]):
+        path = tmp_path / f"{len(pictures)}.png"
+        result = CliRunner().invoke(app, ["inspect", "bravo7", "--out", str(path), *options])
+        assert result.exit_code == 0, result.stderr
+        pictures.append(path.read_bytes())
+    assert len(set(pictures)) == 3
+
+
+def test_how_a_file_is_read(tmp_path: Path) -> None:
+    """A robot that walks along y, in another pose: as it is along x."""
+    path = load_robot("bravo7").save(tmp_path / "r.xml")
+    text = path.read_text("utf-8")
+    turned = text.replace(
+        '<body name="trunk"', '<body name="trunk" euler="0 0 1.5707963267948966"', 1
+    )
+    assert turned != text
+    path.write_text(turned, "utf-8")
+    options = ["--forward", "y", "--pose", "left_knee=23deg"]
+    result = CliRunner().invoke(app, ["inspect", str(path), "--json", *options])
+    told = json.loads(result.stdout)
+    assert told["coordinates"][:3] == ["root_x", "root_z", "root_pitch"]
+    knee = told["coordinates"].index("left_knee")
+    assert told["reference"][knee] == pytest.approx(np.deg2rad(23.0))
 
 
 def _inspect(*arguments: str, encoding: str) -> subprocess.CompletedProcess[bytes]:

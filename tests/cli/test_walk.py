@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -15,6 +16,7 @@ import heelstrike as hs
 from heelstrike.cli import walk as walk_module
 from heelstrike.cli.main import app
 from heelstrike.cli.options import method_called
+from heelstrike.experiments.results import OF_MOTORS
 from heelstrike.sim import Scheme
 from heelstrike.view.figures import FIGURES
 
@@ -240,6 +242,12 @@ def test_interrupted_by_ctrl_c(
         (["--method", "event-driven", "--scheme", "moreau-jean"], "event-driven has no schemes"),
         (["--method", "compliant", "--scheme", "gap-linearised"], "compliant has no schemes"),
         (["--gait", "."], "directory"),
+        (["--ground", "slop:3"], "Did you mean slope:DEGREES"),
+        (["--push", "head:60:1:0.1"], "link 'head', which robot 'bravo7' does not have"),
+        (["--pose", "left_kne=1"], "Did you mean 'left_knee'?"),
+        (["--forward", "up"], "is not one of 'x', 'y'"),
+        (["compass_gait"], "walks down a slope only"),
+        (["compass_gait", "--ground", "slope:-3", "--step-length", "0.2"], "has no motors"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else None,
 )
@@ -322,6 +330,36 @@ def test_out_is_a_file(tmp_path: Path) -> None:
         assert "taken" in result.stderr
         assert "Traceback" not in result.stderr
     assert taken.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_push_and_a_slope_reach_the_walk(walk: Callable[..., Any], tmp_path: Path) -> None:
+    options = ["--push", "trunk:20:0.2:0.1", "--ground", "slope:-0.2"]
+    result = walk("--steps", "1", *options)
+    assert result.exit_code == 0, result.stderr
+    run = hs.load_run(tmp_path / "out" / "run.nc")
+    (push,) = run.pushes
+    assert (push.force, push.start, push.duration) == ((20.0, 0.0), 0.2, 0.1)
+    assert run.ground.slope == math.radians(-0.2)
+    assert abs(run.gap[0, run.robot.feet[0].contacts[0]]) < 1e-12
+
+
+def test_a_passive_walker_starts_on_its_cycle(tmp_path: Path) -> None:
+    (tmp_path / "gait.json").write_text("of yesterday", encoding="utf-8")
+    options = ["--ground", "slope:-3", "--steps", "4", "--animation", "none"]
+    arguments = ["walk", "compass_gait", "--out", str(tmp_path), *options]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.stderr
+    left = {path.name for path in tmp_path.iterdir()}
+    figures = {f"{name}.png" for name in FIGURES if name not in OF_MOTORS}
+    assert left == {"run.nc", "summary.json", *figures}
+    run = hs.load_run(tmp_path / "run.nc")
+    touchdowns = [e.time for e in run.events if e.kind.name == "TOUCHDOWN" and e.time > 0.0]
+    assert np.diff(touchdowns) == pytest.approx(0.734346391, abs=1e-7)
+    # Its legs are of one length, which time stepping does not let pass.
+    result = CliRunner().invoke(app, [*arguments, "--method", "time-stepping"])
+    assert result.exit_code == 1
+    assert "of 4 steps" in result.stderr
+    assert "--method event-driven lets them swing through" in result.stderr
 
 
 def test_schemes_are_those_of_the_library() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import heelstrike as hs
 from heelstrike.analysis import walking_steps
-from heelstrike.experiments.walk import BRAVO7, StepSize, design, typical_step, walk
+from heelstrike.experiments.walk import BRAVO7, StepSize, beginning, design, typical_step, walk
 
 
 def test_step_of_a_robot_twice_as_large(bravo7: hs.Robot) -> None:
@@ -82,3 +82,33 @@ def test_options_reach_the_simulation(bravo7: hs.Robot, gait: hs.Gait) -> None:
     run = walk(bravo7, gait, steps=1, method=hs.TimeStepping(step=5e-4), ground=ground)
     assert run.ground is ground
     assert run.time[1] == pytest.approx(5e-4)
+
+
+@pytest.mark.parametrize("degrees", [-4.0, 0.0, 6.0])
+def test_a_start_on_a_slope_is_a_start_on_a_slope(
+    bravo7: hs.Robot, gait: hs.Gait, degrees: float
+) -> None:
+    """The soles lie on it as they lie on the level, and move alike along its tangent."""
+    level = hs.Ground()
+    ground = hs.Ground(slope=np.deg2rad(degrees))
+    state = beginning(bravo7, gait, ground).state
+    here = hs.contact_kinematics(bravo7, state.q, state.v, ground)
+    there = hs.contact_kinematics(bravo7, gait.initial_state.q, gait.initial_state.v, level)
+    np.testing.assert_allclose(here.gap, there.gap, atol=1e-12)
+    np.testing.assert_allclose(here.velocity, there.velocity, atol=1e-12)
+    np.testing.assert_array_equal(state.q[3:], gait.initial_state.q[3:])
+    if degrees == 0.0:
+        assert state is gait.initial_state
+
+
+def test_a_start_on_high_ground_is_on_the_ground(bravo7: hs.Robot, gait: hs.Gait) -> None:
+    ground = hs.Ground(profile=[(-5.0, 0.3), (0.6, 0.3), (0.6, 0.5), (9.0, 0.5)])
+    state = beginning(bravo7, gait, ground).state
+    gap = hs.contact_kinematics(bravo7, state.q, state.v, ground).gap
+    assert gap.min() == pytest.approx(0.0, abs=1e-12)
+
+
+def test_pushes_reach_the_simulation(bravo7: hs.Robot, gait: hs.Gait) -> None:
+    push = hs.Push("trunk", force=(30.0, 0.0), start=0.1, duration=0.1)
+    run = walk(bravo7, gait, steps=1, pushes=[push])
+    assert run.pushes == (push,)

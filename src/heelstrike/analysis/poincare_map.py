@@ -271,8 +271,9 @@ class PoincareMap:
                     return run, event.time, event.contact
             if not run.completed:
                 break
+        lasted = f" in {run.time[-1]:.6g} s" if len(run.time) else ""
         raise LimitCycleError(
-            f"robot {run.robot.name!r} did not complete a step in {run.time[-1]:.6g} s "
+            f"robot {run.robot.name!r} did not complete a step{lasted} "
             f"({run.message}); begin nearer to the cycle"
         )
 

@@ -13,14 +13,22 @@ from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     AsJson,
     Debug,
+    Floating,
+    Forward,
     Friction,
+    OnGround,
+    Pose,
+    Projected,
+    Pushed,
     RobotName,
     SavedGait,
     Steps,
     method_called,
+    reading,
 )
-from heelstrike.cli.planning import planned_gait
+from heelstrike.cli.planning import planned_walk
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, tell_interruption, wrote
+from heelstrike.cli.values import ground_called, pushes_called
 
 
 class Way(StrEnum):
@@ -52,36 +60,47 @@ def compare(
     step: Annotated[
         float, typer.Option(help="Time step in s of the methods that have one.")
     ] = 1e-4,
+    ground: OnGround = "flat",
     friction: Friction = 0.75,
     restitution: Annotated[
         float,
         typer.Option(help="Restitution of the ground; methods that know none are left out."),
     ] = 0.0,
+    push: Pushed = None,
+    floating: Floating = False,
+    projected: Projected = False,
+    forward: Forward = None,
+    pose: Pose = None,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
     ] = Path("compare"),
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
-    """Walk the same gait by several methods and tell how far they differ."""
+    """Walk the same steps by several methods and tell how far they differ."""
     import heelstrike as hs
+    from heelstrike.experiments.walk import beginning
     from heelstrike.view.style import save_figure
     from heelstrike.whole_file import write_whole
 
-    machine = hs.load_robot(robot)
+    surface = ground_called(ground, friction=friction, restitution=restitution)
+    pushes = pushes_called(push)
+    machine = hs.load_robot(robot, **reading(floating, projected, forward, pose))
+    for each in pushes:
+        each.place(machine)
     ways = method or [way for way in Way if not way.startswith("paper")]
-    methods = {way.value: method_called(way, step) for way in ways}
-    ground = hs.Ground(friction=friction, restitution=restitution)
-    planned = planned_gait(machine, gait, friction)
+    methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
+    start = beginning(machine, planned_walk(machine, gait, surface), surface)
     doing = f"walking {steps} steps by {len(methods)} methods"
     with stage(doing, when_slow="(compiling each of them, once: about a minute)"):
         comparison = hs.compare(
             machine,
-            hs.ComputedTorque(machine, planned),
+            start.controller,
             methods=methods,
-            state=planned.initial_state,
-            duration=(steps + 0.1) * planned.step_duration,
-            ground=ground,
+            state=start.state,
+            duration=(steps + 0.1) * start.step_duration,
+            ground=surface,
+            pushes=pushes,
         )
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(comparison.to_dict(), indent=2)

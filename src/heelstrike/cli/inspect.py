@@ -10,11 +10,27 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
-from heelstrike.cli.options import AsJson, Debug, RobotName
+from heelstrike.cli.options import (
+    AsJson,
+    Debug,
+    Floating,
+    Forward,
+    OnGround,
+    Pose,
+    Projected,
+    Pushed,
+    RobotName,
+    reading,
+)
 from heelstrike.cli.terminal import output, spoken, tell
+from heelstrike.cli.values import ground_called, pushes_called
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from heelstrike.contact.ground import Ground
     from heelstrike.robot.inspection import Inspection
+    from heelstrike.sim.push import Push
 
 FOUND = 1
 """Exit code when something looks wrong, so that a script can tell."""
@@ -29,34 +45,50 @@ def inspect(
             "--out", "--picture", dir_okay=False, help="Draw it into this file (PNG, SVG or PDF)."
         ),
     ] = None,
-    floating: Annotated[
-        bool, typer.Option("--floating", help="Let the trunk float in the plane.")
-    ] = False,
-    projected: Annotated[
-        bool, typer.Option("--projected", help="Lock the joints that leave the x–z plane.")
-    ] = False,
+    ground: OnGround = "flat",
+    push: Pushed = None,
+    floating: Floating = False,
+    projected: Projected = False,
+    forward: Forward = None,
+    pose: Pose = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Look at a robot: tree, masses, limits, contact points, and what looks wrong.
 
-    Ends with exit code 1 if something does.
+    Ground and pushes are those of the picture. Ends with exit code 1 if something looks wrong.
     """
     from heelstrike.robot.inspection import inspect_robot
 
-    inspection = inspect_robot(robot, floating=floating, projected=projected)
-    look_at(inspection, picture, as_json=as_json)
+    surface = None if ground == "flat" else ground_called(ground)
+    pushes = pushes_called(push)
+    if picture is None and (surface is not None or pushes):
+        raise typer.BadParameter(
+            "ground and pushes are drawn: say into which file", param_hint="--out"
+        )
+    inspection = inspect_robot(robot, **reading(floating, projected, forward, pose))
+    look_at(inspection, picture, as_json=as_json, ground=surface, pushes=pushes)
     if not inspection.sound:
         raise typer.Exit(FOUND)
 
 
-def look_at(inspection: Inspection, picture: Path | None, *, as_json: bool) -> None:
+def look_at(
+    inspection: Inspection,
+    picture: Path | None,
+    *,
+    as_json: bool,
+    ground: Ground | None = None,
+    pushes: Sequence[Push] = (),
+) -> None:
     """Print what was found of a robot, and draw it into a file."""
     from heelstrike.robot.inspection import facts
     from heelstrike.view.drawing import robot_picture
     from heelstrike.view.terminal import terminal_drawing
 
     robot = inspection.robot
+    if robot is not None:
+        for push in pushes:
+            push.place(robot)
     if as_json:
         typer.echo(json.dumps(facts(inspection), indent=2))
     else:
@@ -65,7 +97,7 @@ def look_at(inspection: Inspection, picture: Path | None, *, as_json: bool) -> N
             if text:
                 output().print(Text(text), soft_wrap=True)
     if picture is not None and robot is not None:
-        robot_picture(robot, picture)
+        robot_picture(robot, picture, ground=ground, pushes=pushes)
         tell(f"drawn into {picture}")
     elif picture is not None:
         tell(f"{picture} is not drawn, for there is no robot to draw")

@@ -2,15 +2,74 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from heelstrike.cli.values import pose_called
+
 if TYPE_CHECKING:
+    from heelstrike.robot.files.options import LoadOptions
     from heelstrike.sim.method import Method
 
-RobotName = Annotated[str, typer.Argument(help="A built-in robot, or an MJCF or URDF file.")]
+
+def _built_in(incomplete: str) -> list[str]:
+    """Complete the name of a built-in robot; where there is none, shells complete a file's."""
+    from heelstrike.robot.library import builtin_robots
+
+    return [name for name in builtin_robots() if name.startswith(incomplete)]
+
+
+class Way(StrEnum):
+    """Where a robot looks in its file."""
+
+    X = "x"
+    Y = "y"
+    BACK = "-x"
+    RIGHT = "-y"
+
+
+RobotName = Annotated[
+    str,
+    typer.Argument(help="A built-in robot, or an MJCF or URDF file.", autocompletion=_built_in),
+]
+Floating = Annotated[
+    bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
+]
+Projected = Annotated[
+    bool, typer.Option("--projected", help="Lock the joints that leave the x–z plane.")
+]
+Forward = Annotated[
+    Way | None,
+    typer.Option(help="Where the robot looks in its file.", show_default="the plane it moves in"),
+]
+Pose = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="JOINT=VALUE,...",
+        help="Reference positions, locked joints too: rad, m, or degrees as in knee=23deg.",
+        show_default="as in the file",
+    ),
+]
+OnGround = Annotated[
+    str,
+    typer.Option(
+        "--ground",
+        metavar="FILE|flat|slope:-3|stairs:0.02x0.3|rough:0.01:7",
+        help="Ground: degrees (positive climbs), rise x tread in m, height in m and seed; or a "
+        "file of corners x z in m.",
+    ),
+]
+Pushed = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--push",
+        metavar="LINK:FORCE:START:DURATION",
+        help="Push a link, in N along x (or X,Z) and s; repeat the option for more.",
+    ),
+]
 SavedGait = Annotated[
     Path | None, typer.Option("--gait", help="Walk this saved gait instead of designing one.")
 ]
@@ -22,13 +81,27 @@ Debug = Annotated[
 ]
 
 
-def method_called(name: str, step: float) -> Method:
-    """Return the method of a name, which may be that of a scheme or a law, with a step (s)."""
+def reading(
+    floating: bool, projected: bool, forward: Way | None, pose: list[str] | None
+) -> LoadOptions:
+    """Return how a robot's file is to be read."""
+    way = None if forward is None else forward.value
+    return {
+        "floating": floating, "projected": projected, "forward": way, "pose": pose_called(pose)
+    }  # fmt: skip
+
+
+def method_called(name: str, step: float, *, passive: bool = False) -> Method:
+    """Return the method of a name, which may be that of a scheme or a law, with a step (s).
+
+    The legs of a passive walker, of one length, may pass through the ground as they swing, where
+    a method can let them.
+    """
     from heelstrike import sim
 
     match name:
         case "event-driven":
-            return sim.EventDriven()
+            return sim.EventDriven(swing_feet_pass=passive)
         case "time-stepping":
             return sim.TimeStepping(step=step)
         case "compliant" | "hunt-crossley":

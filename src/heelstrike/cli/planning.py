@@ -1,7 +1,8 @@
-"""The gait that a command walks: the saved one that is asked for, or one that is designed."""
+"""What a command walks: a saved gait, one that is designed, or the walk of a passive walker."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,16 +12,25 @@ import typer
 from heelstrike.cli.terminal import stage
 
 if TYPE_CHECKING:
+    from heelstrike.analysis.limit_cycle import LimitCycle
+    from heelstrike.contact.ground import Ground
     from heelstrike.gait import Gait
     from heelstrike.robot import Robot
 
 
-def planned_gait(robot: Robot, path: Path | None, friction: float, **size: float | None) -> Gait:
-    """Load a gait, or design one; what is None of the size of its steps suits the robot."""
+def planned_walk(
+    robot: Robot, path: Path | None, ground: Ground, **size: float | None
+) -> Gait | LimitCycle:
+    """Load a gait, or design one; what is None of the size of its steps suits the robot.
+
+    Of a robot without motors it is the limit cycle on the ground.
+    """
     from heelstrike.experiments.walk import design, typical_step
     from heelstrike.gait import load_gait
 
     given = {name: value for name, value in size.items() if value is not None}
+    if robot.nu == 0 and robot.nc:
+        return _passive(robot, path, ground, given)
     if path is not None:
         if given:
             raise typer.BadParameter(
@@ -30,6 +40,7 @@ def planned_gait(robot: Robot, path: Path | None, friction: float, **size: float
             )
         return load_gait(path, robot)
     chosen = replace(typical_step(robot), **given)
+    friction = float(ground.model().friction.min())
     with stage(f"designing a gait of {chosen.length:g} m in {chosen.duration:g} s") as designing:
         gait = design(robot, chosen, friction=friction, progress=designing.reached)
         designing.outcome = (
@@ -37,3 +48,20 @@ def planned_gait(robot: Robot, path: Path | None, friction: float, **size: float
             f"cost {gait.cost:.4g} N²m²s"
         )
     return gait
+
+
+def _passive(
+    robot: Robot, path: Path | None, ground: Ground, size: Mapping[str, float]
+) -> LimitCycle:
+    from heelstrike.errors import GaitError
+    from heelstrike.experiments.passive import passive_walk
+
+    if path is not None or size:
+        raise GaitError(
+            f"robot {robot.name!r} has no motors to follow a gait: leave --gait, --step-length, "
+            "--step-duration and --clearance out; the slope says how it walks."
+        )
+    with stage("looking for a walk that repeats") as looking:
+        cycle = passive_walk(robot, ground)
+        looking.outcome = str(cycle)
+    return cycle

@@ -25,7 +25,7 @@ from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
-from heelstrike.sim import Controller, Run, simulate
+from heelstrike.sim import Controller, Push, Run, simulate
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.method import Method
 
@@ -182,12 +182,13 @@ def compare(
     ground: Ground | None = None,
     reference: str | None = None,
     control_period: float | None = None,
+    pushes: Sequence[Push] = (),
 ) -> Comparison:
     """Simulate the same thing by several methods and tell how far their answers differ.
 
     Parameters
     ----------
-    robot, controller, state, duration, ground, control_period
+    robot, controller, state, duration, ground, control_period, pushes
         As in :func:`heelstrike.simulate`.
     methods : sequence of Method, or mapping of names to them
         Ways through time; a sequence is named after their classes and options.
@@ -230,6 +231,7 @@ def compare(
                 method=method,
                 ground=ground,
                 control_period=control_period,
+                pushes=pushes,
             )
         except SimulationError as error:
             if name == first:

@@ -15,6 +15,9 @@ from heelstrike.sim import Run
 from heelstrike.view.figures import FIGURES
 from heelstrike.whole_file import write_whole
 
+OF_MOTORS = ("tracking", "velocities", "torque")
+"""Figures of what motors move, of which there are none on a passive walker."""
+
 
 @dataclass(frozen=True)
 class Saved:
@@ -57,20 +60,26 @@ class Results:
         """Files that are there, whole."""
         return tuple(each.path for each in self.saved if each.error is None)
 
-    def save_gait(self, gait: Gait) -> Path:
-        """Write gait.json, and remove the results of an earlier walk, which belong to another."""
+    def save_gait(self, gait: Gait | None) -> tuple[Path, ...]:
+        """Write gait.json, and remove the results of an earlier walk, which belong to another.
+
+        Of a walk without a gait nothing is written yet, and an earlier gait goes, too.
+        """
         path = self.directory / "gait.json"
-        gait.save(path)
+        if gait is None:
+            path.unlink(missing_ok=True)
+        else:
+            gait.save(path)
+            self.saved.append(Saved(path))
         pictures = ("walk.mp4", "walk.gif", *(f"{figure}.png" for figure in FIGURES))
         for stale in ("run.nc", "summary.json", *pictures):
             (self.directory / stale).unlink(missing_ok=True)
-        self.saved.append(Saved(path))
-        return path
+        return self.written
 
     def save_run(
         self,
         run: Run,
-        gait: Gait,
+        gait: Gait | None,
         *,
         figures: bool = True,
         animation: str | None = "mp4",
@@ -82,8 +91,8 @@ class Results:
         ----------
         run : Run
             The run.
-        gait : Gait
-            The gait it followed.
+        gait : Gait or None
+            The gait it followed, if it did.
         figures : bool
             Whether to draw figures.
         animation : str, optional
@@ -100,7 +109,8 @@ class Results:
             "run.nc": run.save,
             "summary.json": lambda path: write_whole(path, run.summary(gait=gait).to_json() + "\n"),
         }
-        for figure in FIGURES if figures else ():
+        shown = [each for each in FIGURES if run.robot.nu or each not in OF_MOTORS]
+        for figure in shown if figures else ():
             tasks[f"{figure}.png"] = _drawing(run, gait, figure)
         if animation is not None:
             tasks[f"walk.{animation}"] = run.animate
@@ -117,5 +127,5 @@ class Results:
         return tuple(self.saved[first:])
 
 
-def _drawing(run: Run, gait: Gait, figure: str) -> Callable[[Path], object]:
+def _drawing(run: Run, gait: Gait | None, figure: str) -> Callable[[Path], object]:
     return lambda path: run.plot(figure, gait=gait, path=path)

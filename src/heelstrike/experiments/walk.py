@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.analysis.limit_cycle import LimitCycle
+from heelstrike.analysis.support import walking_steps
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque
-from heelstrike.dynamics import center_of_mass, contact_positions
+from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
 from heelstrike.errors import GaitError, SimulationError
 from heelstrike.gait import Gait, optimize_gait
-from heelstrike.robot import Robot
-from heelstrike.sim import Controller, Run, simulate
+from heelstrike.robot import Robot, State
+from heelstrike.sim import Controller, Push, Run, simulate
 from heelstrike.sim.method import Method
 
 HEIGHT = 1.044
@@ -126,32 +128,89 @@ def design(
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """What a walk begins with.
+
+    Attributes
+    ----------
+    state : State
+        The robot on its ground.
+    step_duration : float
+        In s.
+    controller : Controller or None
+        What moves the joints.
+    """
+
+    state: State
+    step_duration: float
+    controller: Controller | None
+
+
+def beginning(robot: Robot, walked: Gait | LimitCycle, ground: Ground | None = None) -> Beginning:
+    """Put a robot on a ground as its gait begins, under computed torque, or on its limit cycle.
+
+    Where the ground slopes at the start, the whole robot is turned with it about the middle of its
+    stance foot, so that its feet lie on the ground as they do on the level; see also
+    :meth:`heelstrike.Robot.placed`.
+    """
+    if isinstance(walked, LimitCycle):
+        return Beginning(walked.state, walked.period, None)
+    state = walked.initial_state
+    if ground is not None and np.any(ground.model().vertices[:, 1]):
+        state = robot.placed(_turned(robot, state, _slope_at(ground, 0.0)), ground)
+    return Beginning(state, walked.step_duration, ComputedTorque(robot, walked))
+
+
+def _slope_at(ground: Ground, x: float) -> float:
+    """Inclination (rad) of the ground at x; positive climbs."""
+    corners = ground.model().vertices
+    segment = int(np.clip(np.searchsorted(corners[:, 0], x, "right") - 1, 0, len(corners) - 2))
+    run, rise = corners[segment + 1] - corners[segment]
+    return float(np.arctan2(rise, run))
+
+
+def _turned(robot: Robot, state: State, slope: float) -> State:
+    """Turn a floating robot with its motion about the world's origin, up by a slope (rad)."""
+    turn = np.array([[np.cos(slope), -np.sin(slope)], [np.sin(slope), np.cos(slope)]])
+    q, v = state.q.copy(), state.v.copy()
+    trunk = link_poses(robot, q).origin[2]
+    q[:2] += turn @ trunk - trunk
+    v[:2] = turn @ v[:2]
+    q[2] -= slope
+    return State(q, v)
+
+
 def walk(
     robot: Robot,
-    gait: Gait,
+    walked: Gait | LimitCycle,
     *,
     steps: int = 20,
     controller: Controller | None = None,
     method: Method | None = None,
     ground: Ground | None = None,
+    pushes: Sequence[Push] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Walk a gait.
+    """Walk a gait, or on from a limit cycle.
 
     Parameters
     ----------
     robot : Robot
         The robot.
-    gait : Gait
-        Its gait.
+    walked : Gait or LimitCycle
+        Its gait, or its walk without motors.
     steps : int
         Steps to walk. The run goes on for a tenth of a step after the time they should take.
     controller : Controller, optional
-        What moves the joints; computed torque with its usual gains by default.
+        What moves the joints; by default computed torque with its usual gains, nothing on a limit
+        cycle.
     method : Method, optional
         Way through time.
     ground : Ground, optional
-        The ground.
+        The ground, on which the robot is put as :func:`beginning` says.
+    pushes : sequence of Push
+        Forces that somebody else applies.
     progress : callable, optional
         Called now and then with the fraction of the walk that is done.
 
@@ -162,7 +221,8 @@ def walk(
     """
     if steps < 1:
         raise SimulationError(f"a walk has at least one step, got {steps}")
-    duration = (steps + LAST_STEP) * gait.step_duration
+    start = beginning(robot, walked, ground)
+    duration = (steps + LAST_STEP) * start.step_duration
 
     def report(time: float) -> None:
         if progress is not None:
@@ -170,26 +230,46 @@ def walk(
 
     return simulate(
         robot,
-        ComputedTorque(robot, gait) if controller is None else controller,
-        state=gait.initial_state,
+        start.controller if controller is None else controller,
+        state=start.state,
         duration=duration,
         method=method,
         ground=ground,
+        pushes=pushes,
         progress=report,
     )
 
 
-def why_unstable(gait: Gait) -> str | None:
-    """Say why computed torque follows a gait but cannot hold it; None if it can.
+def steps_taken(run: Run, walked: Gait | LimitCycle) -> int:
+    """Count the steps of a walk; on a limit cycle by the distance.
+
+    A wheel lands on one spoke after the other, and all of them are one foot; and a walker that
+    stumbles lands often and gets nowhere.
+    """
+    if not isinstance(walked, LimitCycle) or not len(run.time):
+        return len(walking_steps(run))
+    first, last = (center_of_mass(run.robot, run.position[row]) for row in (0, -1))
+    return int(np.hypot(*(last - first)) / walked.step_length)
+
+
+def why_unstable(walked: Gait | LimitCycle) -> str | None:
+    """Say why a robot cannot keep to what it walks; None if it can.
 
     On a flat foot every coordinate follows from the joints. On a point the robot tips about it as
     gravity will, whatever the joints do: the linearised step multiplies an error of that motion by
     some factor, 7.8 for rabbit's usual gait (:func:`heelstrike.find_limit_cycle`).
     """
-    if not gait.point_feet:
+    if isinstance(walked, LimitCycle):
+        if walked.stable:
+            return None
+        return (
+            "The walk repeats, but it is unstable: an error grows from step to step, by the factor "
+            f"{np.abs(walked.multipliers).max():.3g}. Another slope may have a stable one."
+        )
+    if not walked.point_feet:
         return None
     return (
-        f"robot {gait.robot!r} stands on point feet, on which the ground exerts no moment: no "
+        f"robot {walked.robot!r} stands on point feet, on which the ground exerts no moment: no "
         "motor acts on its tipping about the stance foot. Computed torque makes the joints follow "
         "the gait, and the first step with them, but an error of that motion grows from step to "
         "step until the robot falls."

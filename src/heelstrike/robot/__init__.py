@@ -8,6 +8,7 @@ from heelstrike.robot.inspection import Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import JointProperties, Model
+from heelstrike.robot.outlines import Outline
 from heelstrike.robot.plausibility import Finding, FindingKind
 from heelstrike.robot.robot import Foot, LockedJoint, Robot
 from heelstrike.robot.state import State
@@ -24,6 +25,7 @@ __all__ = [
     "LockedJoint",
     "Mirror",
     "Model",
+    "Outline",
     "Robot",
     "RobotBuilder",
     "RobotWarning",

@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.robot.convex import lowest_chain, touches_first
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
+from heelstrike.robot.files.shapes import mesh_corners
 from heelstrike.robot.files.snapping import IN_PLANE
 from heelstrike.robot.warning import warn
 
@@ -65,7 +67,9 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     of its two ends; a box or a cylinder in the plane becomes the two ends of its sole, the
     lowest edge in the reference configuration. Its upper corners are left out: they meet flat
     ground only when the robot has fallen, and every contact point costs time in every step. Whoever
-    needs them adds spheres of radius 1e-6 there. A mesh is treated like a box, with a warning.
+    needs them adds spheres of radius 1e-6 there. Of a mesh it is the corners of its convex outline
+    on which it stands and rolls, but for those that others of its link always keep off the ground;
+    see :mod:`heelstrike.robot.convex`.
 
     Parameters
     ----------
@@ -85,16 +89,15 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
         If they are more than `MOST_POINTS`.
     """
     points: list[ContactPoint] = []
+    of_meshes: set[ContactPoint] = set()
     skipped: list[str] = []
-    meshes: list[str] = []
     model, pose = file.model, file.pose
     for geom in _geoms_that_touch(file, links):
         link = int(links.of_body[model.geom_bodyid[geom]])
         turn = pose.geom_xmat[geom].reshape(3, 3)
         if model.geom_type[geom] == MESH:
-            vertices = pose.geom_xpos[geom] + _vertices(file, geom) @ turn.T
-            shape: tuple[NDArray[np.float64], float] | None = (_sole(vertices[:, ::2]), 0.0)
-            meshes.append(f"{file.name('geom', geom)} of {links.names[link]}")
+            vertices = pose.geom_xpos[geom, ::2] + mesh_corners(file, geom) @ turn[::2].T
+            shape: tuple[NDArray[np.float64], float] | None = (lowest_chain(vertices), 0.0)
         else:
             shape = _outline(
                 int(model.geom_type[geom]), model.geom_size[geom], pose.geom_xpos[geom], turn
@@ -106,19 +109,15 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
         friction = float(model.geom_friction[geom, 0])
         for x, z in centers - links.origin[link]:
             points.append(ContactPoint(link, float(x), float(z), radius, friction))
+            if model.geom_type[geom] == MESH:
+                of_meshes.add(points[-1])
     if skipped:
         warn(
             f"{file.source}: these geoms cannot touch the ground here, because their shape "
             f"(ellipsoid, tilted cylinder …) has no contact points: {', '.join(skipped)}. Add "
             "spheres, capsules or boxes where the robot meets the ground."
         )
-    if meshes:
-        warn(
-            f"{file.source}: these meshes touch the ground only at the two ends of their lowest "
-            f"edge: {', '.join(meshes)}. Where that is not the sole, replace them by boxes, "
-            "capsules or spheres."
-        )
-    points = in_order(points)
+    points = in_order(_without_idle(points, of_meshes))
     if len(points) > MOST_POINTS:
         raise file.error(
             f"the robot has {len(points)} contact points, and heelstrike takes up to "
@@ -128,12 +127,15 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     return points
 
 
-def _vertices(file: MujocoFile, geom: int) -> NDArray[np.float64]:
-    """Corners of a mesh, in the frame of its geom, (n, 3)."""
-    model = file.model
-    mesh = model.geom_dataid[geom]
-    first = model.mesh_vertadr[mesh]
-    return np.asarray(model.mesh_vert[first : first + model.mesh_vertnum[mesh]], dtype=np.float64)
+def _without_idle(points: list[ContactPoint], some: set[ContactPoint]) -> list[ContactPoint]:
+    """Leave out those of some points that never come first where their link meets the ground."""
+    kept = []
+    for link in sorted({point.link for point in points}):
+        own = [point for point in points if point.link == link]
+        place = np.array([(point.x, point.z) for point in own])
+        first = touches_first(place, np.array([point.radius for point in own]))
+        kept += [p for p, touches in zip(own, first, strict=True) if touches or p not in some]
+    return kept
 
 
 def _geoms_that_touch(file: MujocoFile, links: Links) -> list[int]:

@@ -14,6 +14,7 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import Model
+from heelstrike.robot.outlines import Outline
 from heelstrike.robot.state import State
 
 if TYPE_CHECKING:
@@ -95,6 +96,8 @@ class Robot:
         File or builder the robot came from, for error messages.
     locked : tuple of LockedJoint
         Joints of its file that do not move here, as ``projected=True`` makes them.
+    outlines : tuple of Outline
+        What its links look like, for pictures; nothing if its file has no shapes.
     """
 
     name: str
@@ -109,6 +112,7 @@ class Robot:
     contact_friction: tuple[float, ...] = ()
     source: str = field(default="", repr=False)
     locked: tuple[LockedJoint, ...] = field(default=(), repr=False)
+    outlines: tuple[Outline, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         if self.mirror is not None:

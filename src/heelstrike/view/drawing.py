@@ -1,8 +1,9 @@
 """The shape of a robot as line segments: what figures, animations and portraits are made of.
 
-A robot is drawn from its tree alone: a bone from every link to the links it carries, a sole
-through the contact points (or spokes to them, where they lie around the joint), and a bone to twice
-the distance of the centre of mass where a link ends, so that a trunk has a height.
+A robot is drawn by the outlines of its links (`Robot.outlines`). Links without outlines, and the
+drawings of a terminal, are made from the tree alone: a bone from every link to the links it
+carries, a sole through the contact points (or spokes to them, where they lie around the joint), and
+a bone to twice the distance of the centre of mass where a link ends, so that a trunk has a height.
 Massless links, the carriers of a floating base, are not drawn.
 """
 
@@ -10,20 +11,24 @@ from __future__ import annotations
 
 import enum
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics import link_poses
+from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.push import Push
 from heelstrike.view.style import (
+    FORCE_COLOR,
     INK,
     ORANGE,
     PALE,
@@ -43,7 +48,9 @@ DISC_CORNERS = 16
 THICKEST = 15.0  # points, of a bone that has the whole mass
 THINNEST = 2.5
 DISC_WIDTH = 1.2
+RIM_WIDTH = 0.6  # of the light line round an outline
 WIDTH_SHARE = 0.74  # of the height of a portrait that the robot may take in width
+PUSH_LENGTH = 0.15  # of the size of a portrait
 LEGS_APART = 0.3  # rad that each leg of a portrait is turned at its root
 
 
@@ -71,6 +78,9 @@ class Skeleton:
         `Side` of each segment.
     foot : (ns,) int
         Index of the foot at the end of the segment's leg, -1 for the trunk.
+    pieces : tuple of slice
+        Segments that go round an outline, or are a bone, in the order of drawing; empty where all
+        are bones.
     """
 
     link: NDArray[np.int64]
@@ -78,6 +88,7 @@ class Skeleton:
     width: Floats
     side: NDArray[np.int64]
     foot: NDArray[np.int64]
+    pieces: tuple[slice, ...] = ()
 
     @property
     def colors(self) -> list[str]:
@@ -101,15 +112,71 @@ class Skeleton:
         """
         return in_world(origin[..., self.link, :], angle[..., self.link], self.local)
 
-    def lines(self, segments: Floats, scale: float = 1.0) -> LineCollection:
-        """Lines to draw, from segments (ns, 2, 2) in the world and a factor of all widths."""
-        return LineCollection(
-            list(segments),
-            colors=self.colors,
-            linewidths=scale * self.width,
-            capstyle="round",
+    def drawn(self, segments: Floats, scale: float = 1.0) -> LineCollection | PolyCollection:
+        """What to draw, from segments (ns, 2, 2) in the world and a factor of all widths."""
+        if not self.pieces:
+            return LineCollection(
+                list(segments),
+                colors=self.colors,
+                linewidths=scale * self.width,
+                capstyle="round",
+                zorder=3,
+            )
+        first = [piece.start for piece in self.pieces]
+        colors = [self.colors[i] for i in first]
+        bone = [piece.stop - piece.start == 1 for piece in self.pieces]
+        return PolyCollection(
+            self._corners(segments),
+            facecolors=colors,
+            edgecolors=[c if thin else "white" for c, thin in zip(colors, bone, strict=True)],
+            linewidths=scale * self.width[first],
+            joinstyle="round",
             zorder=3,
         )
+
+    def move(self, drawn: LineCollection | PolyCollection, segments: Floats) -> None:
+        """Move what was drawn to other segments."""
+        if isinstance(drawn, LineCollection):
+            drawn.set_segments(list(segments))
+        else:
+            drawn.set_verts(self._corners(segments))
+
+    def _corners(self, segments: Floats) -> list[Floats]:
+        if not len(segments):
+            return []
+        return [
+            segments[piece, 0] if piece.stop - piece.start > 1 else segments[piece.start]
+            for piece in self.pieces
+        ]
+
+
+def body(robot: Robot) -> Skeleton:
+    """Make what a robot is drawn by: outlines, and bones of the links that have none."""
+    bones = skeleton(robot)
+    if not robot.outlines:
+        return bones
+    shaped = {outline.link for outline in robot.outlines}
+    side = _sides(robot)
+    parts = [
+        (bones.link[i : i + 1], bones.local[i : i + 1], float(bones.width[i]))
+        for i, link in enumerate(bones.link[:, 0])
+        if int(link) not in shaped
+    ]
+    for outline in robot.outlines:
+        rim = outline.rim()
+        edges = np.stack((rim, np.roll(rim, -1, axis=0)), axis=1)
+        parts.append((np.full((len(rim), 2), outline.link), edges, RIM_WIDTH))
+    parts.sort(key=lambda part: side[part[0][0, 0]])
+    ends = np.cumsum([len(links) for links, _, _ in parts]).tolist()
+    links = np.concatenate([links for links, _, _ in parts])
+    return Skeleton(
+        link=links,
+        local=np.concatenate([local for _, local, _ in parts]),
+        width=np.concatenate([np.full(len(links), width) for links, _, width in parts]),
+        side=side[links[:, 0]],
+        foot=legs(robot)[links[:, 0]],
+        pieces=tuple(slice(start, end) for start, end in pairwise((0, *ends))),
+    )
 
 
 def skeleton(robot: Robot) -> Skeleton:
@@ -251,7 +318,13 @@ def _says_left(robot: Robot, link: int) -> bool:
     return "left" in f"{robot.joint_names[link]} {robot.link_names[link]}".lower()
 
 
-def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
+def robot_picture(
+    robot: Robot,
+    path: str | os.PathLike[str],
+    *,
+    ground: Ground | None = None,
+    pushes: Sequence[Push] = (),
+) -> Path:
     """Write a portrait of a robot, standing as in its file but with its legs apart.
 
     Parameters
@@ -260,6 +333,10 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         The robot.
     path : str or path
         Picture to write: .png, .pdf or .svg.
+    ground : Ground, optional
+        Ground on which it stands instead, as :meth:`heelstrike.Robot.standing` puts it there.
+    pushes : sequence of Push
+        Pushes to draw, as arrows that end at what they push.
 
     Returns
     -------
@@ -270,22 +347,26 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
     ------
     ViewError
         If the file cannot be written.
+    RobotError
+        If there is a ground, and the robot cannot stand on any.
+    SimulationError
+        If the robot has no such link as is pushed.
     """
     model = robot.model
-    q = legs_apart(robot)
+    q = legs_apart(robot) if ground is None else robot.standing(ground).q
     poses = link_poses(robot, q)
-    if robot.floating and robot.nc:  # stand on z = 0
+    if ground is None and robot.floating and robot.nc:  # stand on z = 0
         q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
         poses = link_poses(robot, q)
-    bones = skeleton(robot)
-    segments = bones.segments(poses.origin, poses.angle)
+    shape = body(robot)
+    segments = shape.segments(poses.origin, poses.angle)
     low, high = extent(segments)
     width, height = high - low
     size = max(float(height), float(width) / WIDTH_SHARE, 1e-3)
     with styled():
-        figure = new_figure(4.6, 5.8)
-        axes = figure.add_subplot()
-        axes.add_collection(bones.lines(segments))
+        page = new_figure(4.6, 5.8)
+        axes = page.add_subplot()
+        axes.add_collection(shape.drawn(segments))
         massive = np.flatnonzero(model.mass > 0.0)
         joints = [i for i in massive if model.axis[i, 0] != 0.0 and model.parent[i] >= 0]
         points = _contact_bottoms(robot, poses.origin, poses.angle)
@@ -299,22 +380,51 @@ def robot_picture(robot: Robot, path: str | os.PathLike[str]) -> Path:
         for label, (places, marker, look) in marks.items():
             if len(places):
                 axes.plot(*places.T, marker, label=label, **({"ms": 5, "zorder": 6} | look))
-        ground = float(points[:, 1].min()) if len(points) else float(low[1])
-        axes.axhspan(ground - 0.06 * size, ground, color=PALE, zorder=0)
         middle = 0.5 * float(low[0] + high[0])
+        left, right = middle - 0.42 * size, middle + 0.42 * size
+        if ground is None:
+            height = float(points[:, 1].min()) if len(points) else float(low[1])
+            surface = np.array([[left, height], [right, height]])
+        else:
+            surface = ground_outline(ground, left, right)
+        bottom = float(surface[:, 1].min()) - 0.06 * size
+        axes.fill_between(surface[:, 0], surface[:, 1], bottom, color=PALE, lw=0.0, zorder=0)
+        _draw_pushes(axes, robot, poses, pushes, size)
         axes.set(
-            xlim=(middle - 0.42 * size, middle + 0.42 * size),
-            ylim=(ground - 0.06 * size, high[1] + 0.06 * size),
+            xlim=(left, right),
+            ylim=(bottom, high[1] + 0.06 * size),
             xlabel="x (m)",
             ylabel="z (m)",
             aspect="equal",
         )
-        figure.suptitle(
+        page.suptitle(
             f"{robot.name}: {robot.total_mass:.4g} kg,\n"
             f"{robot.nv} coordinates, {robot.nu} actuators"
         )
         legend_above(axes)
-        return save_figure(figure, path)
+        return save_figure(page, path)
+
+
+def _draw_pushes(
+    axes: Axes, robot: Robot, poses: LinkPoses, pushes: Sequence[Push], size: float
+) -> None:
+    """Draw pushes as arrows of one length that end where they act, with their forces."""
+    for push in pushes:
+        link, place = push.place(robot)
+        x, z = in_world(poses.origin[link], poses.angle[link], np.array(place)).tolist()
+        strength = float(np.hypot(*push.force))
+        along = (np.array(push.force) / (strength or 1.0)).tolist()
+        arrow = {"arrowstyle": "-|>", "color": FORCE_COLOR, "lw": 2.0}
+        axes.annotate(
+            f"{strength:.4g} N",
+            (x, z),
+            xytext=(x - PUSH_LENGTH * size * along[0], z - PUSH_LENGTH * size * along[1]),
+            arrowprops=arrow,
+            color=FORCE_COLOR,
+            ha="right" if along[0] > 0.0 else "left",
+            va="center",
+            zorder=7,
+        )
 
 
 def legs_apart(robot: Robot) -> Floats:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.motion import run_motion
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
-from heelstrike.view.drawing import extent, ground_outline, leg_labels, skeleton
+from heelstrike.view.drawing import body, extent, ground_outline, leg_labels
 from heelstrike.view.style import (
     FORCE_COLOR,
     GREY,
@@ -92,7 +92,7 @@ def frames(run: Run, interval: float) -> Frames:
     return Frames(
         time=time,
         row=row,
-        segments=skeleton(run.robot).segments(motion.link_origin[row], motion.link_angle[row]),
+        segments=body(run.robot).segments(motion.link_origin[row], motion.link_angle[row]),
         center=motion.center_of_mass[row],
         point=run.contact_point[row],
         force=force,
@@ -127,11 +127,11 @@ class Film:
         axes.set_axis_off()
         self._frame_view(size)
         axes.set(xlim=self._x, ylim=self._z)
-        bones = skeleton(run.robot)
+        self._body = body(run.robot)
         self._soil = Polygon(np.zeros((1, 2)), closed=True, facecolor=PALE, edgecolor=GREY, lw=1.0)
         axes.add_patch(self._soil)
         self._marks = LineCollection([], colors=GREY, linewidths=1.0)
-        self._robot = bones.lines(np.zeros((0, 2, 2)), scale)
+        self._robot = self._body.drawn(np.zeros((0, 2, 2)), scale)
         for collection in (self._marks, self._robot):
             axes.add_collection(collection, autolim=False)
         self._arrows = Arrows(axes, self._size, run.robot.weight, width=2.5 * scale)
@@ -179,7 +179,7 @@ class Film:
         canvas: Any = self._canvas
         canvas.restore_region(self._background)
         self._draw_ground(camera)
-        self._robot.set_segments(list(frames.segments[index] - camera))
+        self._body.move(self._robot, frames.segments[index] - camera)
         self._arrows.show(frames.point[index] - camera, frames.force[index])
         for marker, place in (
             (self._pressure, frames.pressure[index] - camera),

@@ -13,7 +13,7 @@ from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.support import walking_steps
 from heelstrike.sim.run import Run
 from heelstrike.view.arrows import Arrows, draw_scale
-from heelstrike.view.drawing import extent, ground_outline, leg_labels, skeleton
+from heelstrike.view.drawing import body, extent, ground_outline, leg_labels
 from heelstrike.view.panels import Excerpt, impact_rows
 from heelstrike.view.style import FORCE_COLOR, PALE, figure_title, new_figure
 
@@ -24,10 +24,10 @@ def draw_snapshots(excerpt: Excerpt) -> Figure:
     """The robot at equal times of one step, side by side, with the forces on it."""
     run = excerpt.run
     motion = run_motion(run)
-    bones = skeleton(run.robot)
+    shape = body(run.robot)
     start, end = _middle_step(run, excerpt.rows)
     at = _usual_rows(run, np.linspace(start, end, POSES))
-    segments = bones.segments(motion.link_origin[at], motion.link_angle[at])
+    segments = shape.segments(motion.link_origin[at], motion.link_angle[at])
     center = motion.center_of_mass[at, 0]
     height = float(run.ground.height(center[POSES // 2]))
     origin = np.column_stack((center, np.full(POSES, height)))
@@ -38,7 +38,7 @@ def draw_snapshots(excerpt: Excerpt) -> Figure:
     axes = figure.add_subplot()
     shift = np.column_stack((spacing * np.arange(POSES), np.zeros(POSES))) - origin
     for i, row in enumerate(at):
-        axes.add_collection(bones.lines(segments[i] + shift[i], 0.55))
+        axes.add_collection(shape.drawn(segments[i] + shift[i], 0.55))
         surface = ground_outline(run.ground, center[i] - 0.5 * spacing, center[i] + 0.5 * spacing)
         below = surface - [0.0, 0.02 * size]
         axes.fill(*(np.concatenate((surface, below[::-1])) + shift[i]).T, color=PALE, zorder=0)

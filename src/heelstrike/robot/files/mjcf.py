@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Unpack
 
@@ -15,6 +16,7 @@ from heelstrike.robot.files.links import read_links
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
 from heelstrike.robot.files.options import AVERAGE, LoadOptions, Options
 from heelstrike.robot.files.posture import BALL
+from heelstrike.robot.files.shapes import read_outlines
 from heelstrike.robot.files.unmodelled import warn_of_unmodelled
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
@@ -88,7 +90,7 @@ def _robot(file: MujocoFile, name: str, options: Options) -> Robot:
         torque_upper=_limits(actuators.upper),
         pivot=int(hinges[0]) if len(hinges) else 0,
     )
-    return assembled(
+    robot = assembled(
         name,
         arrays,
         joint_names=tuple(one.name for one in file.coordinates),
@@ -99,6 +101,7 @@ def _robot(file: MujocoFile, name: str, options: Options) -> Robot:
         locked=file.locked,
         average=options.mirror == AVERAGE,
     )
+    return replace(robot, outlines=read_outlines(file, links))
 
 
 def _ranges(file: MujocoFile) -> dict[str, Floats]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Model
+from heelstrike.robot.outlines import Outline
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 
@@ -52,6 +53,12 @@ _MIRROR = {
     "mirror_contact": Variable(("contact",), kind=int),
     "mirror_foot": Variable(("foot",), kind=int),
 }
+_OUTLINES = {
+    "outline_link": Variable(("outline",), kind=int),
+    "outline_radius": Variable(("outline",), "m"),
+    "outline_corners": Variable(("outline",), kind=int),
+    "outline_corner": Variable(("corner", "xz"), "m"),
+}
 
 
 def robot_to_dataset(robot: Robot) -> xarray.Dataset:
@@ -72,7 +79,14 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
         values["contact_friction"] = robot.contact_friction
     if robot.mirror is not None:
         values |= {name: getattr(robot.mirror, name.removeprefix("mirror_")) for name in _MIRROR}
-    declared = _NUMBERS | _NAMES | _FEET | _FRICTION | _MIRROR
+    if robot.outlines:
+        values |= {
+            "outline_link": [each.link for each in robot.outlines],
+            "outline_radius": [each.radius for each in robot.outlines],
+            "outline_corners": [len(each.corners) for each in robot.outlines],
+            "outline_corner": np.concatenate([each.corners for each in robot.outlines]),
+        }
+    declared = _NUMBERS | _OUTLINES | _NAMES | _FEET | _FRICTION | _MIRROR
     # NetCDF has no lists of no text: names of nothing are left out.
     variables = {
         name: declared[name].written(each)
@@ -131,9 +145,18 @@ def stored_robot(contents: Mapping[str, NDArray[Any]]) -> Robot:
         floating=bool(stored.count("floating")),
         contact_friction=tuple(friction),
         source=stored.text("source"),
+        outlines=_outlines(stored.arrays(_OUTLINES, sizes)) if "outline_link" in contents else (),
     )
     _check(robot)
     return robot
+
+
+def _outlines(arrays: Mapping[str, NDArray[Any]]) -> tuple[Outline, ...]:
+    link, radius, corners, corner = arrays.values()
+    if np.any(corners < 1) or corners.sum() != len(corner) or np.any(radius < 0.0):
+        raise DamageError("outlines must have corners, and radii that are not negative")
+    parts = np.split(corner, np.cumsum(corners)[:-1])
+    return tuple(map(Outline, link.tolist(), parts, radius.tolist()))
 
 
 def _check(robot: Robot) -> None:
@@ -143,6 +166,7 @@ def _check(robot: Robot) -> None:
     astray: dict[str, Any] = {
         "parent": np.any(model.parent >= np.arange(robot.nl)),
         "foot_link": np.any((feet < 0) | (feet >= robot.nl)),
+        "outline_link": any(not 0 <= each.link < robot.nl for each in robot.outlines),
     }
     for name, number in NUMBERS.items():
         values = np.asarray(getattr(model, name))

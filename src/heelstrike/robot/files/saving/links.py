@@ -71,6 +71,12 @@ def warn_of_loss(
         for what, joints in lost.items()
         if len(joints)
     ]
+    seen = zip(
+        model.contact_link, map(tuple, model.contact_position), model.contact_radius, strict=True
+    )
+    discs = set(seen)  # which are spheres there
+    if any((o.link, *map(tuple, o.corners), o.radius) not in discs for o in robot.outlines):
+        said.append("outlines, for pictures")
     if said:
         warn(
             f"{robot.name}: {kind} cannot hold everything this robot has. Left out: "

@@ -18,6 +18,7 @@ from heelstrike.robot.files.saving.text import (
     range_of,
     unique,
 )
+from heelstrike.robot.files.shapes import COUNT, PREFIX
 from heelstrike.robot.model import PROPERTIES, Floats
 from heelstrike.robot.robot import Robot
 
@@ -31,10 +32,15 @@ def mjcf(robot: Robot) -> Element:
     SubElement(root, "compiler", angle="radian", autolimits="true")
     SubElement(root, "option", gravity=numbers((model.gravity[0], 0.0, model.gravity[1])))
     custom = [(name, joint) for name in CUSTOM for joint in joints_with(robot, name)]
-    holder = SubElement(root, "custom") if custom else root
+    holder = SubElement(root, "custom")
     for name, joint in custom:
         data = number(getattr(model, name)[joint])
         SubElement(holder, "numeric", name=f"{name}:{robot.joint_names[joint]}", data=data)
+    SubElement(holder, "numeric", name=COUNT, data=str(len(robot.outlines)))
+    for count, outline in enumerate(robot.outlines):
+        name = f"{PREFIX}:{count}:{robot.joint_names[outline.link]}"
+        data = numbers((outline.radius, *outline.corners.ravel()))
+        SubElement(holder, "numeric", name=name, data=data)
     default = SubElement(root, "default")
     SubElement(default, "geom", contype="0", conaffinity="0", rgba="0.55 0.60 0.68 1")
     world = SubElement(root, "worldbody")

@@ -1,0 +1,114 @@
+"""Passive walkers of the library: walks down a slope, without motors, that repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
+from heelstrike.contact.ground import Ground
+from heelstrike.errors import LimitCycleError
+from heelstrike.robot import Robot, State
+from heelstrike.sim import EventDriven
+
+METHOD = EventDriven(rtol=1e-12, atol=1e-13, swing_feet_pass=True)
+"""How steps of a search are taken; legs of one length scuff the ground at mid-stance."""
+
+COMPASS = (
+    (0.7094, 0.0757, -0.1796, 0.2269),
+    (3.6618, 0.7549, -9.457, 5.7268),
+    (3.632, 1.5454, -30.7392, 21.0734),
+)
+"""Half the angle between the legs of the compass gait at touchdown (rad) and the rates (rad/s) of
+the leg that stands and of the one that swings: coefficients of the first four powers of the cube
+root of the slope (rad). They fit the walks that :func:`find_limit_cycle` finds from 0.05 to 11
+degrees, beginning with that of Goswami, Thuilot and Espiau (1998) at 3, to 2e-3. On mild slopes all
+three grow as the cube root (Garcia, Chatterjee, Ruina and Coleman 1998)."""
+
+HALF_SPOKE = np.pi / 8.0
+"""Half the angle between two spokes of the rimless wheel, in rad."""
+
+
+def passive_walk(robot: Robot, ground: Ground) -> LimitCycle:
+    """Find the walk of a passive walker of the library that repeats on a slope.
+
+    Parameters
+    ----------
+    robot : Robot
+        A robot without motors, known by its name: ``compass_gait`` or ``rimless_wheel``.
+    ground : Ground
+        One slope that descends along +x.
+
+    Returns
+    -------
+    LimitCycle
+        The walk, with a state to start on.
+
+    Raises
+    ------
+    LimitCycleError
+        If no walk of this robot is known, or it has none that repeats on this ground.
+    """
+    start = _STARTS.get(robot.name)
+    if start is None:
+        raise LimitCycleError(
+            f"robot {robot.name!r} has no motors, and where its walk begins is not known here, as "
+            f"it is of {' and '.join(_STARTS)}. hs.find_limit_cycle finds a walk that repeats from "
+            "a state near it, and hs.simulate starts there."
+        )
+    descent = -ground.slope
+    if ground.profile is not None or not descent > 0.0:
+        raise LimitCycleError(
+            f"robot {robot.name!r} has no motors and walks down a slope only: give it ground that "
+            "descends, Ground(slope=-0.05), or --ground slope:-3 on the command line."
+        )
+    try:
+        return find_limit_cycle(robot, start(robot, descent), ground=ground, method=METHOD)
+    except LimitCycleError as error:
+        raise LimitCycleError(
+            f"no walk of {robot.name!r} was found that repeats on a slope of "
+            f"-{np.rad2deg(descent):.4g} degrees; another slope may do: {error}"
+        ) from error
+
+
+def _compass_gait(robot: Robot, descent: float) -> State:
+    """State just after touchdown, the right foot at the origin."""
+    powers = np.cbrt(descent) ** np.arange(1, 5)
+    half, stance_rate, swing_rate = np.array(COMPASS) @ powers
+    stance, swing = descent - half, descent + half
+    hip = np.array([np.cos(stance), -np.sin(stance)]) * stance_rate
+    return robot.state(
+        {
+            **{"root_x": np.sin(stance), "root_z": np.cos(stance)},
+            **{"right_leg": stance, "left_leg": swing},
+        },
+        {
+            **{"root_x": hip[0], "root_z": hip[1]},
+            **{"right_leg": stance_rate, "left_leg": swing_rate},
+        },
+    )
+
+
+def _rimless_wheel(robot: Robot, descent: float) -> State:
+    """State just after a spoke has met the ground at the origin, at the speed of the closed form.
+
+    Rolling over a spoke of length r adds 4 g/r sin α sin γ to the square of the speed, of which an
+    impact keeps cos² 2α (Coleman 1998), for the spokes α = 22.5° apart from the middle between two.
+    """
+    gravity = float(np.hypot(*robot.model.gravity))
+    kept = np.cos(2.0 * HALF_SPOKE) ** 2
+    gained = 4.0 * gravity * np.sin(HALF_SPOKE) * np.sin(descent)
+    rate = float(np.sqrt(gained * kept / (1.0 - kept)))
+    lean = descent - HALF_SPOKE
+    return robot.state(
+        {"root_x": np.sin(lean), "root_z": np.cos(lean), "root_pitch": descent},
+        {"root_x": np.cos(lean) * rate, "root_z": -np.sin(lean) * rate, "root_pitch": rate},
+    )
+
+
+_STARTS: dict[str, Callable[[Robot, float], State]] = {
+    "compass_gait": _compass_gait,
+    "rimless_wheel": _rimless_wheel,
+}
+"""States near the walk of the library's passive walkers, by the slope's descent (rad)."""

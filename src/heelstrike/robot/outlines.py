@@ -1,0 +1,61 @@
+"""What a robot looks like from its right side: convex outlines fixed to its links."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from heelstrike.robot.convex import FLAT, Floats, convex_hull
+
+ROUND = 16
+"""Corners of a disc that is drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """A convex shape on a link, seen in the plane: a polygon, or what a disc covers within one.
+
+    Attributes
+    ----------
+    link : int
+        The link that it is fixed to.
+    corners : (k, 2) float
+        Corners (x, z) of the polygon in the frame of the link, in m; one for a disc, two for a
+        capsule.
+    radius : float
+        Radius of the disc, in m; 0 for the polygon itself.
+    """
+
+    link: int
+    corners: Floats
+    radius: float
+
+    def rim(self) -> Floats:
+        """Corners (m, 2) of a polygon around all of it, in the frame of the link (m)."""
+        if self.radius == 0.0:
+            return self.corners
+        turn = np.arange(ROUND) * (2.0 * np.pi / ROUND)
+        disc = self.radius * np.column_stack((np.cos(turn), np.sin(turn)))
+        return convex_hull((self.corners[:, None] + disc).reshape(-1, 2))
+
+
+def without_hidden(outlines: list[Outline]) -> tuple[Outline, ...]:
+    """Leave out outlines that are points, or within another one of the same link."""
+    rims = [each.rim() for each in outlines]
+    kept: list[int] = []
+    for i in sorted(range(len(rims)), key=lambda i: -float(np.ptp(rims[i], axis=0).max())):
+        larger = [rims[k] for k in kept if outlines[k].link == outlines[i].link]
+        size = np.ptp(rims[i], axis=0).max()
+        if size > FLAT and not any(_inside(rims[i], rim) for rim in larger):
+            kept.append(i)
+    return tuple(outlines[i] for i in sorted(kept))
+
+
+def _inside(points: Floats, polygon: Floats) -> bool:
+    """Whether all points lie in a convex polygon whose corners go from +x towards +z."""
+    if len(polygon) < 3:
+        return False
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    away = points[:, None] - polygon
+    return bool(np.all(edge[:, 0] * away[..., 1] - edge[:, 1] * away[..., 0] >= -FLAT))
