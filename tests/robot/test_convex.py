@@ -5,8 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from heelstrike.robot.convex import convex_hull, lowest_chain, touches_first, with_fewer_corners
-from heelstrike.robot.outlines import Outline, without_hidden
+from heelstrike.robot.shapes.convex import (
+    convex_hull,
+    lowest_chain,
+    touches_first,
+    with_fewer_corners,
+)
+from heelstrike.robot.shapes.outlines import Outline, without_hidden
 
 SQUARE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 

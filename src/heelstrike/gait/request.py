@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.sole import reach, sole, standing_height
-from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.sides.mirror import Mirror
 
 Floats = NDArray[np.float64]
 

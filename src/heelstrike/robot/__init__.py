@@ -6,11 +6,11 @@ from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.human import BodyTable, human
 from heelstrike.robot.inspection import Inspection, inspect_robot
 from heelstrike.robot.library import builtin_robots, load_robot
-from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import JointProperties, Model
-from heelstrike.robot.outlines import Outline
 from heelstrike.robot.plausibility import Finding, FindingKind
 from heelstrike.robot.robot import Foot, LockedJoint, Robot
+from heelstrike.robot.shapes.outlines import Outline
+from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.state import State
 from heelstrike.robot.warning import RobotWarning
 

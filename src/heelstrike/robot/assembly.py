@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.averaging import averaged
 from heelstrike.robot.contact_points import ContactPoint
 from heelstrike.robot.model import NUMBERS, Floats, Model, label
 from heelstrike.robot.plausibility import unlikely_numbers
 from heelstrike.robot.robot import Foot, LockedJoint, Robot
-from heelstrike.robot.symmetry import find_mirror
+from heelstrike.robot.sides.averaging import averaged
+from heelstrike.robot.sides.symmetry import find_mirror
 from heelstrike.robot.warning import warn
 
 LARGEST_NUMBER = 1e10

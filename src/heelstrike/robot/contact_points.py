@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.convex import lowest_chain, touches_first
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
 from heelstrike.robot.files.snapping import IN_PLANE
+from heelstrike.robot.shapes.convex import lowest_chain, touches_first
 from heelstrike.robot.warning import warn
 
 SAME_PLACE = 1e-9  # metres; nearer points of one link are one point
@@ -69,7 +69,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     ground only when the robot has fallen, and every contact point costs time in every step. Whoever
     needs them adds spheres of radius 1e-6 there. Of a mesh it is the corners of its convex outline
     on which it stands and rolls, but for those that others of its link always keep off the ground;
-    see :mod:`heelstrike.robot.convex`.
+    see :mod:`heelstrike.robot.shapes.convex`.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ from heelstrike.robot.plausibility import (
     unlikely_numbers,
 )
 from heelstrike.robot.robot import Foot, Robot
-from heelstrike.robot.symmetry import find_mirror
+from heelstrike.robot.sides.symmetry import find_mirror
 from heelstrike.robot.warning import RobotWarning
 
 SAME_HEIGHT = 1e-4

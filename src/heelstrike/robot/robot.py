@@ -12,9 +12,9 @@ import numpy as np
 
 from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
-from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import Model
-from heelstrike.robot.outlines import Outline
+from heelstrike.robot.shapes.outlines import Outline
+from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.state import State
 
 if TYPE_CHECKING:

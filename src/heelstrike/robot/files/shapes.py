@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.robot.convex import Floats, convex_hull, with_fewer_corners
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
-from heelstrike.robot.outlines import Outline, without_hidden
+from heelstrike.robot.shapes.convex import Floats, convex_hull, with_fewer_corners
+from heelstrike.robot.shapes.outlines import Outline, without_hidden
 from heelstrike.robot.warning import warn
 
 SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(2, 8)  # MuJoCo's mjtGeom

@@ -10,7 +10,7 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.posture import BALL, FREE, HINGE
 from heelstrike.robot.files.snapping import IN_PLANE
-from heelstrike.robot.symmetry import counterparts
+from heelstrike.robot.sides.symmetry import counterparts
 
 SHOWN = 4  # how many culprits a message lists before it counts the rest
 

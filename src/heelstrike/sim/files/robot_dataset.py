@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Model
-from heelstrike.robot.outlines import Outline
 from heelstrike.robot.robot import Foot, Robot
+from heelstrike.robot.shapes.outlines import Outline
+from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.sim.files.variables import DamageError, Stored, Variable
 
 if TYPE_CHECKING:

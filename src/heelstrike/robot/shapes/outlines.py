@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from heelstrike.robot.convex import FLAT, Floats, convex_hull
+from heelstrike.robot.shapes.convex import FLAT, Floats, convex_hull
 
 ROUND = 16
 """Corners of a disc that is drawn."""

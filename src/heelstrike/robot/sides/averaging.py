@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
-from heelstrike.robot.symmetry import (
+from heelstrike.robot.sides.mirror import Mirror
+from heelstrike.robot.sides.symmetry import (
     FLOOR,
     ROUND_OFF,
     SAME_PLACE,

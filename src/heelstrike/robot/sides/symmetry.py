@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.robot.mirror import Mirror
 from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
 from heelstrike.robot.robot import Foot
+from heelstrike.robot.sides.mirror import Mirror
 
 TOLERANCE = 1e-4
 """Relative difference up to which numbers of left and right are the same: files round, and those

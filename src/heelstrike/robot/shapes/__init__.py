@@ -1,0 +1,1 @@
+"""What links look like in the plane: outlines, and the corners of them that matter."""
