@@ -81,7 +81,7 @@ def test_unknown_keywords_raise() -> None:
 
 def test_restitution_needs_a_scheme_that_knows_it() -> None:
     scheme = hs.TimeStepping(scheme=Scheme.GAP_LINEARISED)
-    with pytest.raises(hs.SimulationError, match="IMPACT_RESOLVED or Scheme.MOREAU_JEAN"):
+    with pytest.raises(hs.SimulationError, match=r"IMPACT_RESOLVED or Scheme\.MOREAU_JEAN"):
         run(None, ground=hs.Ground(restitution=0.5), method=scheme)
 
 
