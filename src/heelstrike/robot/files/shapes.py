@@ -18,6 +18,12 @@ corner in the frame of the link that the joint moves."""
 COUNT = "outlines"
 """The custom number of them, which is zero for a robot that has none."""
 
+MOST_SHAPES = 200
+"""Bodies of more shapes than this are drawn as bones."""
+
+FARTHEST = 1e6
+"""Metres within which a shape is drawn."""
+
 TURN = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 CIRCLE = np.column_stack((np.cos(TURN), np.sin(TURN)))
 
@@ -37,7 +43,9 @@ def read_outlines(file: MujocoFile, links: Links) -> tuple[Outline, ...]:
     for body in range(1, model.nbody):
         link = int(links.of_body[body])
         geoms = np.flatnonzero(np.asarray(model.geom_bodyid) == body)
-        shapes = [_shape(file, int(geom), links.origin[link]) for geom in geoms]
+        if len(geoms) > MOST_SHAPES:
+            continue
+        shapes = [_drawable(file, int(geom), links.origin[link]) for geom in geoms]
         for only_seen in (True, False):
             outlines = [
                 Outline(link, *shape)
@@ -48,6 +56,20 @@ def read_outlines(file: MujocoFile, links: Links) -> tuple[Outline, ...]:
                 found += outlines
                 break
     return without_hidden(found)
+
+
+def _drawable(file: MujocoFile, geom: int, origin: Floats) -> tuple[Floats, float] | None:
+    """Shape of a geom, None of one that is too large for numbers, too."""
+    from scipy.spatial import QhullError
+
+    with np.errstate(all="ignore"):
+        try:
+            shape = _shape(file, geom, origin)
+        except (QhullError, np.linalg.LinAlgError):
+            return None
+    if shape is None or not (np.all(np.abs(shape[0]) < FARTHEST) and shape[1] < FARTHEST):
+        return None
+    return shape
 
 
 def _shape(file: MujocoFile, geom: int, origin: Floats) -> tuple[Floats, float] | None:
