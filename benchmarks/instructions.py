@@ -37,6 +37,7 @@ import heelstrike as hs
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.experiments.engines import Scenario
 from heelstrike.robot import read_mjcf
+from heelstrike.sim import Scheme
 from heelstrike.sim.frame import Outcome
 
 KEPT = Path(__file__).with_name("instructions.json")
@@ -114,8 +115,11 @@ def scenarios(gait: hs.Gait | None = None) -> dict[str, Counted]:
         "slipping, bravo7": Counted(
             replace(bent, state=sliding, friction=0.05), 50, 500, beside="standing, knees bent"
         ),
+        # Impacts make a difference of 1e-12 that decides in which step a foot arrives one of 1e-3;
+        # the scheme that lets feet arrive in two steps has no such edge, and counts repeat.
         "stamping, bravo7": Counted(
             replace(bent, feedback=stamping(bent), friction=0.1), 0, 600,
+            method=hs.TimeStepping(step=STEP, scheme=Scheme.GAP_LINEARISED),
             beside="standing, knees bent",
         ),
         "slipping, plank on 8 points": Counted(

@@ -133,9 +133,10 @@ def test_walk() -> None:
     """Over a steady walk motors give what impacts take, and hard contact gives nothing.
 
     The step keeps a foot at rest in the pose of its beginning, so that the foot's velocity in the
-    pose of its end is of order h, and so is the work of the ground on a foot at rest.
+    pose of its end is of order h, and so is the work of the ground on a foot at rest. So is what
+    positions gain on velocities in the step of an impact, 1.5 % of its energy a millisecond.
     """
-    balance = energy_balance(walking.walk(steps=4))
+    balance = energy_balance(walking.walk(steps=4, step=5e-4))
     given_by_ground = np.maximum(np.diff(balance.contacts), 0.0).sum()
     assert given_by_ground < 1e-2 * -balance.contacts[-1]
     start, end = np.searchsorted(balance.time, (1.4 + 0.35, 2.1 + 0.35))
@@ -143,7 +144,7 @@ def test_walk() -> None:
     taken = balance.contacts[end] - balance.contacts[start]
     assert given == pytest.approx(-taken, rel=0.01)
     # What no work explains is the error of a method of first order.
-    finer = energy_balance(walking.walk(steps=4, step=5e-4))
+    finer = energy_balance(walking.walk(steps=4, step=2.5e-4))
     ratio = np.abs(balance.residual).max() / np.abs(finer.residual).max()
     assert ratio == pytest.approx(2.0, abs=0.2)
 

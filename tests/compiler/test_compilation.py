@@ -429,7 +429,7 @@ def test_memory_put_back_knows_the_machine_code_made_meanwhile() -> None:
     robot = load_robot("bravo7")
     memory = allocate_memory(robot)
     before = copy.deepcopy(memory)
-    before.solver.solvers[:] = 0
+    before.assembly.solver.solvers[:] = 0
     try_solvers.finish()
     memory.become(before)
     assert memory.assembly.solver.solvers[0] == try_solvers.address[0] != 0
