@@ -118,18 +118,18 @@ def bundle_type(cls: Any) -> BundleType:
     kind: type[BundleType] = type(cls.__name__, (BundleType,), {})
     register_model(kind)(_BundleModel)
     made = kind(cls)
-    _made[made.name] = made
+    _made.append(made)
     numba_in_use().declare(made)
     return made
 
 
-_made: dict[str, BundleType] = {}
-"""Types by their names."""
+_made: list[BundleType] = []
+"""All types. A list, since what that holds is no part of what kernels are made of."""
 
 
 def _named(name: str) -> Any:
     """Return the type of a name; of one that is not made here, what is equal to no other."""
-    return _made.get(name) or types.Opaque(name)
+    return next((each for each in reversed(_made) if each.name == name), types.Opaque(name))
 
 
 def _member_type(member: Any) -> Any:
