@@ -8,13 +8,14 @@ contacts or friction take part, and the state behind such an impact does not con
 So position and velocity part ways in a step in which a contact closes. Both start from the same
 free velocity v_f and Delassus matrix::
 
-    position   gap + h (J_n v_f + …)_n ≥ 0       the robot moves on with this velocity: it arrives
-    velocity   w = G λ + J v_f ≥ −e J_n v        of the contacts that touch: Newton's impact law
+    position   w = G λ + J v_f,  w_n ≥ −gap/h    the robot moves on with this velocity: it arrives
+    velocity   w = G λ + J v_f,  w_n ≥ −e J_n v  of the contacts that touch: Newton's impact law
 
 The contacts of the impact are those that touch now and touched before or would close if they were
 free. It is for the contact that is *new* to say that there is an impact at all: one that touches at
-the end of this step, did not at the end of the last one, and is not there already. Elsewhere the
-two velocities are the same.
+the end of this step, did not at the end of the last one, and is not there already. A contact that
+is in the ground makes two problems of it, too: positions are pushed out, velocities are not, so
+that no solve makes kinetic energy. Elsewhere the two velocities are the same.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ from heelstrike.sim.memory import Assembly, Memory, contact_capacity
 
 Floats = NDArray[np.float64]
 
-# A contact touches when its gap is no more than this (m).
+# A contact touches when its gap is no more than this (m): far above what rounding leaves of a gap
+# that is closed (1e-16), far below what turning makes of one in a step (h² ω² l / 2, 1e-7 at 1 ms).
 TOUCHING = 1e-9
 NEVER = -1
 
