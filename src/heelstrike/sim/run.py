@@ -347,6 +347,25 @@ class Run:
 
         return animate(self, path, **options)
 
+    def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the run as one HTML file; see :func:`heelstrike.view.page.page.save_html`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.page.page import save_html
+
+        return save_html(self, path, **options)
+
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""
         from heelstrike.sim.files.dataset import to_dataset
