@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
+    from heelstrike.view.live import watch as watch
 
 __version__ = "0.1.0"
 
@@ -145,6 +146,7 @@ _HOME = {
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
+    "watch": "heelstrike.view.live",
 }
 
 

@@ -145,19 +145,19 @@ class Layout:
                 },
             ]  # fmt: skip
         begin = self.begin["energy"]
-        energy = [
-            {"label": label, "foot": -1, "dash": dash, "at": begin + i} | color
-            for i, (label, dash, color) in enumerate(
-                (
-                    ("kinetic", 0, {"color": 0}),
-                    ("potential", DASHED, {"color": 1}),
-                    ("mechanical", 0, {}),
-                )
+        look = {"foot": -1, "dash": 0}
+        kinetic = [look | {"label": "", "color": 0, "at": begin}]
+        others = [
+            look | {"label": "potential", "dash": DASHED, "color": 1, "at": begin + 1},
+            look | {"label": "mechanical", "at": begin + 2},
+        ]
+        found += [
+            {"title": title, "unit": "J", "group": "energy", "curves": curves, "limits": []}
+            for title, curves in (
+                ("kinetic energy", kinetic),
+                ("potential and mechanical energy", others),
             )
         ]
-        found.append(
-            {"title": "energy", "unit": "J", "group": "energy", "curves": energy, "limits": []}
-        )
         return found
 
     def _of_joints(
@@ -171,6 +171,7 @@ class Layout:
         for i, joint in enumerate(int(j) for j in joints):
             words = in_words(names[i]).split()
             alike = " ".join(word for word in words if word.lower() not in SIDES)
+            side = " ".join(word for word in words if word.lower() in SIDES)
             unit = angular if model.axis[joint, 0] != 0.0 else linear
             panel = panels.setdefault(
                 (alike, unit),
@@ -184,8 +185,14 @@ class Layout:
                 },
             )
             foot = int(leg[joint])
-            look = {"label": in_words(names[i]), "foot": foot, "dash": DASHED if foot > 0 else 0}
-            panel["curves"].append(look | {"at": self.begin[field] + i})
+            panel["curves"].append(
+                {
+                    "label": side or " ".join(words),
+                    "foot": foot,
+                    "dash": DASHED if foot > 0 else 0,
+                    "at": self.begin[field] + i,
+                }
+            )
             if field == "torque":
                 levels = (float(model.torque_lower[i]), float(model.torque_upper[i]))
                 known = {limit["level"] for limit in panel["limits"]}
@@ -194,6 +201,10 @@ class Layout:
                     for level in levels
                     if np.isfinite(level) and level not in known
                 ]
+        for panel in panels.values():
+            if panel["limits"]:
+                levels = " … ".join(f"{limit['level']:g}" for limit in panel["limits"])
+                panel["title"] += f", limits {levels}".replace("-", "−")
         return list(panels.values())
 
     def _of_feet(self, field: str) -> list[dict[str, Any]]:

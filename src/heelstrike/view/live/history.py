@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ class History:
     def part(self, first: int, last: int) -> Run:
         """Rows from one index to another, the last one included, as a run with their events."""
         assert self._run is not None
-        rows = {name: self._kept(name)[first : last + 1] for name in self._rows}
+        rows: dict[str, Any] = {name: self._kept(name)[first : last + 1] for name in self._rows}
         begin, end = rows["time"][0] - SAME, rows["time"][-1] + SAME
         events = []
         for event in reversed(self.events):
@@ -95,8 +96,7 @@ class History:
         """See to it that the rows of a piece fit behind those that are kept."""
         if not self._rows:
             self._rows = {
-                name: np.zeros((0, *getattr(run, name).shape[1:]))
-                for name in ("time", *QUANTITIES)
+                name: np.zeros((0, *getattr(run, name).shape[1:])) for name in ("time", *QUANTITIES)
             }
         size, needed = len(self._rows["time"]), self._end + len(run.time)
         if needed <= size:

@@ -260,16 +260,20 @@
     return found;
   }
 
+  /** The newest event of each contact point, each kind named once. */
   function flashes(frame) {
-    const lasts = FLASH * Math.min(1, Math.max(state.rate || 1, 0.02)), found = [];
+    const lasts = FLASH * Math.min(1, Math.max(state.rate || 1, 0.02));
+    const found = new Map(), named = new Set();
     for (let k = events.length - 1; k >= 0 && k > events.length - 200; k--) {
-      const [time, kind, where, contact] = events[k];
+      const [time, kind, , contact] = events[k];
       if (time > frame.time + 1e-9 || time < frame.time - lasts) continue;
-      if (contact < 0 || 2 * contact + 1 >= frame.point.length) continue;
-      found.push({ x: frame.point[2 * contact], z: frame.point[2 * contact + 1],
-        label: kindNames[kind].replaceAll("_", " "), strength: 1 - (frame.time - time) / lasts });
+      if (contact < 0 || 2 * contact + 1 >= frame.point.length || found.has(contact)) continue;
+      const label = named.size ? "" : kindNames[kind].replaceAll("_", " ");
+      named.add(kind);
+      found.set(contact, { x: frame.point[2 * contact], z: frame.point[2 * contact + 1], label,
+        strength: 1 - (frame.time - time) / lasts });
     }
-    return found;
+    return [...found.values()];
   }
 
   function drawPlane() {
@@ -299,7 +303,7 @@
     context.setLineDash([4, 4]);
     context.beginPath();
     context.moveTo(toX(px), toY(pz));
-    context.lineTo(toX(pull.x), toY(pull.z));
+    context.lineTo(toX(pulledTo()[0]), toY(pulledTo()[1]));
     context.stroke();
     context.setLineDash([]);
     context.beginPath();
@@ -308,8 +312,8 @@
     if (state.playing) return;
     context.fillStyle = colors.push;
     context.font = "600 13px system-ui, sans-serif";
-    context.fillText(`${words(Math.hypot(...pull.force))} N when it goes on`, toX(pull.x) + 8,
-      toY(pull.z));
+    context.fillText(`${words(Math.hypot(...pull.force))} N when it goes on`,
+      toX(pulledTo()[0]) + 8, toY(pulledTo()[1]));
   }
 
   /* Pushing. */
@@ -321,6 +325,7 @@
   const poseOf = (frame, link) => [0, 1, 2].map((k) => frame.pose[3 * link + k]);
   const placed = ([x, z, angle], a, b) =>
     [x + Math.cos(angle) * a + Math.sin(angle) * b, z + Math.cos(angle) * b - Math.sin(angle) * a];
+  const pulledTo = () => worldOf(pull); // the picture moves below the pointer, too
   const grasped = (frame) => placed(poseOf(frame, pull.link), ...pull.point);
 
   /** The foremost part at a place in the world, or the nearest one within reach; -1 if none. */
@@ -356,7 +361,8 @@
     if (!pull || !vector) return;
     const frame = frameOf(vector), [px, pz] = grasped(frame);
     const newtons = scene.weight > 0 ? scene.weight / (WEIGHT_LENGTH * scene.size) : 100;
-    let fx = (pull.x - px) * newtons, fz = (pull.z - pz) * newtons;
+    const [x, z] = pulledTo();
+    let fx = (x - px) * newtons, fz = (z - pz) * newtons;
     const size = Math.hypot(fx, fz), most = STRONGEST * (scene.weight || 100);
     if (size > most) [fx, fz] = [(fx / size) * most, (fz / size) * most];
     if (pull.force[0] === fx && pull.force[1] === fz) return;
@@ -377,14 +383,14 @@
     }
     const [ox, oz, angle] = poseOf(frame, link), c = Math.cos(angle), s = Math.sin(angle);
     const point = [c * (x - ox) - s * (z - oz), s * (x - ox) + c * (z - oz)];
-    pull = { link, point, x, z, force: [0, 0] };
+    pull = { link, point, clientX: event.clientX, clientY: event.clientY, force: [0, 0] };
     plane.classList.add("pulling");
   });
   plane.addEventListener("pointermove", (event) => {
     const vector = current();
     if (!vector) return;
     if (pull) {
-      [pull.x, pull.z] = worldOf(event);
+      Object.assign(pull, { clientX: event.clientX, clientY: event.clientY });
       followPull();
       dirty = true;
     } else if (pan) {
@@ -417,7 +423,8 @@
   /* The strip of events, and the time on it. */
   function drawEvents() {
     const { context, width, height } = sized(at("events")), colors = palette(dark.matches);
-    const { from, to } = state, inner = width - 16;
+    const from = state.from, inner = width - 16;
+    const to = course && course.count ? Math.max(from, course.time(course.count - 1)) : from;
     const toX = (t) => 8 + ((t - from) / (to - from || 1)) * inner;
     context.clearRect(0, 0, width, height);
     const wanted = at("kinds").value, last = new Map();

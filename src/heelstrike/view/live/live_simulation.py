@@ -135,9 +135,7 @@ class LiveSimulation:
         self._last = snapshot.time
         self._added = tuple(push for push in self._added if push.start < time - 1e-9)
         known = pushes_of_numbers(snapshot.part("push"))
-        self.simulation.apply(
-            [p for p in self._added if p.end > snapshot.time and p not in known]
-        )
+        self.simulation.apply([p for p in self._added if p.end > snapshot.time and p not in known])
         if time > snapshot.time + 1e-9:
             self.simulation.advance(time)
         self.simulation.forget()

@@ -151,6 +151,7 @@ class Server:
                 return None
             return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "")
         response = connection.respond(HTTPStatus.OK, self._page)
+        del response.headers["Content-Type"]  # of plain text
         for name, value in {
             "Content-Type": "text/html; charset=utf-8",
             "Cache-Control": "no-store",
@@ -158,7 +159,6 @@ class Server:
             "X-Content-Type-Options": "nosniff",
             "Cross-Origin-Resource-Policy": "same-origin",
         }.items():
-            del response.headers[name]
             response.headers[name] = value
         return response
 

@@ -28,7 +28,7 @@ from heelstrike.view.live.stage import Stage
 from heelstrike.view.page.scene import scene
 from heelstrike.view.style import in_words
 
-UPDATES = 60.0
+UPDATES = 64.0
 """Updates a second that are offered to viewers."""
 LONGEST = 0.1
 """Seconds of the clock that one update makes up for at most; what cannot keep up is slower."""
@@ -36,13 +36,15 @@ RATES = (0.001, 100.0)
 """Slowest and fastest, in simulated seconds a second."""
 DENSEST = 1.0 / 60.0
 """Simulated seconds between two frames that are kept, at real time and faster."""
+WORDS_LAST = 0.5
+"""Seconds that the words of the light stay."""
 RANDOM_PUSH = (0.08, 0.25)
 """Force of a random push, as shares of the weight."""
 RANDOM_PUSH_LASTS = 0.1
 """Seconds."""
 
 
-class Refusal(Exception):
+class RefusedError(Exception):
     """What a viewer asked for that cannot be done, in a person's words."""
 
 
@@ -70,9 +72,7 @@ class Session:
         rate: float = 1.0,
     ) -> None:
         self._board, self._stage, self._run = board, stage, run
-        self.values: dict[str, Any] = (
-            {} if stage is None else {c.name: c.value for c in stage.controls}
-        )
+        self.values: dict[str, Any] = {} if stage is None else stage.fitted({})
         self.rate = rate
         self.playing = True
         self.cursor = 0.0
@@ -87,6 +87,7 @@ class Session:
         self._reached, self._pace = rate, math.inf
         self._gained = self._elapsed = 0.0
         self._note = self._busy = ""
+        self._light, self._light_until = light_of(None), 0.0
         self._thread = threading.Thread(target=self._go, name="heelstrike-watch", daemon=True)
 
     def start(self) -> None:
@@ -107,7 +108,7 @@ class Session:
         self._commands.put((viewer, command))
 
     def _go(self) -> None:
-        self._begin()
+        self.begin()
         before = due = clock_time.perf_counter()
         while not self._closing.is_set():
             idle = not (self.playing and self._board.watched)
@@ -116,7 +117,7 @@ class Session:
             if idle:
                 before = due = now
                 continue
-            self._update(now - before)
+            self.update(now - before)
             before = now
             due = max(due + 1.0 / UPDATES, now)
 
@@ -146,11 +147,11 @@ class Session:
         do = _COMMANDS.get(command.get("do", ""))
         try:
             if do is None:
-                raise Refusal(f"unknown command {command.get('do')!r}")
+                raise RefusedError(f"unknown command {command.get('do')!r}")
             if not len(self.history) and do not in _ALWAYS:
-                raise Refusal("there is nothing to see yet")
+                raise RefusedError("there is nothing to see yet")
             do(self, viewer, command)
-        except (Refusal, HeelstrikeError) as refused:
+        except (RefusedError, HeelstrikeError) as refused:
             self._note = str(refused)
         except (KeyError, TypeError, ValueError, OverflowError) as error:
             self._note = f"command {command.get('do')!r} cannot be read: {error}"
@@ -162,7 +163,8 @@ class Session:
         on = bool(command["on"])
         if on and self._at_end and (self.live is None or not self.live.can_go_on):
             if self.live is not None:
-                raise Refusal(f"{self.live.message}. Begin anew, or go on from an earlier time")
+                over = f"{self.live.message}. Begin anew, or go on from an earlier time"
+                raise RefusedError(over)
             self._move(self.history.time[0])
         self.playing = on
         self._goal = self.cursor
@@ -189,7 +191,9 @@ class Session:
         )
         wanted = [t for t in times if (t > self.cursor + SAME if ahead else t < self.cursor - SAME)]
         if not wanted:
-            raise Refusal(f"there is no {'later' if ahead else 'earlier'} event of this kind so far")
+            raise RefusedError(
+                f"there is no {'later' if ahead else 'earlier'} event of this kind so far"
+            )
         self.playing = False
         self._move(wanted[0] if ahead else wanted[-1])
 
@@ -227,22 +231,23 @@ class Session:
     def _choose(self, _: str, command: Mapping[str, Any]) -> None:
         stage = self._needs_stage()
         name, value = str(command["name"]), command["value"]
-        control = next((c for c in stage.controls if c.name == name), None)
+        control = next((c for c in stage.controls(self.values) if c.name == name), None)
         if control is None or not control.accepts(value):
-            raise Refusal(f"{name} cannot be {value!r}")
-        chosen = self.values | {name: value}
+            raise RefusedError(f"{name} cannot be {value!r}")
+        kept = {each: v for each, v in self.values.items() if each not in control.resets}
+        chosen = stage.fitted(kept | {name: value})
         if control.at_once:
             live = self._needs_live()
             live.lay(stage.ground(chosen, live.simulation))
             self.values = chosen
         else:
-            self._begin(chosen)
+            self.begin(chosen)
 
     def _reset(self, *_: Any) -> None:
         if self._stage is None:
             self._move(self.history.time[0])
         else:
-            self._begin()
+            self.begin()
 
     def _resume(self, *_: Any) -> None:
         self._needs_live()
@@ -259,8 +264,8 @@ class Session:
 
     # What happens by itself
 
-    def _begin(self, values: Mapping[str, Any] | None = None) -> None:
-        """Begin with the simulation of some values, or stay with the one before if there is none."""
+    def begin(self, values: Mapping[str, Any] | None = None) -> None:
+        """Begin with the simulation of some values; if there is none, stay with the one before."""
         wanted = self.values if values is None else dict(values)
         if self._stage is None:
             assert self._run is not None
@@ -304,7 +309,7 @@ class Session:
             self.cursor = float(times[0])
             self._move(self.cursor)
 
-    def _update(self, elapsed: float) -> None:
+    def update(self, elapsed: float) -> None:
         """Go on by what has passed on the clock (s)."""
         if not len(self.history):
             self.playing = False
@@ -339,7 +344,7 @@ class Session:
 
     def _advance(self, until: float | None) -> None:
         """Simulate until a time (s), or one step, and show it."""
-        assert self.live is not None and self._layout is not None
+        assert self.live is not None
         run = self.live.advance(until)
         if run is None:
             return
@@ -363,7 +368,8 @@ class Session:
         part = self.history.part(rows[0], rows[-1])
         frames = self._layout.frames(part, [row - rows[0] for row in rows], self._pushes)
         self._shown = self.cursor = float(part.time[-1])
-        self._board.add(frames, [[e.time, int(e.kind), self._where(e)] for e in events])
+        told = [[e.time, int(e.kind), self._where(e), _contact(e)] for e in events]
+        self._board.add(frames, told)
 
     def _move(self, time: float) -> None:
         """Look at a time (s) of the history."""
@@ -373,11 +379,12 @@ class Session:
         assert self._layout is not None
         self.cursor = float(min(max(time, times[0]), times[-1]))
         row = self.history.row_at(self.cursor)
-        # Forces since the picture before; standing still, those of the row.
-        since = self.history.row_at(self.cursor - self.rate / UPDATES) if self.playing else row
-        frame = self._layout.frames(
-            self.history.part(since, row), [0, row - since], self._pushes
-        )[0]
+        # Forces since the picture before; standing still, those of the step that led here.
+        before = self.history.row_at(self.cursor - self.rate / UPDATES) if self.playing else row
+        since = max(min(before, row - 1), 0)
+        frame = self._layout.frames(self.history.part(since, row), [0, row - since], self._pushes)[
+            0
+        ]
         self._goal = self.cursor
         self._board.look(frame)
 
@@ -405,12 +412,12 @@ class Session:
 
     def _needs_live(self) -> LiveSimulation:
         if self.live is None:
-            raise Refusal("this is a run that is over: there is nothing to push or set")
+            raise RefusedError("this is a run that is over: there is nothing to push or set")
         return self.live
 
     def _needs_stage(self) -> Stage:
         if self._stage is None:
-            raise Refusal("this is a run that is over: there is nothing to push or set")
+            raise RefusedError("this is a run that is over: there is nothing to push or set")
         return self._stage
 
     def _where(self, event: Event) -> str:
@@ -427,25 +434,31 @@ class Session:
     def _tell(self) -> None:
         """Show how things are, where that has changed."""
         times, run = self.history.time, self.history.newest
-        controls = () if self._stage is None else self._stage.controls
+        controls = () if self._stage is None else self._stage.controls(self.values)
         self._board.state(
             {
                 "playing": self.playing,
                 "rate": self.rate,
                 "reached": round(self._reached, 2),
                 "from": float(times[0]) if len(times) else 0.0,
-                "to": float(times[-1]) if len(times) else 0.0,
                 "end": self._at_end,
                 "note": self._note,
                 "busy": self._busy,
                 "message": "" if run is None or self._going_well else run.message,
                 "over": self.live is not None and not self.live.can_go_on,
-                "light": light_of(run),
+                "light": self._lit(),
                 "returns": self.live is not None and self.live.returns,
                 "controls": [control.described() for control in controls],
                 "values": self.values,
             }
         )
+
+    def _lit(self) -> dict[str, str]:
+        """Return the light, whose words change twice a second at most."""
+        light, now = light_of(self.history.newest), clock_time.perf_counter()
+        if light["level"] != self._light["level"] or now > self._light_until:
+            self._light, self._light_until = light, now + WORDS_LAST
+        return self._light
 
     @property
     def _going_well(self) -> bool:
@@ -454,6 +467,10 @@ class Session:
 
 def _kind(event: Event) -> str:
     return event.kind.name.lower()
+
+
+def _contact(event: Event) -> int:
+    return -1 if event.kind in OF_JOINTS else event.contact
 
 
 def _finite(value: Any) -> float:

@@ -34,6 +34,8 @@ class Control:
     unit : str
     at_once : bool
         Whether it acts at once; otherwise the simulation begins anew.
+    resets : tuple of str
+        Controls that have their first values again when this one is set.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Control:
     step: float = 0.01
     unit: str = ""
     at_once: bool = False
+    resets: tuple[str, ...] = ()
 
     def accepts(self, value: Any) -> bool:
         """Whether a value is one that it can have."""
@@ -55,21 +58,24 @@ class Control:
 
     def described(self) -> dict[str, Any]:
         """Return it as JSON has it."""
-        return {**vars(self), "options": list(self.options)}
+        return {**vars(self), "options": list(self.options), "resets": list(self.resets)}
 
 
 class Stage(ABC):
     """Makes the simulation that is watched, of the values of its controls."""
 
-    @property
     @abstractmethod
-    def controls(self) -> tuple[Control, ...]:
-        """What can be set."""
+    def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
+        """What can be set, where some things are set already; with none, what there is at first."""
+
+    def fitted(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of all controls: those given where they can be had, others as at first."""
+        controls = self.controls(values)
+        wanted = {control.name: values.get(control.name) for control in controls}
+        return {c.name: wanted[c.name] if c.accepts(wanted[c.name]) else c.value for c in controls}
 
     @abstractmethod
-    def simulation(
-        self, values: Mapping[str, Any], progress: Callable[[str], None]
-    ) -> Simulation:
+    def simulation(self, values: Mapping[str, Any], progress: Callable[[str], None]) -> Simulation:
         """Make the simulation at its beginning.
 
         Parameters
@@ -105,13 +111,14 @@ class GivenStage(Stage):
         friction = float(np.min(simulation.ground.model().friction))
         self._controls = (friction_control(friction),)
 
-    @property
-    def controls(self) -> tuple[Control, ...]:
+    def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:  # noqa: ARG002
         """The friction of the ground, everywhere."""
         return self._controls
 
     def simulation(
-        self, values: Mapping[str, Any], progress: Callable[[str], None]  # noqa: ARG002
+        self,
+        values: Mapping[str, Any],  # noqa: ARG002
+        progress: Callable[[str], None],  # noqa: ARG002
     ) -> Simulation:
         """Return it as it is; when asked again, as it was then."""
         if not self._begun:

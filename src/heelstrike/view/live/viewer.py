@@ -85,7 +85,8 @@ class Viewer:
         target = html.escape(self.url)
         way.write_text(
             '<!DOCTYPE html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
-            f'<meta http-equiv="refresh" content="0;url={target}"><a href="{target}">heelstrike</a>',
+            f'<meta http-equiv="refresh" content="0;url={target}">'
+            f'<a href="{target}">heelstrike</a>',
             encoding="utf-8",
         )
         with suppress(webbrowser.Error):
@@ -169,7 +170,7 @@ def watch(
     if browser or (browser is None and not notebook):
         viewer.open()
     if block or (block is None and not (notebook or _at_prompt())):
-        print(f"watching at {viewer.url}\nCtrl-C ends it", file=sys.stderr, flush=True)  # noqa: T201
+        print(f"watching at {viewer.url}\nCtrl-C ends it", file=sys.stderr, flush=True)
         with suppress(KeyboardInterrupt):
             viewer.wait()
     return viewer

@@ -1,0 +1,118 @@
+"""``heelstrike watch``: a robot walks in the browser, to be looked at and pushed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.options import (
+    Debug,
+    Floating,
+    Forward,
+    Friction,
+    OnGround,
+    Pose,
+    Projected,
+    RobotName,
+    SavedGait,
+    method_called,
+    reading,
+)
+from heelstrike.cli.terminal import spoken, stage, tell
+from heelstrike.cli.values import ground_called
+from heelstrike.cli.walk import Method, Scheme
+
+if TYPE_CHECKING:
+    from heelstrike.contact.ground import Ground
+    from heelstrike.experiments.watching import GroundChoices
+
+METHODS = (
+    Scheme.IMPACT_RESOLVED.value,
+    Method.EVENT_DRIVEN.value,
+    Method.COMPLIANT.value,
+    *(scheme.value for scheme in Scheme if scheme is not Scheme.IMPACT_RESOLVED),
+)
+"""Names that :func:`~heelstrike.cli.options.method_called` knows, the usual one first."""
+
+
+@spoken
+def watch(
+    robot: RobotName = "bravo7",
+    gait: SavedGait = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            metavar="|".join(METHODS),
+            help="Way through time, or discretisation of time stepping.",
+            show_default=f"{METHODS[0]}; {Method.EVENT_DRIVEN} without motors",
+        ),
+    ] = None,
+    step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
+    ground: OnGround = "flat",
+    friction: Friction = 0.75,
+    speed: Annotated[float, typer.Option(help="Simulated seconds a second, at first.")] = 1.0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of 127.0.0.1.", show_default="a free one")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
+    ] = True,
+    floating: Floating = False,
+    projected: Projected = False,
+    forward: Forward = None,
+    pose: Pose = None,
+    debug: Debug = False,  # noqa: ARG001 - for `spoken`
+) -> None:
+    """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
+
+    Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, to whoever has
+    the address that is printed. Ctrl-C ends it.
+    """
+    if method is not None and method not in METHODS:
+        raise typer.BadParameter(
+            f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method"
+        )
+    with stage("loading"):
+        from heelstrike.view.live.server import check_installed
+
+        check_installed()
+        from heelstrike.experiments.watching import WalkStage
+        from heelstrike.view.live.viewer import view
+
+        surface = ground_called(ground, friction=friction)
+        walks = WalkStage(
+            robot,
+            method_called,
+            METHODS,
+            method=method,
+            step=step,
+            gait=gait,
+            friction=friction,
+            **_ground_choices(ground, surface),
+            **reading(floating, projected, forward, pose),
+        )
+        viewer = view(stage=walks, rate=speed, port=port)
+    tell(f"watch at {viewer.url}")
+    try:
+        if browser and not viewer.open():
+            tell("no browser could be opened here: open the address yourself")
+        tell("Ctrl-C ends it")
+        viewer.wait()
+    except KeyboardInterrupt:
+        tell("closed")
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def _ground_choices(words: str, surface: Ground) -> GroundChoices:
+    """What of a ground can be set by viewers; stairs and files are as they are."""
+    kind, *shape = words.split(":")
+    if kind == "flat":
+        return {}
+    if kind == "slope":
+        return {"slope": math.degrees(surface.slope)}
+    if kind == "rough":
+        return {"roughness": float(shape[0]), "seed": int(shape[1])}
+    return {"ground": surface}
