@@ -82,7 +82,10 @@ def watch(
         from heelstrike.experiments.watching import WalkStage
         from heelstrike.view.live.viewer import view
 
+        # All that is cheap to refuse is refused before anything is served.
         surface = ground_called(ground, friction=friction)
+        for name in METHODS if method is None else (method,):
+            method_called(name, step)
         walks = WalkStage(
             robot,
             method_called,

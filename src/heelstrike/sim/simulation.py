@@ -706,6 +706,8 @@ class Simulation:
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
+        if not self._records:
+            self._new_record()
         return Run(
             robot=self.robot,
             ground=self._ground,

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
-from heelstrike.analysis.motion import in_world, run_motion
+from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.support import foot_sums
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view.drawing import legs
+from heelstrike.view.live.history import SAME
 from heelstrike.view.page.motion import frames as drawn
 from heelstrike.view.style import in_words
 
@@ -89,7 +90,7 @@ class Layout:
             **drawn(each, every, motion, zmp),
             "time": each.time,
             "force": each.world_force,
-            "push": self._pushes(each, motion.link_origin, motion.link_angle, pushes),
+            "push": self._pushes(run.time[np.asarray(rows[:-1])], each.time, motion, pushes),
             "joint": each.position[:, self.joints],
             "torque": each.torque,
             "ahead": zmp.foot,
@@ -105,16 +106,20 @@ class Layout:
             table[:, begin : begin + wide] = found[name].reshape(len(every), wide)
         return table
 
-    def _pushes(self, run: Run, origin: Floats, angle: Floats, pushes: Iterable[Push]) -> Floats:
-        """Where pushes act and their forces, (n, 4 a push); NaN for those that do not."""
-        table = np.full((len(run.time), MOST_PUSHES, 4), np.nan)
-        used = np.zeros(len(run.time), dtype=np.int64)
+    def _pushes(
+        self, since: Floats, until: Floats, motion: Motion, pushes: Iterable[Push]
+    ) -> Floats:
+        """Where those pushes act that did between some times, (n, 4 a push) in m and N, or NaN."""
+        table = np.full((len(until), MOST_PUSHES, 4), np.nan)
+        used = np.zeros(len(until), dtype=np.int64)
         for push in pushes:
-            acts = (push.start - 1e-9 <= run.time) & (run.time <= push.end + 1e-9)
-            for row in np.flatnonzero(acts & (used < MOST_PUSHES)).tolist():
-                link, place = push.place(run.robot)
-                at = in_world(origin[row, link], angle[row, link], np.array(place))
-                table[row, used[row]] = (*at, *push.force)
+            if push.end <= since[0] or push.start >= until[-1]:
+                continue
+            acted = (push.start < until - SAME) & (push.end > since + SAME)
+            for row in np.flatnonzero(acted & (used < MOST_PUSHES)).tolist():
+                link, place = push.place(self.robot)
+                pose = motion.link_origin[row, link], motion.link_angle[row, link]
+                table[row, used[row]] = (*in_world(*pose, np.array(place)), *push.force)
                 used[row] += 1
         return table
 
@@ -203,8 +208,8 @@ class Layout:
                 ]
         for panel in panels.values():
             if panel["limits"]:
-                levels = " … ".join(f"{limit['level']:g}" for limit in panel["limits"])
-                panel["title"] += f", limits {levels}".replace("-", "−")
+                ends = " … ".join(f"{limit['level']:g}" for limit in panel["limits"])
+                panel["title"] += f", limits {ends}".replace("-", "−")
         return list(panels.values())
 
     def _of_feet(self, field: str) -> list[dict[str, Any]]:

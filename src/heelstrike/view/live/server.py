@@ -8,6 +8,7 @@ import logging
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from http import HTTPStatus
 from typing import TYPE_CHECKING, Any
 
@@ -61,6 +62,11 @@ class Server:
         The page, HTML.
     port : int
         Where to listen; 0 for any free port.
+
+    Attributes
+    ----------
+    listens_at : list of (str, int)
+        Addresses and ports.
     """
 
     def __init__(
@@ -74,6 +80,7 @@ class Server:
         self._board, self._obey, self._page = board, obey, page
         self._gate = Gate()
         self.port = port
+        self.listens_at: list[tuple[str, int]] = []
         self._viewers = 0
         self._begun = threading.Event()
         self._trouble: OSError | None = None
@@ -125,16 +132,15 @@ class Server:
         quiet = logging.getLogger("heelstrike.view.live")
         quiet.addHandler(logging.NullHandler())
         quiet.propagate = False
-        server = await serve(
+        async with serve(
             self._attend, ADDRESS, self.port, process_request=self._answer,
             max_size=LONGEST_MESSAGE, compression=None, close_timeout=CLOSES_WITHIN,
             server_header=None, logger=quiet,
-        )  # fmt: skip
-        self.port = server.sockets[0].getsockname()[1]
-        self._begun.set()
-        await self._over.wait()
-        server.close()
-        await asyncio.wait_for(server.wait_closed(), 1.5 * CLOSES_WITHIN)
+        ) as server:  # fmt: skip
+            self.listens_at = [each.getsockname() for each in server.sockets]
+            self.port = self.listens_at[0][1]
+            self._begun.set()
+            await self._over.wait()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request that is not one for the socket, or that may not come in."""
@@ -174,17 +180,19 @@ class Server:
             there.set()
 
         def listener(message: Message) -> None:
-            self._loop.call_soon_threadsafe(put, message)
+            with suppress(RuntimeError):  # the server has just ended
+                self._loop.call_soon_threadsafe(put, message)
 
         async def tell() -> None:
-            while True:
-                await there.wait()
-                there.clear()
-                if len(waiting) > MOST_WAITING:
-                    await connection.close(1013, "too slow")
-                    return
-                while waiting:
-                    await connection.send(waiting.popleft())
+            with suppress(ConnectionClosed):
+                while True:
+                    await there.wait()
+                    there.clear()
+                    if len(waiting) > MOST_WAITING:
+                        await connection.close(1013, "too slow")
+                        return
+                    while waiting:
+                        await connection.send(waiting.popleft())
 
         name = connection.id.hex
         self._viewers += 1
@@ -192,12 +200,11 @@ class Server:
         teller = asyncio.create_task(tell())
         try:
             self._obey(name, {"do": "nothing"})
-            async for message in connection:
-                command = _command(message)
-                if command is not None:
-                    self._obey(name, command)
-        except ConnectionClosed:
-            pass
+            with suppress(ConnectionClosed):
+                async for message in connection:
+                    command = _command(message)
+                    if command is not None:
+                        self._obey(name, command)
         finally:
             self._viewers -= 1
             self._board.leave(listener)

@@ -36,6 +36,10 @@ RATES = (0.001, 100.0)
 """Slowest and fastest, in simulated seconds a second."""
 DENSEST = 1.0 / 60.0
 """Simulated seconds between two frames that are kept, at real time and faster."""
+IDLE = 0.25
+"""Seconds between two looks whether there is something to do, when there was not."""
+SLOW = 0.03
+"""Seconds that one update may take; what takes longer simulates less at a time."""
 WORDS_LAST = 0.5
 """Seconds that the words of the light stay."""
 RANDOM_PUSH = (0.08, 0.25)
@@ -84,7 +88,7 @@ class Session:
         self._layout: Layout | None = None
         self._shown = 0.0  # time of the frame that was kept last
         self._goal = 0.0
-        self._reached, self._pace = rate, math.inf
+        self._reached, self._span = rate, 0.05  # of one update, in s
         self._gained = self._elapsed = 0.0
         self._note = self._busy = ""
         self._light, self._light_until = light_of(None), 0.0
@@ -111,26 +115,26 @@ class Session:
         self.begin()
         before = due = clock_time.perf_counter()
         while not self._closing.is_set():
-            idle = not (self.playing and self._board.watched)
-            self._obey_until(due, idle)
+            going = self.playing and self._board.watched
+            self._obey_until(due, wait=not going)
             now = clock_time.perf_counter()
-            if idle:
-                before = due = now
-                continue
-            self.update(now - before)
+            if going and self.playing:
+                self.update(now - before)
+                due = max(due + 1.0 / UPDATES, now)
+            else:
+                due = now
             before = now
-            due = max(due + 1.0 / UPDATES, now)
 
-    def _obey_until(self, due: float, idle: bool) -> None:
-        """Carry out commands until an update is due; without a clock until one has come."""
+    def _obey_until(self, due: float, *, wait: bool) -> None:
+        """Carry out commands until an update is due, or wait for one a while."""
         while not self._closing.is_set():
-            left = 0.25 if idle else due - clock_time.perf_counter()
+            left = IDLE if wait else due - clock_time.perf_counter()
             try:
                 viewer, command = self._commands.get(timeout=max(left, 0.0))
             except queue.Empty:
                 return
             self.obey(viewer, command)
-            if idle:
+            if wait:
                 return
 
     def obey(self, viewer: str, command: Mapping[str, Any]) -> None:
@@ -144,17 +148,18 @@ class Session:
             What to ``do``, by the name of a method below, and its arguments.
         """
         self._note = ""
-        do = _COMMANDS.get(command.get("do", ""))
+        what = command.get("do")
+        do = _COMMANDS.get(what) if isinstance(what, str) else None
         try:
             if do is None:
-                raise RefusedError(f"unknown command {command.get('do')!r}")
+                raise RefusedError(f"unknown command {what!r}")
             if not len(self.history) and do not in _ALWAYS:
                 raise RefusedError("there is nothing to see yet")
             do(self, viewer, command)
         except (RefusedError, HeelstrikeError) as refused:
             self._note = str(refused)
-        except (KeyError, TypeError, ValueError, OverflowError) as error:
-            self._note = f"command {command.get('do')!r} cannot be read: {error}"
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
+            self._note = f"command {what!r} cannot be read: {error}"
         self._tell()
 
     # What viewers ask for
@@ -277,6 +282,8 @@ class Session:
                 self._tell_busy("compiling the simulator, once: about 20 s")
                 live = LiveSimulation(simulation)
                 run = live.record()
+                if not len(run.time):  # a controller that is not asked but for good
+                    run = live.advance(None) or run
             except HeelstrikeError as error:
                 self._note = str(error)
                 return
@@ -331,11 +338,9 @@ class Session:
         assert self.live is not None
         before, began = self.live.time, clock_time.perf_counter()
         step = self.live.simulation.method.row_period[1]
-        self._advance(min(self._goal, before + max(self._pace / UPDATES, step)))
-        gained = self.live.time - before
-        if gained > 0.0:
-            pace = gained / max(clock_time.perf_counter() - began, 1e-6)
-            self._pace = pace if self._pace == math.inf else 0.8 * self._pace + 0.2 * pace
+        self._advance(min(self._goal, before + max(self._span, step)))
+        gained, took = self.live.time - before, clock_time.perf_counter() - began
+        self._span = gained * SLOW / took if took > SLOW else min(2.0 * self._span, 1e3)
         self._goal = min(self._goal, self.live.time + max(self.rate / UPDATES, step))
         self._gained, self._elapsed = self._gained + gained, self._elapsed + elapsed
         if self._elapsed >= 0.5:
