@@ -19,7 +19,7 @@ from heelstrike.view.live import viewer as module
 pytest.importorskip("websockets", reason="the live view is not installed: heelstrike[watch]")
 
 
-class Made(Exception):
+class MadeError(Exception):
     """Raised instead of serving anything."""
 
 
@@ -30,7 +30,7 @@ def made(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
 
     def view(**given: Any) -> None:
         found.update(given)
-        raise Made
+        raise MadeError
 
     monkeypatch.setattr(module, "view", view)
     return found
@@ -45,7 +45,7 @@ def test_what_is_asked_for_is_what_viewers_find_set(made: dict[str, Any]) -> Non
         "geyer7", "--method", "event-driven", "--step", "0.002", "--friction", "0.6",
         "--speed", "0.25", "--port", "8123", "--ground", "slope:-2",
     )  # fmt: skip
-    assert isinstance(result.exception, Made)
+    assert isinstance(result.exception, MadeError)
     assert (made["rate"], made["port"]) == (0.25, 8123)
     stage = made["stage"]
     assert isinstance(stage, WalkStage)

@@ -77,7 +77,7 @@ def test_impulses_that_only_events_know_are_in_the_forces() -> None:
 def test_pushes_are_drawn_where_they_act_and_no_longer() -> None:
     run = walking.walk(steps=1)
     layout = Layout(run.robot)
-    trunk = run.robot.link_names.index("trunk")
+    trunk, _ = hs.Push("trunk", force=(1.0, 0.0), start=0.0, duration=0.0).place(run.robot)
     push = hs.Push(trunk, force=(50.0, -3.0), start=0.2, duration=0.1, point=(0.0, 0.1))
     rows = [198, 200, 201, 300, 301]
     drawn = field(layout, layout.frames(run, rows, [push]), "push").reshape(4, MOST_PUSHES, 4)

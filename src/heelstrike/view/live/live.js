@@ -116,7 +116,6 @@
     glance = null;
     events = [];
     camera.follows = true;
-    camera.fresh = true;
     at("name").textContent = `${scene.robot}`;
     at("name").title = message.method;
     document.title = `${scene.robot}: heelstrike`;
@@ -244,12 +243,10 @@
     const base = Math.min(height / (1.5 * scene.size), width / (1.2 * scene.size));
     camera.scale = base * camera.zoom;
     if (!camera.follows) return;
-    const ground = heightOfGround(scene.ground, frame.center[0]);
-    const z = ground + 0.55 * scene.size;
-    const share = camera.fresh || Math.abs(frame.center[0] - camera.x) > scene.size ? 1 : 0.12;
-    camera.x += share * (frame.center[0] - camera.x);
-    camera.z += share * (z - camera.z);
-    camera.fresh = false;
+    camera.x = frame.center[0];
+    const around = [-1, -0.5, 0, 0.5, 1].map((n) => camera.x + n * scene.size);
+    const heights = around.map((x) => heightOfGround(scene.ground, x));
+    camera.z = 0.55 * scene.size + heights.reduce((sum, z) => sum + z, 0) / heights.length;
   }
 
   function trail(now) {
@@ -410,7 +407,7 @@
   for (const end of ["pointerup", "pointercancel", "lostpointercapture"])
     plane.addEventListener(end, letGo);
   plane.addEventListener("dblclick", () => {
-    camera.follows = camera.fresh = true;
+    camera.follows = true;
     camera.zoom = 1;
     dirty = true;
   });
