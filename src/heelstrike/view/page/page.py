@@ -118,7 +118,7 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     for name, part in parts.items():
         body = body.replace(f"<!--{name}-->", part)
     body += data_block("run", contents(run, gait))
-    script = shipped("drawing.js") + shipped("player.js")
+    script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))
     return document(title, body, style=shipped("page.css"), script=script)
 
 
