@@ -71,8 +71,6 @@ def save_html(
         If the gait does not fit the robot of the run.
     """
     target = check_page(path)
-    if not len(run.time):
-        raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
     text = page(run, gait, command=command)
     with view_errors():
         return write_whole(target, text)
@@ -97,6 +95,8 @@ def check_page(path: str | os.PathLike[str]) -> Path:
 
 def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     """Write the page of a run; see :func:`save_html`."""
+    if not len(run.time):
+        raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
     summary = summarize(run, gait=gait)
     title = f"{run.robot.name}: {run.message}"
     body = shipped("player.html")
