@@ -68,7 +68,7 @@ class Verdict:
     headline : str
         Does it walk, how close to its limits, what to change: in one line.
     limits : tuple of Limit
-        The closest first.
+        Those that were reached in the order of time, then the others, the closest first.
     advice : tuple of str
         What to change; nothing if nothing has to.
     """
@@ -94,16 +94,16 @@ def judge(run: Run, gait: Gait | None = None) -> Verdict:
     Verdict
         In words and numbers.
     """
-    limits = tuple(sorted(_limits(run), key=lambda limit: -limit.used))
+    limits = tuple(sorted(_limits(run), key=lambda limit: (limit.reached, -limit.used)))
     advice = tuple(_advice(run, gait, limits))
     good = run.completed and not run.solver.failures
     parts = [_does(run)]
     if limits:
-        first = min(limits, key=lambda limit: limit.reached)
+        first = limits[0]
         if math.isfinite(first.reached):
             parts.append(f"First limit reached: {first.name} at {first.reached:.3g} s.")
         else:
-            closest = f"{limits[0].name}, {limits[0].detail} ({_percent(limits[0].used)} used)"
+            closest = f"{first.name}, {first.detail} ({_percent(first.used)} used)"
             parts.append(f"No limit is reached; closest comes {closest}.")
     parts.append(f"To change: {advice[0]}" if advice else "Nothing has to change.")
     return Verdict(good, " ".join(parts), limits, advice)
@@ -230,7 +230,7 @@ def _advice(run: Run, gait: Gait | None, limits: tuple[Limit, ...]) -> Iterator[
         )
     if run.status is RunStatus.DIVERGED:
         yield "Numbers grew beyond all bounds: a smaller time step, or smaller gains."
-    first = min(limits, key=lambda limit: limit.reached, default=None)
+    first = limits[0] if limits else None
     reached = math.inf if first is None else first.reached
     fell = run.status is RunStatus.FELL
     for push in run.pushes if fell else ():

@@ -167,7 +167,7 @@ def _limits(name: str, verdict: Verdict, several: int) -> str:
         return ""
     caption = "How close to each limit" + (f": {name}" if several > 1 else "")
     return (
-        f"<table><caption>{escaped(caption)}</caption><thead><tr>"
+        f'<table class="limits"><caption>{escaped(caption)}</caption><thead><tr>'
         '<th scope="col">limit</th><th scope="col">used</th><th scope="col" aria-hidden="true">'
         '</th><th scope="col">closest</th><th scope="col">reached</th></tr></thead>'
         f"<tbody>{rows}</tbody></table>"
@@ -177,7 +177,7 @@ def _limits(name: str, verdict: Verdict, several: int) -> str:
 def _limit(limit: Limit) -> str:
     share = min(max(limit.used, 0.0), 1.0)
     reached = f"at {limit.reached:.3g} s" if limit.used >= REACHED else "never"
-    sign = "bad" if limit.used >= REACHED else "used"
+    sign = "bad" if limit.used >= REACHED else "far"
     return (
         f'<tr><th scope="row">{escaped(limit.name)}</th>'
         f'<td class="{sign}">{100.0 * limit.used:.3g} %</td>'
