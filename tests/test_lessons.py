@@ -1,4 +1,4 @@
-"""The lessons run from top to bottom, and what they say comes out.
+"""The lessons and the gallery run from top to bottom, and what they say comes out.
 
 Cells that carry the tag `check` hold what is asserted of the figures in the text; pages leave them
 out.
@@ -14,10 +14,11 @@ import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 LESSONS = sorted((ROOT / "docs" / "lessons").glob("*.ipynb"))
+GALLERY = ROOT / "docs" / "gallery.ipynb"
 
 
 @pytest.mark.filterwarnings("ignore:stick_slip. numbers that are unlikely")
-@pytest.mark.parametrize("lesson", LESSONS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("lesson", [*LESSONS, GALLERY], ids=lambda path: path.stem)
 def test_a_lesson_runs(lesson: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(plt, "show", lambda: None)
@@ -32,7 +33,7 @@ def test_there_are_lessons_in_the_navigation_without_results() -> None:
     """Pictures come from the build of the pages, so that they are of this version."""
     navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     assert len(LESSONS) == 6
-    for lesson in LESSONS:
-        assert f"lessons/{lesson.name}" in navigation
+    for lesson in (*LESSONS, GALLERY):
+        assert f"- {lesson.relative_to(ROOT / 'docs').as_posix()}\n" in navigation
         cells = json.loads(lesson.read_text(encoding="utf-8"))["cells"]
         assert not any(cell.get("outputs") for cell in cells)
