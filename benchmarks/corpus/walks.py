@@ -3,8 +3,8 @@
     python -m corpus.walks CLONES --scratch DIR [--only TEXT] [--page corpus/walks.md]
 
 in the folder `benchmarks`; CLONES as for `python -m corpus`. Each file of `robots.csv` is loaded as
-there, left and right averaged where they are no mirror
-images; its gait is that of `heelstrike walk`, of a smaller step where there is none, and is
+there, a trunk let loose where the file holds it, left and right averaged where they are no mirror
+images. Its gait is that of `heelstrike walk`, of a smaller step where there is none, and is
 followed by computed torque under time stepping at 1 ms. A row says how far it came, or why not.
 """
 
@@ -90,14 +90,20 @@ def attempt(robot: Published, clones: Path, scratch: Path) -> Walk | None:
 
 
 def _loaded(path: Path, options: dict[str, Any]) -> tuple[Robot, str]:
-    """Load a file, with a mirror image if it can have one, and say what that needed."""
-    robot = load_robot(path, **options)
-    if robot.mirror is None:
-        try:
-            return load_robot(path, **options, mirror="average"), "left and right averaged; "
-        except HeelstrikeError:
-            pass  # so different that the gait is refused, in words
-    return robot, ""
+    """Load a file with a trunk that is free and a mirror image, and say what that needed."""
+    robot, changed = load_robot(path, **options), ""
+    wishes = {
+        "trunk let loose; ": ({"floating": True}, lambda: robot.floating),
+        "left and right averaged; ": ({"mirror": "average"}, lambda: robot.mirror is not None),
+    }
+    for words, (more, fulfilled) in wishes.items():
+        if not fulfilled():
+            try:
+                robot = load_robot(path, **options, **more)
+            except HeelstrikeError:
+                continue  # the gait is then refused, in words
+            options, changed = options | more, changed + words
+    return robot, changed
 
 
 def _gait(robot: Robot) -> Gait:
