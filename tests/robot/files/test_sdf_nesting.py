@@ -68,9 +68,6 @@ NESTED = {
         f'<model name="low"><pose>0.15 0 0 0 0 0</pose><model name="er"><pose>0 0 0.6 0 0 0</pose>'
         f"{shin()}</model></model>" + knee("thigh", "low::er::shin")
     ),
-    "merged": whole(
-        f'<model name="low" merge="true">{PLACED}{shin()}</model>' + knee("thigh", "shin")
-    ),
 }
 
 

@@ -185,8 +185,9 @@ def _included_models(include: Element, label: str, place: Place, reading: Readin
     if include.find("pose") is not None:
         model.attrib.pop("placement_frame", None)
     changes = {tag: (include.findtext(tag) or "").strip() for tag in ("name", "placement_frame")}
-    changes["merge"] = include.get("merge", "")
     model.attrib.update({name: value for name, value in changes.items() if value})
+    if isinstance(model, Node):
+        model.merged = include.get("merge") in ("true", "1")
     return [model]
 
 

@@ -51,7 +51,7 @@ def _parts(model: Element, label: str) -> Iterator[Element]:
     if truth(model, "static", label):
         raise error(model, label, f"the nested model {name[:60]!r} is static: it would hold the "
                     "robot. Take <static> or the model out.")  # fmt: skip
-    merged = model.get("merge") in ("true", "1")
+    merged = getattr(model, "merged", False)
     scope = "" if merged else f"{name}{SCOPE}"
     own = f"_merged__{name}__model__" if merged else name
     yield _own_frame(model, own, scope, label)
