@@ -13,11 +13,13 @@ from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.compare import Way
 from heelstrike.cli.options import (
     AsJson,
+    Averaged,
     Debug,
     Floating,
     Forward,
     Friction,
     OnGround,
+    Packages,
     Pose,
     Projected,
     Pushed,
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import Run
 
 OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "floating", "projected",
-             "forward", "pose")  # fmt: skip
+             "forward", "pose", "mirror", "package_path")  # fmt: skip
 """Options that say how a robot walks, and nothing to a run that is read."""
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"
@@ -81,6 +83,8 @@ def report(
     projected: Projected = False,
     forward: Forward = None,
     pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
@@ -108,7 +112,9 @@ def report(
         raise typer.BadParameter("one robot is walked at a time; repeat --method for several ways")
     else:
         surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
-        machine = load_robot(what[0], **reading(floating, projected, forward, pose))
+        machine = load_robot(
+            what[0], **reading(floating, projected, forward, pose, mirror, package_path)
+        )
         for each in pushes:
             each.place(machine)
         ways = method or [Way.TIME_STEPPING if machine.nu else Way.EVENT_DRIVEN]
@@ -141,7 +147,7 @@ def _refuse_options_of_a_walk(context: typer.Context) -> None:
         if source is not None and source.name == "COMMANDLINE":
             raise typer.BadParameter(
                 "it says how a robot walks, and a run that is read has walked",
-                param_hint=f"--{name}",
+                param_hint=f"--{name.replace('_', '-')}",
             )
 
 
