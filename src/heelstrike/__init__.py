@@ -86,6 +86,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
     from heelstrike.view.live import watch as watch
+    from heelstrike.view.report import report as report
 
 __version__ = "0.1.0"
 
@@ -142,6 +143,7 @@ _HOME = {
     "load_snapshot": "heelstrike.sim",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
+    "report": "heelstrike.view.report",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",

@@ -164,6 +164,11 @@ class Summary:
             table.add_row(label, value)
         return table
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import summary_card
+
+        return summary_card(self)
+
     def _title(self) -> str:
         return f"{self.robot}: {self.message}"
 

@@ -229,7 +229,7 @@ def test_it_goes_on_from_an_earlier_time_bit_by_bit() -> None:
 
 
 def test_friction_acts_at_once_and_is_there_when_gone_back() -> None:
-    session, shown = watching(walker())
+    session, _ = watching(walker())
     go_on(session, 0.2)
     assert ask(session, "choose", name="friction", value=0.02) == ""
     assert session.live.simulation.ground.friction == 0.02

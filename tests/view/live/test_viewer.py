@@ -56,7 +56,7 @@ def test_what_cannot_be_watched(what: Any, options: Any, words: str) -> None:
 def test_an_empty_run_cannot_be_watched() -> None:
     run = walking.walk(steps=1)
     empty = dataclasses.replace(run, time=run.time[:0], message="stopped at once")
-    with pytest.raises(ViewError, match="no rows .stopped at once"):
+    with pytest.raises(ViewError, match=r"no rows .stopped at once"):
         hs.watch(empty)
 
 

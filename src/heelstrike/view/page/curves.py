@@ -24,6 +24,8 @@ from heelstrike.view.style import in_words
 Floats = NDArray[np.float64]
 
 DASHED, DOTTED = 1, 2
+FLATTEST = 3.0
+"""How much taller than its curves an axis may become to hold their limits."""
 ROOM = 0.08
 """Share of the height of a panel that is left free above and below its curves."""
 
@@ -65,6 +67,10 @@ class Plot:
         Ends of the y axis; those of the curves by default.
     steps : bool
         Whether values are held from row to row.
+    note : str
+        What else there is to say.
+    group : str
+        What it belongs to.
     """
 
     title: str
@@ -73,6 +79,7 @@ class Plot:
     limits: Sequence[tuple[str, float]] = ()
     span: tuple[float, float] | None = None
     steps: bool = False
+    note: str = ""
     group: str = field(default="", kw_only=True)
 
     def described(self) -> dict[str, Any]:
@@ -90,7 +97,11 @@ class Plot:
         found["limits"] = [{"label": label, "level": level} for label, level in self.limits]
         if self.span is not None:
             found["span"] = list(self.span)
-        return found | ({"steps": True} if self.steps else {})
+        return (
+            found
+            | ({"steps": True} if self.steps else {})
+            | ({"note": self.note} if self.note else {})
+        )
 
 
 def plots(run: Run, gait: Gait | None, rows: Rows, zmp: ZeroMomentPoint) -> list[Plot]:
@@ -153,10 +164,16 @@ def _torques(run: Run, rows: Rows) -> list[Plot]:
                 [("limit", level) for level in limits],
                 span=_usual_span(run, run.torque[:, several], limits),
                 steps=True,
+                note=_limits_in_words(limits, unit),
                 group="joint torques",
             )
         )
     return found
+
+
+def _limits_in_words(limits: Sequence[float], unit: str) -> str:
+    text = " … ".join(f"{limit:g}" for limit in limits).replace("-", "−")
+    return f"limits {text} {unit}" if limits else ""
 
 
 def _alike(names: Sequence[str], which: NDArray[np.int64]) -> dict[str, list[int]]:
@@ -236,10 +253,18 @@ def _energy(run: Run, rows: Rows) -> list[Plot]:
 
 
 def _usual_span(run: Run, values: Floats, levels: Sequence[float]) -> tuple[float, float] | None:
-    """Ends of an axis that holds values (nt, ...) between impacts, which leave it, and levels."""
+    """Ends of an axis that holds values (nt, ...) between impacts, which leave it.
+
+    Levels that would press the curves flat are left outside.
+    """
     usual = values[~impact_rows(run)].ravel()
-    usual = np.append(usual[np.isfinite(usual)], levels)
-    if not usual.size or not np.ptp(usual) > 0.0:
+    usual = usual[np.isfinite(usual)]
+    if not usual.size:
+        return None
+    wide = np.append(usual, levels)
+    if np.ptp(wide) <= FLATTEST * np.ptp(usual):
+        usual = wide
+    if not np.ptp(usual) > 0.0:
         return None
     room = ROOM * float(np.ptp(usual))
     return float(usual.min()) - room, float(usual.max()) + room

@@ -61,6 +61,18 @@ var HeelstrikeDrawing = (() => {
     return text.replace("-", "−");
   }
 
+  /** Text with a rim of the page's colour, so that it is read over anything. */
+  function label({ context, colors }, text, x, y, { color, font = "12px", align = "center", base }) {
+    context.font = `${font} system-ui, sans-serif`;
+    context.textAlign = align;
+    context.textBaseline = base || "middle";
+    context.lineWidth = 3;
+    context.strokeStyle = colors.paper;
+    context.strokeText(text, x, y);
+    context.fillStyle = color;
+    context.fillText(text, x, y);
+  }
+
   function heightOfGround(ground, x) {
     let k = 0;
     while (k < ground.length - 4 && ground[k + 2] <= x) k += 2;
@@ -216,12 +228,9 @@ var HeelstrikeDrawing = (() => {
       context.stroke();
       context.setLineDash([]);
       if (near) {
-        context.fillStyle = colors.warn;
-        context.font = "600 12px system-ui, sans-serif";
-        context.textAlign = "center";
-        context.textBaseline = "bottom";
-        context.fillText(use > 1 - 1e-6 ? "slips" : `${Math.floor(100 * use)} % of friction`,
-          toX(x + height * nx), toY(z + height * nz) - 2);
+        const told = use > 1 - 1e-6 ? "edge of friction" : `${Math.floor(100 * use)} % of friction`;
+        label({ context, colors }, told, toX(x + height * nx), toY(z + height * nz) - 2,
+          { color: colors.warn, font: "600 12px", base: "bottom" });
       }
     });
   }
@@ -235,12 +244,8 @@ var HeelstrikeDrawing = (() => {
       drawArrow({ context, toX, toY }, { x, z, ax: fx / newtons, az: fz / newtons, length, size,
         color, cut: whole > length, width: Math.max(2, 2.5 * POINT * view.height) });
       if (whole > length) {
-        context.fillStyle = color;
-        context.font = "12px system-ui, sans-serif";
-        context.textAlign = "left";
-        context.textBaseline = "middle";
-        context.fillText(`${words(newtons)} N`, toX(x + (0.6 * length * fx) / newtons) + 8,
-          toY(z + (0.6 * length * fz) / newtons));
+        label({ context, colors }, `${words(newtons)} N`, toX(x + (0.6 * length * fx) / newtons) + 8,
+          toY(z + (0.6 * length * fz) / newtons), { color, align: "left" });
       }
     };
     for (let i = 0; i < scene.contacts.length; i++)
@@ -251,11 +256,8 @@ var HeelstrikeDrawing = (() => {
       const newtons = Math.hypot(push[k + 2], push[k + 3]);
       if (!(newtons > 0)) continue;
       arrow(push[k], push[k + 1], push[k + 2], push[k + 3], colors.push);
-      context.fillStyle = colors.push;
-      context.font = "600 13px system-ui, sans-serif";
-      context.textAlign = push[k + 2] > 0 ? "right" : "left";
-      context.textBaseline = "middle";
-      context.fillText(` ${words(newtons)} N `, toX(push[k]), toY(push[k + 1]));
+      label({ context, colors }, ` ${words(newtons)} N `, toX(push[k]), toY(push[k + 1]),
+        { color: colors.push, font: "600 13px", align: push[k + 2] > 0 ? "right" : "left" });
     }
   }
 
@@ -320,27 +322,24 @@ var HeelstrikeDrawing = (() => {
     context.stroke();
   }
 
-  function drawFlash({ context, colors, toX, toY }, { x, z, label, strength }) {
+  function drawFlash({ context, colors, toX, toY }, { x, z, label: told, strength }) {
     context.globalAlpha = Math.max(0, Math.min(1, strength));
     context.strokeStyle = colors.warn;
     context.lineWidth = 2.5;
     context.beginPath();
     context.arc(toX(x), toY(z), 10 + 14 * (1 - strength), 0, 2 * Math.PI);
     context.stroke();
-    if (label) {
-      context.fillStyle = colors.ink;
-      context.font = "600 13px system-ui, sans-serif";
-      context.textAlign = "center";
-      context.textBaseline = "top";
-      context.fillText(label, toX(x), toY(z) + 30);
+    if (told) {
+      label({ context, colors }, told, toX(x), toY(z) + 30,
+        { color: colors.ink, font: "600 13px", base: "top" });
     }
     context.globalAlpha = 1;
   }
 
-  /* panel: {title, unit, curves: [{label, foot, dash, values}], limits: [{label, level}],
-             bands: [{values}]} of which limits are dashed lines and bands are ±values
+  /* panel: {title, unit, note, curves: [{label, foot, dash, values}], limits: [{label, level}],
+             span: [low, high], steps} of which limits are dashed lines; steps: held from row to row
      time:  of the values (s)
-     view:  {width, height, from, to, cursor} in CSS pixels and s, dark, and low, high of the y axis
+     view:  {width, height, from, to, cursor} in CSS pixels and s, and dark
      Returns the x pixels of the span, for pointers. */
   function plot(context, panel, time, view) {
     const colors = palette(view.dark);
@@ -461,6 +460,10 @@ var HeelstrikeDrawing = (() => {
       context.setLineDash([]);
       context.fillText(curve.label, x + 24, 11);
       x += wide;
+    }
+    if (panel.note && x + context.measureText(panel.note).width < view.width) {
+      context.fillStyle = colors.grey;
+      context.fillText(panel.note, x, 11);
     }
   }
 

@@ -20,6 +20,7 @@ from heelstrike.view.page.motion import frames
 from heelstrike.view.page.provenance import provenance
 from heelstrike.view.page.rows import IMPACTS, shown_rows
 from heelstrike.view.page.scene import scene
+from heelstrike.view.page.verdict import judge
 from heelstrike.view.style import in_words, view_errors
 from heelstrike.whole_file import check_target, write_whole
 
@@ -70,8 +71,6 @@ def save_html(
         If the gait does not fit the robot of the run.
     """
     target = check_page(path)
-    if not len(run.time):
-        raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
     text = page(run, gait, command=command)
     with view_errors():
         return write_whole(target, text)
@@ -89,37 +88,42 @@ def check_page(path: str | os.PathLike[str]) -> Path:
     with view_errors():
         check_target(target)
     if target.suffix.lower() not in (".html", ".htm"):
-        raise ViewError(f"cannot write {target}: the name of a page ends in .html")
+        hint = "; a browser prints it to PDF" if target.suffix.lower() == ".pdf" else ""
+        raise ViewError(f"cannot write {target}: the name of a page ends in .html{hint}")
     return target
 
 
 def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     """Write the page of a run; see :func:`save_html`."""
+    if not len(run.time):
+        raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
     summary = summarize(run, gait=gait)
     title = f"{run.robot.name}: {run.message}"
     body = shipped("player.html")
-    worst = run.certificates
     parts = {
-        "title": escaped(title),
-        "headline": escaped(_headline(run, summary)),
+        "title": escaped(run.robot.name),
+        "headline": escaped(judge(run, gait).headline),
         "summary": table(dict(lines(summary)), "Summary"),
-        "certificates": table(
-            {
-                "deepest penetration": f"{worst.penetration:.3g} m",
-                "complementarity": f"{worst.complementarity:.3g}",
-                "friction cone": f"{worst.cone:.3g}",
-                "non-penetration": f"{worst.non_penetration:.3g}",
-                "contact problems": str(run.solver),
-            },
-            "Certificates: worst values over all steps, residuals relative to the data",
-        ),
+        "certificates": table(certificates(run), "Certificates: worst values over all steps"),
         "provenance": table(provenance(run, gait, command=command), "Where this comes from"),
     }
     for name, part in parts.items():
         body = body.replace(f"<!--{name}-->", part)
     body += data_block("run", contents(run, gait))
-    script = shipped("drawing.js") + shipped("player.js")
+    script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))
     return document(title, body, style=shipped("page.css"), script=script)
+
+
+def certificates(run: Run) -> dict[str, str]:
+    """Return the worst values of a run's certificates, label by label."""
+    worst = run.certificates
+    return {
+        "deepest penetration": f"{worst.penetration:.3g} m",
+        "residual of complementarity": f"{worst.complementarity:.3g} of the data",
+        "residual of the friction cone": f"{worst.cone:.3g} of the data",
+        "residual of non-penetration": f"{worst.non_penetration:.3g} of the data",
+        "contact problems": str(run.solver),
+    }
 
 
 def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
@@ -163,7 +167,3 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
 def _where(run: Run, kind: EventKind, index: int) -> str:
     names = run.robot.joint_names if kind in OF_JOINTS else run.robot.contact_names
     return in_words(names[index]) if 0 <= index < len(names) else ""
-
-
-def _headline(run: Run, summary: Any) -> str:
-    return f"{run.message}: {summary.steps} steps"

@@ -1,41 +1,15 @@
-/* A recorded run on a page: decodes its numbers, plays them, and keeps curves on the same cursor. */
+/* Plays a recorded run on a page, and keeps timeline and curves on the same cursor. */
 "use strict";
 
 (() => {
-  const run = JSON.parse(document.getElementById("run").textContent);
-  const { scene, data, plots, events, phases } = run;
+  const { before, fit } = HeelstrikeRecording;
   const at = (name) => document.getElementById(name);
-  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
-
-  /* Numbers: time (n), and columns of n rows or, where all are the same, of one. */
-  const time = new Float64Array(bytes(data.time)), count = data.rows;
-  const columns = new Map();
-  const numbers = new Float32Array(bytes(data.numbers));
-  let next = 0;
-  for (const { name, width, rows } of data.columns) {
-    columns.set(name, { width, rows, values: numbers.subarray(next, next + width * rows) });
-    next += width * rows;
-  }
-  const row = (name, k) => {
-    const { width, rows, values } = columns.get(name);
-    const start = rows === 1 ? 0 : k * width;
-    return values.subarray(start, start + width);
-  };
-  const MEMBERS = ["pose", "point", "normal", "force", "friction", "center", "capture", "pressure",
-    "support", "push"];
-  const MOVING = ["pose", "point", "center", "capture", "push"];
-  const frameOf = (k) => {
-    const frame = { time: time[k] };
-    for (const name of MEMBERS) frame[name] = row(name, k);
-    return frame;
-  };
-
+  const run = HeelstrikeRecording.read(JSON.parse(at("run").textContent));
+  const { scene, plots, events, phases, time, count, start, end } = run;
   plots.forEach((panel, i) => panel.curves.forEach((curve, k) => {
-    const { rows, values } = columns.get(`curve ${i} ${k}`);
-    curve.values = rows === 1 ? new Float32Array(count).fill(values[0]) : values;
+    curve.values = run.curve(`curve ${i} ${k}`);
   }));
 
-  const start = time[0], end = time[count - 1];
   const impacts = events.filter((event) => event.impact).map((event) => event.time);
   const instants = [...new Set(events.map((event) => event.time))].sort((a, b) => a - b);
 
@@ -44,110 +18,8 @@
   const isDark = () => state.dark === null
     ? matchMedia("(prefers-color-scheme: dark)").matches : state.dark;
 
-  /** Last of sorted values that is not beyond t, or -1. */
-  function before(values, t) {
-    let low = 0, high = values.length;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (values[middle] <= t) low = middle + 1;
-      else high = middle;
-    }
-    return low - 1;
-  }
-
-  /** What is drawn at a time: places on the straight line between rows, forces of the row before. */
-  function frameAt(t) {
-    const k = Math.max(0, before(time, t));
-    const frame = frameOf(k);
-    const share = k + 1 < count ? (t - time[k]) / (time[k + 1] - time[k] || 1) : 0;
-    if (share > 0) {
-      const after = frameOf(k + 1);
-      for (const name of MOVING)
-        frame[name] = frame[name].map((value, i) => value + share * (after[name][i] - value));
-    }
-    return frame;
-  }
-
-  /* The camera follows the centre of mass, evenly, and holds all of the robot. */
-  const camera = (() => {
-    let low = Infinity, high = -Infinity, reach = 0;
-    for (let k = 0; k < count; k++) {
-      const center = row("center", k)[0], pose = row("pose", k);
-      const ground = HeelstrikeDrawing.heightOfGround(scene.ground, center);
-      for (const shape of scene.shapes) {
-        const [x, z, angle] = [0, 1, 2].map((n) => pose[3 * shape.link + n]);
-        for (let n = 0; n + 1 < shape.corners.length; n += 2) {
-          const [a, b] = [shape.corners[n], shape.corners[n + 1]];
-          const px = x + Math.cos(angle) * a + Math.sin(angle) * b;
-          const pz = z + Math.cos(angle) * b - Math.sin(angle) * a;
-          if (!Number.isFinite(px + pz)) continue;
-          low = Math.min(low, pz - ground);
-          high = Math.max(high, pz - ground);
-          reach = Math.max(reach, Math.abs(px - center));
-        }
-      }
-    }
-    if (!(high > low)) [low, high, reach] = [0, 1, 1];
-    const size = Math.max(high - low, scene.size);
-    return { low: Math.min(low, 0) - 0.14 * size, high: high + 0.2 * size, reach: reach * 1.05 };
-  })();
-
-  /** Mean of the centre of mass within 0.3 s of a time. */
-  function followed(t) {
-    let total = 0, weight = 0;
-    for (let n = -6; n <= 6; n++) {
-      const center = frameCenter(Math.min(end, Math.max(start, t + 0.05 * n)));
-      const share = 7 - Math.abs(n);
-      if (Number.isFinite(center)) [total, weight] = [total + share * center, weight + share];
-    }
-    return weight ? total / weight : 0;
-  }
-  function frameCenter(t) {
-    const k = Math.max(0, before(time, t)), l = Math.min(k + 1, count - 1);
-    const share = time[l] > time[k] ? (t - time[k]) / (time[l] - time[k]) : 0;
-    return row("center", k)[0] * (1 - share) + row("center", l)[0] * share;
-  }
-
-  function fit(canvas) {
-    const width = canvas.clientWidth, height = canvas.clientHeight;
-    const ratio = window.devicePixelRatio || 1;
-    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
-      canvas.width = Math.round(width * ratio);
-      canvas.height = Math.round(height * ratio);
-    }
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    return { context, width, height };
-  }
-
-  const FLASH = 0.12; // s
-  function flashes(t, frame) {
-    const found = [];
-    for (const event of events) {
-      if (event.time > t + 1e-9) break;
-      if (t - event.time > FLASH || event.contact < 0 || !event.impact) continue;
-      const impulse = event.impulse ? ` ${HeelstrikeDrawing.words(event.impulse)} N s` : "";
-      const same = found.find((other) => other.kind === event.kind);
-      found.push({ x: frame.point[2 * event.contact], z: frame.point[2 * event.contact + 1],
-        strength: 1 - (t - event.time) / FLASH, kind: event.kind,
-        label: same ? "" : `${event.kind}${impulse}` });
-    }
-    return found;
-  }
-
-  function drawPlane() {
-    const { context, width, height } = fit(at("plane"));
-    if (!width || !height) return;
-    const frame = frameAt(state.now), x = followed(state.now);
-    const scale = Math.min(height / (camera.high - camera.low), width / (2 * camera.reach));
-    const bottom = HeelstrikeDrawing.heightOfGround(scene.ground, x) + camera.low;
-    const trail = [];
-    for (let k = state.row; k >= 0 && state.now - time[k] < 1.5; k--) trail.push(frameOf(k));
-    HeelstrikeDrawing.draw(context, scene, frame, { width, height, x, scale,
-      z: bottom + (0.5 * height) / scale, dark: isDark(), hide: state.hide, trail,
-      flashes: flashes(state.now, frame) });
-    return frame;
-  }
+  const drawPlane = () =>
+    run.draw(at("plane"), state.now, { dark: isDark(), hide: state.hide });
 
   const canvases = plots.map((panel) => {
     const canvas = document.createElement("canvas");
@@ -251,7 +123,7 @@
 
   function go(t) {
     state.now = Math.min(end, Math.max(start, t));
-    state.row = Math.max(0, before(time, state.now));
+    state.row = run.rowAt(state.now);
     show();
   }
   const goToRow = (k) => go(time[Math.min(count - 1, Math.max(0, k))]);
