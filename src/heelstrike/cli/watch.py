@@ -9,11 +9,13 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
+    Averaged,
     Debug,
     Floating,
     Forward,
     Friction,
     OnGround,
+    Packages,
     Pose,
     Projected,
     RobotName,
@@ -38,6 +40,7 @@ METHODS = (
 """Names that :func:`~heelstrike.cli.options.method_called` knows, the usual one first."""
 
 
+# As many arguments as the command has options: a person's.
 @spoken
 def watch(
     robot: RobotName = "bravo7",
@@ -64,6 +67,8 @@ def watch(
     projected: Projected = False,
     forward: Forward = None,
     pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
@@ -95,7 +100,7 @@ def watch(
             gait=gait,
             friction=friction,
             **_ground_choices(ground, surface),
-            **reading(floating, projected, forward, pose),
+            **reading(floating, projected, forward, pose, mirror, package_path),
         )
         viewer = view(stage=walks, rate=speed, port=port)
     tell(f"watch at {viewer.url}")

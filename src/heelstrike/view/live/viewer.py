@@ -32,6 +32,13 @@ class Viewer:
     Made by :func:`heelstrike.watch`. In a notebook it shows itself as the result of a cell; as a
     context manager it closes at the end of the block.
 
+    Parameters
+    ----------
+    session : Session
+        What is watched.
+    server : Server
+        Who serves it.
+
     Attributes
     ----------
     url : str
