@@ -37,7 +37,9 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return walking.gait().save(tmp_path_factory.mktemp("gait") / "gait.json")
+    path = tmp_path_factory.mktemp("gait") / "gait.json"
+    walking.gait().save(path)
+    return path
 
 
 @pytest.fixture

@@ -100,7 +100,7 @@ def test_the_simulation_goes_on_as_by_itself() -> None:
     assert np.array_equal(part.contact_force, whole.contact_force[:rows])
     kept = np.array([frame[0] for frame in shown.course])
     assert (np.diff(kept) > 0.0).all()
-    assert np.diff(kept).max() < 0.02
+    assert np.diff(kept).max() < 1.5 / 60.0 + 2e-3
     assert {event[1] for event in shown._events} == {EventKind.TOUCHDOWN, EventKind.LIFTOFF}
     assert shown.told["light"]["level"] == "good"
 
@@ -116,7 +116,7 @@ def test_slower_and_faster(rate: float) -> None:
     assert 0.1 < session.cursor <= 0.1 + 12 * TICK * rate + 1e-3
     times = np.array([frame[0] for frame in shown.course if frame[0] > 0.105])
     # Slowly every step that is seen is there, quickly as many frames as at real time.
-    assert np.diff(times).max() < max(rate * TICK, 1.0 / 60.0) + 2e-3
+    assert np.diff(times).max() < max(rate * TICK, 1.5 / 60.0) + 2e-3
 
 
 def test_back_and_forth() -> None:
