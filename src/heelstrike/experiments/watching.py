@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, Unpack
 
 import numpy as np
 
@@ -22,10 +22,9 @@ from heelstrike.sim import Controller, Simulation
 from heelstrike.sim.method import Method
 from heelstrike.view.live.stage import Control, Stage, friction_control
 
-Methods = Callable[[str, float], Method]
-
 DESIGNED, CYCLE = "designed for the speed", "limit cycle"
 EXACT, ENCODERS, NOTHING = "computed torque", "computed torque by encoders", "no torque"
+MILLISECONDS = " ms"
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Steps that are offered, in ms."""
 SPEEDS = (0.4, 1.6)
@@ -38,6 +37,13 @@ AHEAD, SPACING, ROUGH_LENGTH = 0.5, 0.1, 100.0
 """Where roughness begins, the distance of its corners and its length, in m."""
 DESCENT = -3.0
 """Degrees of the slope on which passive walkers begin."""
+
+
+class Methods(Protocol):
+    """Makes the method of a name and a step (s); legs of passive walkers may pass the ground."""
+
+    def __call__(self, name: str, step: float, *, passive: bool) -> Method:
+        """Make it."""
 
 
 class GroundChoices(TypedDict, total=False):
@@ -57,7 +63,7 @@ class WalkStage(Stage):
     robot : str or path
         Name or file of the robot at first; the built-in ones are offered, too.
     methods : callable
-        Makes the method of a name and a step (s).
+        Makes the method of a name and a step (s), for robots with motors or without.
     method_names : sequence of str
         The names, the usual one first.
     method : str, optional
@@ -132,12 +138,13 @@ class WalkStage(Stage):
         ground = self.ground(values)
         walked = self._walked(robot, values, ground, progress)
         start = beginning(robot, walked, ground)
+        step = 1e-3 * float(values["step"].removesuffix(MILLISECONDS))
         controller = start.controller if robot.nu == 0 else self._controller(robot, walked, values)
         return Simulation(
             robot,
             controller,
             state=start.state,
-            method=self._methods(values["method"], float(values["step"].split()[0]) * 1e-3),
+            method=self._methods(values["method"], step, passive=robot.nu == 0),
             ground=ground,
         )
 
@@ -182,8 +189,8 @@ class WalkStage(Stage):
     def _step_control(self) -> Control:
         step = 1e3 * (self._given["step"] or 1e-3)
         offered = sorted({*STEPS, float(f"{step:.6g}")})
-        words = tuple(f"{each:g} ms" for each in offered)
-        return Control("step", "step", f"{step:.6g} ms", words)
+        words = tuple(f"{each:g}{MILLISECONDS}" for each in offered)
+        return Control("step", "step", f"{step:.6g}{MILLISECONDS}", words)
 
     def _walked(
         self,
