@@ -26,6 +26,7 @@ from heelstrike.cli.options import (
 from heelstrike.cli.terminal import spoken, stage, tell
 from heelstrike.cli.values import ground_called
 from heelstrike.cli.walk import Method, Scheme
+from heelstrike.interruption import acknowledge
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
@@ -109,7 +110,8 @@ def watch(
             tell("no browser could be opened here: open the address yourself")
         tell("Ctrl-C ends it")
         viewer.wait()
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
+        acknowledge(interrupt)
         tell("closed")
         raise typer.Exit(INTERRUPTED) from None
 
