@@ -265,6 +265,42 @@ def test_what_cannot_be_is_refused_in_words() -> None:
     go_on(session, 0.1)  # nothing of it did harm
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_that_viewers_do_breaks_it(seed: int) -> None:
+    """Commands at random, many of them nonsense: each is carried out or refused in words."""
+    random = np.random.default_rng(seed)
+    session, shown = watching(walker())
+    values = [0, 1, -1, 0.3, 1e9, -1e300, float("inf"), float("nan"), True, None, "", "x", [], {}]
+
+    def some() -> Any:
+        return values[random.integers(len(values))]
+
+    def number() -> float:
+        return float(random.normal())
+
+    kinds = ["play", "step", "seek", "event", "rate", "hold", "release", "random push", "choose",
+             "reset", "resume", "leave", "nothing"]  # fmt: skip
+    for _ in range(150):
+        do = str(random.choice(kinds))
+        sane: dict[str, Any] = {
+            "on": True, "rows": random.choice([-1, 1]), "time": 0.5 * abs(number()),
+            "direction": random.choice([-1, 1]), "value": abs(number()), "name": "friction",
+            "link": int(random.integers(-1, 10)), "point": [number(), number()],
+            "force": [200.0 * number(), 200.0 * number()],
+        }  # fmt: skip
+        if random.random() < 0.3:
+            sane[str(random.choice(list(sane)))] = some()
+        session.obey(str(random.choice(["a", "b"])), {"do": do, **sane})
+        if random.random() < 0.6:
+            session.update(TICK)
+        times = session.history.time
+        assert (np.diff(times) > 0.0).all()
+        assert times[0] - 1e-9 <= session.cursor <= times[-1] + 1e-9
+        assert shown.seen is not None
+        assert shown.seen[0] == pytest.approx(times[session.history.row_at(session.cursor)])
+        assert [frame[0] for frame in shown.course] == sorted(frame[0] for frame in shown.course)
+
+
 def test_a_fall_ends_it_and_it_can_be_taken_back() -> None:
     session, shown = watching(walker())
     trunk = TRUNK_LINK
@@ -336,6 +372,17 @@ def test_a_simulation_that_has_been_going_shows_its_past() -> None:
     assert "too long ago" in ask(session, "resume")  # from before it was watched
     ask(session, "reset")
     assert session.cursor == pytest.approx(0.4)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+def test_a_mistake_of_ours_is_not_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown = Shown()
+    session = Session(shown, run=walking.walk(steps=1))
+    monkeypatch.setattr(Session, "obey", lambda *_: 1 / 0)
+    session.ask("a", {"do": "nothing"})
+    session.start()
+    session.join(60.0)
+    assert "ZeroDivisionError" in shown.told["message"]
 
 
 class Broken(GivenStage):

@@ -26,7 +26,7 @@ LONGEST_MESSAGE = 2**16
 """Bytes of a message from a viewer."""
 MOST_WAITING = 5000
 """Messages that may wait for a viewer; one that is slower is sent away."""
-CLOSES_WITHIN = 0.5
+CLOSES_WITHIN = 0.3
 """Seconds that viewers are given to say goodbye."""
 
 MISSING = (

@@ -112,6 +112,14 @@ class Session:
         self._commands.put((viewer, command))
 
     def _go(self) -> None:
+        try:
+            self._go_on()
+        except Exception as error:
+            # Of ours: viewers are told, and the terminal gets the rest.
+            self._board.state({"message": f"the view has failed: {error!r}", "playing": False})
+            raise
+
+    def _go_on(self) -> None:
         self.begin()
         before = due = clock_time.perf_counter()
         while not self._closing.is_set():

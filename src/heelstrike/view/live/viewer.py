@@ -22,6 +22,8 @@ from heelstrike.view.live.stage import GivenStage, Stage
 
 LOOK_EVERY = 0.1
 """Seconds between two looks whether Ctrl-C has come, which Windows keeps from what waits."""
+JOINS_WITHIN = 0.25
+"""Seconds that the simulation is given to end; the design of a gait cannot be broken off."""
 HEIGHT = 640
 """Pixels of the view in a notebook."""
 
@@ -115,7 +117,7 @@ class Viewer:
         self._closed.set()
         self._session.close()
         self._server.close()
-        self._session.join(1.0)
+        self._session.join(JOINS_WITHIN)
         if self._way is not None:
             self._way.cleanup()
 
