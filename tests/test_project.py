@@ -48,6 +48,7 @@ HEAVY = {
     "pandas",
     "scipy",
     "viser",
+    "websockets",
     "xarray",
 }
 
