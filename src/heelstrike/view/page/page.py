@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -167,7 +168,7 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
                 "kind": event.kind.name.lower().replace("_", " "),
                 "where": _where(run, event.kind, event.contact),
                 "contact": -1 if event.kind in OF_JOINTS else event.contact,
-                "impulse": float(event.impulse[0]),
+                "impulse": event.impulse[0] if math.isfinite(event.impulse[0]) else 0.0,
                 "impact": event.kind in IMPACTS,
             }
             for event in events
