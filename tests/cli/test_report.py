@@ -8,31 +8,46 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import walking
 from synthetic_runs import box, make_run
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
 from heelstrike.sim import RunStatus
+from heelstrike.view.report import writing
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a short walk leaves: its gait and its run."""
+    folder = tmp_path_factory.mktemp("walk")
+    walking.gait().save(folder / "gait.json")
+    walking.walk(steps=2).save(folder / "run.nc")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def one_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw one figure of a report only: drawing takes most of its time."""
+    monkeypatch.setattr(writing, "FIGURES", ("energy",))
 
 
 def report(*options: str) -> Any:
     return CliRunner().invoke(app, ["report", *options])
 
 
-def test_a_run_is_reported_with_the_gait_beside_it(
-    walked: tuple[Path, Any], tmp_path: Path
-) -> None:
+def test_a_run_is_reported_with_the_gait_beside_it(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
-    result = report(str(walked[0] / "run.nc"), "--out", str(out))
+    result = report(str(folder / "run.nc"), "--out", str(out))
     assert result.exit_code == 0, result.stderr
-    assert result.stdout.startswith("bravo7 walks: 3 steps")
+    assert result.stdout.startswith("bravo7 walks: 2 steps")
     assert "gait.json" in result.stderr
     assert "joint tracking error" in out.read_text(encoding="utf-8")
 
 
-def test_a_robot_is_walked_by_several_methods(walked: tuple[Path, Any], tmp_path: Path) -> None:
+def test_a_robot_is_walked_by_several_methods(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
-    gait = str(walked[0] / "gait.json")
+    gait = str(folder / "gait.json")
     ways = ("--method", "time-stepping", "--method", "paper-symplectic")
     result = report("bravo7", "--gait", gait, "--steps", "1", *ways, "--out", str(out))
     assert result.exit_code == 0, result.stderr

@@ -220,7 +220,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
     thickness = width
     if bones:
         lines = [(home, p) for p in points if all(_apart(p, end) for end in (home, *joints))]
-    elif _are_around(points):
+    elif are_around(points):
         lines, thickness = [(home, p) for p in points], THINNEST
     else:
         lines = _outline(points)
@@ -254,7 +254,7 @@ def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
     )
 
 
-def _are_around(points: Floats) -> bool:
+def are_around(points: Floats) -> bool:
     """Whether points lie on all sides of the joint, as those of a wheel: no half-plane is free."""
     if len(points) < 3:
         return False

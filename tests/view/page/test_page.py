@@ -160,7 +160,9 @@ def test_unusual_runs(kind: str, tmp_path: Path) -> None:
     elif kind == "one row":
         run = make_run(walking.bravo7(), [0.0])
     elif kind == "nothing known":
-        run = make_run(box(), [0.0, 0.1], position=np.full((2, 3), np.nan))
+        event = Event(0.1, EventKind.TOUCHDOWN, 0, (np.nan, np.inf))
+        unknown = np.full((2, 3), np.nan)
+        run = make_run(box(), [0.0, 0.1], position=unknown, velocity=unknown, events=[event])
     elif kind == "box":
         push = hs.Push("box", force=(30.0, 0.0), start=0.0, duration=0.05)
         run = hs.simulate(box(), state=hs.State([0, 0.1, 0.2], [1.0, 0, 0]), duration=0.3,
@@ -218,6 +220,8 @@ def test_bad_requests(tmp_path: Path) -> None:
     run = make_run(box(), [0.0, 0.1])
     with pytest.raises(ViewError, match=r"ends in \.html"):
         save_html(run, tmp_path / "run.txt")
+    with pytest.raises(hs.GaitError, match="load_gait"):
+        save_html(run, tmp_path / "run.html", gait="gait.json")  # type: ignore[arg-type]
     with pytest.raises(ViewError, match="there is no folder"):
         save_html(run, tmp_path / "none" / "run.html")
     with pytest.raises(ViewError, match="has no rows"):

@@ -83,12 +83,18 @@ def test_a_fall_names_what_came_first() -> None:
     early = hs.Push("trunk", force=(3.0, 4.0), start=0.05, duration=0.1)
     pushed = judge(make_run(robot, [0.0, 0.1], force=force, pushes=(early,), **fell))
     assert pushed.advice[0].startswith("the push of 5 N from 0.05 s on")
-    late = hs.Push("trunk", force=(3.0, 4.0), start=0.2, duration=0.1)
-    assert (
-        judge(make_run(robot, [0.0, 0.1], force=force, pushes=(late,), **fell))
-        .advice[0]
-        .startswith("friction")
-    )
+    for start in (0.2, -0.6):  # after it, and long before
+        other = hs.Push("trunk", force=(3.0, 4.0), start=start, duration=0.1)
+        found = judge(make_run(robot, [0.0, 0.1], force=force, pushes=(other,), **fell))
+        assert found.advice[0].startswith("friction")
+
+
+def test_a_wheel_has_no_sole() -> None:
+    robot = hs.load_robot("rimless_wheel")
+    force = np.zeros((2, robot.nc, 2))
+    force[:, :2, 0] = 5.0
+    run = make_run(robot, [0.0, 0.1], force=force)
+    assert {limit.kind for limit in judge(run).limits} == {"friction"}
 
 
 def test_what_is_not_certified_is_not_good() -> None:

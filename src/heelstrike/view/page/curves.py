@@ -16,7 +16,9 @@ from heelstrike.analysis.tracking import reference_motion
 from heelstrike.analysis.zero_moment_point import ZeroMomentPoint, zero_moment_point_limits
 from heelstrike.gait.gait import Gait
 from heelstrike.sim.run import Run
+from heelstrike.view.contact_figures import ROOM_ABOUT_POINTS
 from heelstrike.view.drawing import legs
+from heelstrike.view.energy_figure import ALWAYS
 from heelstrike.view.page.rows import Rows, means
 from heelstrike.view.panels import impact_rows
 from heelstrike.view.style import in_words
@@ -189,7 +191,7 @@ def _pressure(run: Run, rows: Rows, zmp: ZeroMomentPoint) -> Plot:
     heel, toe = zero_moment_point_limits(run.robot)
     alone = np.where(zmp.single_support[:, None], zmp.foot, np.nan)[rows]
     traces = [Trace(alone[:, i], in_words(foot.name), i) for i, foot in enumerate(run.robot.feet)]
-    room = 0.15 * max(toe - heel, 1e-3)
+    room = 0.15 * (toe - heel) if toe > heel else ROOM_ABOUT_POINTS
     return Plot(
         "zero moment point in single support, ahead of the ankle",
         "m",
@@ -244,7 +246,7 @@ def _energy(run: Run, rows: Rows) -> list[Plot]:
             ("pushes", "pushes", 3, 0),
             ("residual", "residual", 0, None),
         )
-        if name in ("actuators", "contacts", "residual") or getattr(balance, name).any()
+        if name in ALWAYS or getattr(balance, name).any()
     ]
     return [
         Plot("energy, change since the start", "J", changes, group="energy"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.summary import lines, summarize
 from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
-from heelstrike.errors import ViewError
+from heelstrike.errors import GaitError, ViewError
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Run
 from heelstrike.view.page.columns import TOLERANCE, packed
@@ -97,6 +98,7 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     """Write the page of a run; see :func:`save_html`."""
     if not len(run.time):
         raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
+    check_gait(gait)
     summary = summarize(run, gait=gait)
     title = f"{run.robot.name}: {run.message}"
     body = shipped("player.html")
@@ -112,6 +114,20 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     body += data_block("run", contents(run, gait))
     script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))
     return document(title, body, style=shipped("page.css"), script=script)
+
+
+def check_gait(gait: object) -> None:
+    """Refuse what is no gait, such as the name of its file.
+
+    Raises
+    ------
+    GaitError
+        That says what it is.
+    """
+    from heelstrike.gait.gait import Gait
+
+    if gait is not None and not isinstance(gait, Gait):
+        raise GaitError(f"gait must be a Gait, got {gait!r}; load_gait reads one from its file")
 
 
 def certificates(run: Run) -> dict[str, str]:
@@ -152,7 +168,7 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
                 "kind": event.kind.name.lower().replace("_", " "),
                 "where": _where(run, event.kind, event.contact),
                 "contact": -1 if event.kind in OF_JOINTS else event.contact,
-                "impulse": float(event.impulse[0]),
+                "impulse": event.impulse[0] if math.isfinite(event.impulse[0]) else 0.0,
                 "impact": event.kind in IMPACTS,
             }
             for event in events

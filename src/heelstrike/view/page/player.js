@@ -15,6 +15,7 @@
 
   const state = { now: start, row: 0, playing: false, speed: 1, slow: true, hide: {}, dark: null,
     last: 0 };
+  const SLIDER = 10000; // its last value
   const isDark = () => state.dark === null
     ? matchMedia("(prefers-color-scheme: dark)").matches : state.dark;
 
@@ -65,12 +66,13 @@
     });
   }
 
+  const INSET = 8; // pixels, half a thumb of the slider: instants stand over their places on it
   const KINDS = { "touchdown": "▼", "liftoff": "▲", "slip": "~", "stick": "·", "impact": "✳" };
   function drawEvents() {
     const { context, width, height } = fit(at("events"));
     if (!width) return;
     const dark = isDark(), colors = HeelstrikeDrawing.palette(dark);
-    const toX = (t) => 8 + ((t - start) / (end - start || 1)) * (width - 16);
+    const toX = (t) => INSET + ((t - start) / (end - start || 1)) * (width - 2 * INSET);
     context.clearRect(0, 0, width, height);
     const feet = scene.feet.length, tall = feet ? 12 / feet : 0;
     for (const [from, to, ...pushing] of phases)
@@ -99,7 +101,7 @@
   function tell(frame) {
     const { words } = HeelstrikeDrawing;
     at("clock").textContent = `${state.now.toFixed(3)} s`;
-    at("time").value = state.row;
+    at("time").value = Math.round((SLIDER * (state.now - start)) / (end - start || 1));
     at("time").setAttribute("aria-valuetext", `${state.now.toFixed(3)} seconds`);
     const near = events.filter((event) => Math.abs(event.time - state.now) < 1e-3);
     const normal = scene.feet.map((foot, i) => {
@@ -162,10 +164,9 @@
     if (target !== undefined) go(target);
   }
 
-  at("time").max = count - 1;
   at("time").addEventListener("input", (happened) => {
     play(false);
-    goToRow(Number(happened.target.value));
+    go(start + (Number(happened.target.value) / SLIDER) * (end - start));
   });
   at("play").addEventListener("click", () => play(!state.playing));
   at("start").addEventListener("click", () => { play(false); go(start); });
@@ -213,6 +214,15 @@
     play(false);
     go(start + ((x - left) / (right - left)) * (end - start));
   };
+  const onStrip = (happened) => {
+    const box = at("events").getBoundingClientRect();
+    play(false);
+    go(start + ((happened.clientX - box.left - INSET) / (box.width - 2 * INSET)) * (end - start));
+  };
+  at("events").addEventListener("pointerdown", onStrip);
+  at("events").addEventListener("pointermove", (happened) => {
+    if (happened.buttons) onStrip(happened);
+  });
   for (const canvas of canvases) {
     canvas.addEventListener("pointerdown", (happened) => pointed(canvas, happened));
     canvas.addEventListener("pointermove", (happened) => {

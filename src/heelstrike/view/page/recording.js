@@ -8,6 +8,7 @@ var HeelstrikeRecording = (() => {
     "support", "push"];
   const MOVING = ["pose", "point", "center", "capture", "push"];
   const FLASH = 0.12, TRAIL = 1.5; // s
+  const FLASHES = 4;
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 
@@ -91,10 +92,14 @@ var HeelstrikeRecording = (() => {
         found.push({ x, z, strength, time: event.time, impulse: event.impulse,
           label: same ? "" : event.kind });
       }
-      for (const flash of found)
-        if (flash.label && flash.impulse)
+      // Of feet that chatter the last touches are shown, and the last one is told.
+      const shown = found.slice(-FLASHES), last = shown.length ? shown.at(-1).time : 0;
+      for (const flash of shown) {
+        if (flash.time !== last) flash.label = "";
+        else if (flash.label && flash.impulse)
           flash.label += ` ${HeelstrikeDrawing.words(flash.impulse)} N s`;
-      return found;
+      }
+      return shown;
     }
 
     /** Draw it on a canvas at a time; return what is shown. */

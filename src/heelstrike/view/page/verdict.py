@@ -18,12 +18,15 @@ from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.gait.gait import Gait
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
+from heelstrike.view.drawing import are_around
 from heelstrike.view.style import in_words
 
 Floats = NDArray[np.float64]
 
 REACHED = 1.0 - 1e-6
 """Share of a limit from which it is reached, but for rounding."""
+RECENT = 0.5
+"""Seconds within which a push before the first limit is named as what may have led to it."""
 SLID = 1e-3
 """Metres that a pressed foot may slide before a verdict speaks of it."""
 
@@ -145,6 +148,8 @@ def _of_feet(run: Run) -> Iterator[Limit]:
             yield Limit(f"friction of the {in_words(foot.name)}", "friction", used, time, reached,
                         detail)  # fmt: skip
         half = 0.5 * (sole.toe - sole.heel)
+        if are_around(run.robot.model.contact_position[list(foot.contacts)]):
+            continue  # a wheel has no sole
         if half > 0.0 and (found := _largest(run, 1.0 - alone[:, i] / half)) is not None:
             k, used, reached = found
             time = float(run.time[k])
@@ -234,7 +239,7 @@ def _advice(run: Run, gait: Gait | None, limits: tuple[Limit, ...]) -> Iterator[
     reached = math.inf if first is None else first.reached
     fell = run.status is RunStatus.FELL
     for push in run.pushes if fell else ():
-        if push.start <= min(reached, float(run.time[-1])):
+        if 0.0 <= min(reached, float(run.time[-1])) - push.start <= RECENT:
             newtons = math.hypot(*push.force)
             yield (
                 f"the push of {newtons:.3g} N from {push.start:.3g} s on came before the first "

@@ -16,7 +16,7 @@ from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view.figures import FIGURES, plot
 from heelstrike.view.page.markup import data_block, document, escaped, grid, shipped, table
-from heelstrike.view.page.page import certificates, check_page, contents
+from heelstrike.view.page.page import certificates, check_gait, check_page, contents
 from heelstrike.view.page.provenance import provenance
 from heelstrike.view.page.verdict import REACHED, Limit, Verdict, judge
 from heelstrike.view.report.differences import differences
@@ -82,7 +82,10 @@ def report(
     """
     target = check_page(path)
     named = _named(runs)
+    check_gait(gait)
     for name, run in named.items():
+        if not isinstance(run, Run):
+            raise ViewError(f"a report is of runs, got {run!r}; load_run reads one from its file")
         if not len(run.time):
             raise ViewError(f"there is nothing to report of {name}: no rows ({run.message})")
     text = report_page(named, gait, command=command)
@@ -121,12 +124,15 @@ def report_page(named: Mapping[str, Run], gait: Gait | None = None, *, command: 
 def _named(runs: Run | Mapping[str, Run] | Sequence[Run]) -> dict[str, Run]:
     if isinstance(runs, Run):
         return {runs.robot.name: runs}
+    if isinstance(runs, str | os.PathLike):
+        raise ViewError(f"a report is of runs, got {runs!r}; load_run reads one from its file")
     named = dict(runs) if isinstance(runs, Mapping) else {}
     for run in () if isinstance(runs, Mapping) else runs:
-        name, several = run.method.name, 1
+        method = run.method.name if isinstance(run, Run) else str(run)
+        name, several = method, 1
         while name in named:
             several += 1
-            name = f"{run.method.name} {several}"
+            name = f"{method} {several}"
         named[name] = run
     if not named:
         raise ViewError("there is no run to report")
