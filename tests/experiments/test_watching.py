@@ -12,11 +12,17 @@ import walking
 import heelstrike as hs
 from heelstrike.cli.options import method_called
 from heelstrike.cli.watch import METHODS
-from heelstrike.experiments.watching import DESIGNED, ENCODERS, NOTHING, WalkStage
+from heelstrike.experiments.watching import (
+    DESIGNED,
+    ENCODERS,
+    NOTHING,
+    First,
+    WalkStage,
+)
 
 
 def stage(robot: str = "bravo7", **options: Any) -> WalkStage:
-    return WalkStage(robot, method_called, METHODS, **options)
+    return WalkStage(robot, method_called, METHODS, First(**options))
 
 
 @pytest.fixture(scope="module")

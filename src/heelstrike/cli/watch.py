@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -30,7 +30,6 @@ from heelstrike.interruption import acknowledge
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
-    from heelstrike.experiments.watching import GroundChoices
 
 METHODS = (
     Scheme.IMPACT_RESOLVED.value,
@@ -85,24 +84,18 @@ def watch(
         from heelstrike.view.live.server import check_installed
 
         check_installed()
-        from heelstrike.experiments.watching import WalkStage
+        from heelstrike.experiments.watching import First, WalkStage
         from heelstrike.view.live.viewer import view
 
         # All that is cheap to refuse is refused before anything is served.
         surface = ground_called(ground, friction=friction)
         for name in METHODS if method is None else (method,):
             method_called(name, step)
-        walks = WalkStage(
-            robot,
-            method_called,
-            METHODS,
-            method=method,
-            step=step,
-            gait=gait,
-            friction=friction,
-            **_ground_choices(ground, surface),
-            **reading(floating, projected, forward, pose, mirror, package_path),
+        first = First(
+            method=method, step=step, gait=gait, friction=friction, **_shape(ground, surface)
         )
+        how = reading(floating, projected, forward, pose, mirror, package_path)
+        walks = WalkStage(robot, method_called, METHODS, first, **how)
         viewer = view(stage=walks, rate=speed, port=port)
     tell(f"watch at {viewer.url}")
     try:
@@ -116,7 +109,7 @@ def watch(
         raise typer.Exit(INTERRUPTED) from None
 
 
-def _ground_choices(words: str, surface: Ground) -> GroundChoices:
+def _shape(words: str, surface: Ground) -> dict[str, Any]:
     """What of a ground can be set by viewers; stairs and files are as they are."""
     kind, *shape = words.split(":")
     if kind == "flat":

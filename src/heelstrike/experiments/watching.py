@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol, TypedDict, Unpack
+from typing import Any, Protocol, Unpack
 
 import numpy as np
 
@@ -46,13 +46,38 @@ class Methods(Protocol):
         """Make it."""
 
 
-class GroundChoices(TypedDict, total=False):
-    """A ground that is given, or what of one can be set: degrees, m, seed of the roughness."""
+@dataclass(frozen=True, kw_only=True)
+class First:
+    """What is chosen at first.
 
-    ground: Ground
-    slope: float
-    roughness: float
-    seed: int
+    Attributes
+    ----------
+    method : str, optional
+        Name of the method; the usual one by default.
+    step : float
+        In s.
+    gait : str or path, optional
+        A saved gait of the robot, offered beside the designed one.
+    friction : float
+        For which gaits are designed, too.
+    slope : float, optional
+        In degrees; by default level, or a descent for walkers without motors.
+    roughness : float
+        Greatest height of the ground's corners (m).
+    seed : int
+        Of the roughness.
+    ground : Ground, optional
+        Instead of a slope and roughness that can be set.
+    """
+
+    method: str | None = None
+    step: float = 1e-3
+    gait: str | os.PathLike[str] | None = None
+    friction: float = 0.75
+    slope: float | None = None
+    roughness: float = 0.0
+    seed: int = 1
+    ground: Ground | None = None
 
 
 class WalkStage(Stage):
@@ -66,18 +91,8 @@ class WalkStage(Stage):
         Makes the method of a name and a step (s), for robots with motors or without.
     method_names : sequence of str
         The names, the usual one first.
-    method : str, optional
-        The one at first.
-    step : float
-        In s, at first.
-    gait : str or path, optional
-        A saved gait of the robot, offered beside the designed one.
-    ground : Ground, optional
-        Instead of a slope and roughness that can be set.
-    friction, slope, roughness : float
-        At first; the slope in degrees, the roughness in m. Gaits are designed for this friction.
-    seed : int
-        Of the roughness.
+    first : First, optional
+        What is chosen at first.
     **how
         How the robot's file is read, as for :func:`heelstrike.load_robot`.
     """
@@ -87,32 +102,23 @@ class WalkStage(Stage):
         robot: str | os.PathLike[str],
         methods: Methods,
         method_names: tuple[str, ...],
-        *,
-        method: str | None = None,
-        step: float = 1e-3,
-        gait: str | os.PathLike[str] | None = None,
-        ground: Ground | None = None,
-        friction: float = 0.75,
-        slope: float | None = None,
-        roughness: float = 0.0,
-        seed: int = 1,
+        first: First | None = None,
         **how: Unpack[LoadOptions],
     ) -> None:
-        self._first = str(robot)
-        self._robots = {self._first: load_robot(robot, **how)}
-        self._methods, self._method_names, self._method = methods, method_names, method
-        self._ground, self._seed = ground, seed
-        self._given = {"friction": friction, "slope": slope, "roughness": roughness, "step": step}
+        self._name, self._first = str(robot), First() if first is None else first
+        self._robots = {self._name: load_robot(robot, **how)}
+        self._methods, self._method_names = methods, method_names
         self._gaits: dict[tuple[Any, ...], Gait | LimitCycle] = {}
+        gait = self._first.gait
         self._saved = "" if gait is None else Path(gait).name
         if gait is not None:
-            self._gaits[self._first, self._saved] = load_gait(gait, self._robots[self._first])
+            self._gaits[self._name, self._saved] = load_gait(gait, self._robots[self._name])
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
         """Robot, gait, controller, speed, ground, method and step."""
-        name = values.get("robot", self._first)
+        name = values.get("robot", self._name)
         robot = self._robot(name)
-        names = tuple(dict.fromkeys((self._first, *builtin_robots())))
+        names = tuple(dict.fromkeys((self._name, *builtin_robots())))
         passive = robot.nu == 0
         found = [Control("robot", "robot", name, names, resets=_OF_ROBOT)]
         if passive:
@@ -124,12 +130,12 @@ class WalkStage(Stage):
             found.append(Control("controller", "controller", EXACT, drives))
             if values.get("gait", gaits[0]) == DESIGNED:
                 found.append(_speed_control(robot))
-        found.append(friction_control(self._given["friction"] or 0.0))
-        if self._ground is None:
+        found.append(friction_control(self._first.friction))
+        if self._first.ground is None:
             found += self._shape_controls(passive)
         usual = "event-driven" if passive else self._method_names[0]
-        first = self._method if self._method and name == self._first else usual
-        found.append(Control("method", "method", first, self._method_names))
+        asked = self._first.method if name == self._name else None
+        found.append(Control("method", "method", asked or usual, self._method_names))
         return (*found, self._step_control())
 
     def simulation(self, values: Mapping[str, Any], progress: Callable[[str], None]) -> Simulation:
@@ -151,8 +157,8 @@ class WalkStage(Stage):
     def ground(self, values: Mapping[str, Any], simulation: Simulation | None = None) -> Ground:  # noqa: ARG002
         """Make the ground of a slope, a roughness and a friction."""
         friction = values["friction"]
-        if self._ground is not None:
-            numbers = self._ground.numbers()
+        if self._first.ground is not None:
+            numbers = self._first.ground.numbers()
             same = np.full_like(numbers["friction"], friction)
             return Ground.of_numbers(numbers | {"friction": same})
         slope = float(np.deg2rad(values["slope"]))
@@ -160,7 +166,7 @@ class WalkStage(Stage):
             return Ground(friction=friction, slope=slope)
         rough = Ground.rough(
             amplitude=values["roughness"], spacing=SPACING, length=ROUGH_LENGTH, start=AHEAD,
-            seed=self._seed,
+            seed=self._first.seed,
         )  # fmt: skip
         corners = rough.numbers()["corner"].copy()
         corners[:, 1] += np.tan(slope) * corners[:, 0]
@@ -172,14 +178,14 @@ class WalkStage(Stage):
         return self._robots[name]
 
     def _shape_controls(self, passive: bool) -> list[Control]:
-        slope = self._given["slope"]
+        slope = self._first.slope
         if slope is None:
             slope = DESCENT if passive else 0.0
         steepest = max(STEEPEST, abs(slope))
         shapes = [
             Control("slope", "slope", slope, low=-steepest, high=steepest, step=0.5, unit="°")
         ]
-        rough = 0.0 if passive else self._given["roughness"] or 0.0
+        rough = 0.0 if passive else self._first.roughness
         highest = 0.0 if passive else max(ROUGHEST, rough)
         shapes.append(
             Control("roughness", "roughness ±", rough, high=highest, step=0.001, unit="m")
@@ -187,7 +193,7 @@ class WalkStage(Stage):
         return shapes
 
     def _step_control(self) -> Control:
-        step = 1e3 * (self._given["step"] or 1e-3)
+        step = 1e3 * self._first.step
         offered = sorted({*STEPS, float(f"{step:.6g}")})
         words = tuple(f"{each:g}{MILLISECONDS}" for each in offered)
         return Control("step", "step", f"{step:.6g}{MILLISECONDS}", words)
@@ -216,7 +222,7 @@ class WalkStage(Stage):
             self._gaits[key] = design(
                 robot,
                 size,
-                friction=self._given["friction"] or 0.75,
+                friction=self._first.friction,
                 progress=lambda share: progress(f"{doing}: {100.0 * share:.0f} %"),
             )
         return self._gaits[key]

@@ -18,7 +18,7 @@ from PIL import Image
 import heelstrike as hs
 from heelstrike.cli.options import method_called
 from heelstrike.cli.watch import METHODS
-from heelstrike.experiments.watching import WalkStage
+from heelstrike.experiments.watching import First, WalkStage
 from heelstrike.view.live.viewer import Viewer, view
 
 pytest.importorskip("websockets", reason="the live view is not installed: heelstrike[watch]")
@@ -45,7 +45,7 @@ def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def viewer(gait: Path) -> Iterator[Viewer]:
     """A live walk of bravo7 with all controls."""
-    with view(stage=WalkStage("bravo7", method_called, METHODS, gait=gait)) as viewer:
+    with view(stage=WalkStage("bravo7", method_called, METHODS, First(gait=gait))) as viewer:
         yield viewer
 
 
