@@ -249,8 +249,10 @@ def test_it_says_so_when_the_server_stops(chromium: Any, viewer: Viewer) -> None
 def test_a_run_is_looked_at(chromium: Any) -> None:
     with view(run=walking.walk(steps=2)) as viewer, Page(chromium, viewer) as seen:
         wait_until(lambda: seen.time > 0.1, "the run to play")
-        assert seen.page.locator("#settings").is_hidden()
-        assert seen.page.locator("#resume").is_hidden()
+        for name in ("controls", "random", "reset", "resume"):
+            assert seen.page.locator(f"#{name}").is_hidden()
+        box = seen.page.locator("#plane").bounding_box()
+        assert box["width"] > 400.0
         seen.halt()
         assert len(seen.where(RIGHT_LEG)) > 20
 

@@ -9,7 +9,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.analysis import zero_moment_point
+from heelstrike.analysis import friction_use, zero_moment_point
 from heelstrike.analysis.intervals import event_impulse
 from heelstrike.dynamics import center_of_mass, link_poses
 from heelstrike.view.live.frames import MOST_PUSHES, Layout, mean_forces
@@ -39,6 +39,9 @@ def test_a_frame_holds_the_row() -> None:
     joints = run.robot.model.actuator_joint
     assert np.array_equal(field(layout, frames, "joint")[0], run.position[300, joints])
     assert np.array_equal(field(layout, frames, "torque")[0], run.torque[300])
+    np.testing.assert_allclose(
+        field(layout, frames, "used")[0], friction_use(run).foot[299], rtol=1e-9
+    )
     energy = field(layout, frames, "energy")
     np.testing.assert_allclose(energy[:, 0] + energy[:, 1], energy[:, 2])
     assert np.isnan(field(layout, frames, "push")).all()

@@ -80,6 +80,17 @@ def test_the_browser_is_given_a_file_that_nobody_else_reads(
     assert not way.exists()
 
 
+def test_when_it_is_closed_the_simulation_is_there_to_go_on() -> None:
+    pytest.importorskip("websockets")
+    robot = hs.load_robot("compass_gait")
+    simulation = hs.Simulation(robot, state=robot.reference_state(), stop_when_fallen=False)
+    with hs.watch(simulation, browser=False, block=False):
+        pass
+    until = simulation.time + 0.01
+    assert simulation.advance(until) is hs.sim.RunStatus.COMPLETED
+    assert simulation.time == pytest.approx(until)
+
+
 def test_a_notebook_shows_it_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("websockets")
     monkeypatch.setattr(module, "_in_notebook", lambda: True)

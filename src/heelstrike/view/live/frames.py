@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
 from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.support import foot_sums
@@ -48,7 +49,8 @@ class Layout:
             "time": 1, "pose": 3 * robot.nl, "point": 2 * nc, "normal": 2 * nc, "force": 2 * nc,
             "friction": nc, "center": 2, "capture": 2, "pressure": 2, "support": 4,
             "push": 4 * MOST_PUSHES, "joint": len(self.joints), "torque": robot.nu,
-            "ahead": feet, "pressing": feet, "dragging": feet, "energy": 3,
+            "ahead": feet, "pressing": feet, "dragging": feet, "used": feet,
+            "energy": 3,
         }  # fmt: skip
         self.width = sum(self.widths.values())
         ends = np.cumsum(list(self.widths.values())).tolist()
@@ -96,6 +98,7 @@ class Layout:
             "ahead": zmp.foot,
             "pressing": sums[..., 0] if sums.size else np.zeros((len(every), 0)),
             "dragging": sums[..., 1] if sums.size else np.zeros((len(every), 0)),
+            "used": friction_use(each).foot,
             "energy": np.stack(
                 (motion.kinetic, motion.potential, motion.kinetic + motion.potential), axis=-1
             ),
@@ -147,6 +150,11 @@ class Layout:
                 {
                     "title": "tangential force, positive forward", "unit": "N", "group": "feet",
                     "curves": self._of_feet("dragging"), "limits": [],
+                },
+                {
+                    "title": "friction used, share of the cone", "unit": "1", "group": "feet",
+                    "curves": self._of_feet("used"), "span": [-0.05, 1.1],
+                    "limits": [{"label": "edge of the cone", "level": 1.0}],
                 },
             ]  # fmt: skip
         begin = self.begin["energy"]

@@ -119,8 +119,6 @@
     at("name").textContent = `${scene.robot}`;
     at("name").title = message.method;
     document.title = `${scene.robot}: heelstrike`;
-    at("settings").hidden = !live;
-    at("resume").hidden = !live;
     document.querySelector("main").classList.toggle("looking", !live);
     spans = new Map();
     buildPanels();
@@ -578,7 +576,7 @@
     let name = KEYS[event.key];
     if (event.shiftKey && event.key.startsWith("Arrow")) name = `event-${
       event.key === "ArrowLeft" ? "before" : "after"}`;
-    if (!name || at(name).disabled || at(name).hidden) return;
+    if (!name || at(name).disabled || !at(name).offsetParent) return;
     event.preventDefault();
     press[name]();
   });

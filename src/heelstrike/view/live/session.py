@@ -457,7 +457,7 @@ class Session:
                 "end": self._at_end,
                 "note": self._note,
                 "busy": self._busy,
-                "message": "" if run is None or self._going_well else run.message,
+                "message": run.message if run is not None and self._over_here else "",
                 "over": self.live is not None and not self.live.can_go_on,
                 "light": self._lit(),
                 "returns": self.live is not None and self.live.returns,
@@ -474,8 +474,9 @@ class Session:
         return self._light
 
     @property
-    def _going_well(self) -> bool:
-        return self.live is not None and self.live.can_go_on
+    def _over_here(self) -> bool:
+        """Whether viewers look at the end of what cannot go on."""
+        return self._at_end and (self.live is None or not self.live.can_go_on)
 
 
 def _kind(event: Event) -> str:
