@@ -341,6 +341,26 @@ def test_a_controller_without_snapshots_cannot_be_taken_back() -> None:
     go_on(session, 0.1)
 
 
+class Gives(InPython):
+    """A controller that gives up after a while."""
+
+    def torque(self, t: float, state: hs.State, contacts: Any) -> np.ndarray:
+        if t > 0.03:
+            raise ValueError("no torque is left")
+        return np.zeros(6)
+
+
+def test_a_controller_that_fails_ends_it_in_words() -> None:
+    session, shown = watching(walker(Gives()))
+    for _ in range(10):
+        session.update(TICK)
+    assert not session.playing
+    assert "no torque is left" in shown.told["message"]
+    assert session.cursor == pytest.approx(0.03, abs=2e-3)
+    ask(session, "seek", time=0.01)  # what has been can be looked at
+    assert shown.told["message"] == ""
+
+
 def test_a_run_is_looked_at() -> None:
     run = walking.walk(steps=2)
     session, shown = watching(run)

@@ -138,7 +138,7 @@ class Layout:
             span = {"span": [heel - room, toe + room]} if toe > heel else {}
             found += [
                 {
-                    "title": "zero moment point ahead of the ankle", "unit": "m", "group": "feet",
+                    "title": "zero moment point, from ankle", "unit": "m", "group": "feet",
                     "curves": self._of_feet("ahead"), **span,
                     "limits": [{"label": "heel", "level": heel}, {"label": "toe", "level": toe}],
                 },
@@ -148,11 +148,11 @@ class Layout:
                     "limits": [{"label": "weight", "level": robot.weight}],
                 },
                 {
-                    "title": "tangential force, positive forward", "unit": "N", "group": "feet",
+                    "title": "tangential force", "unit": "N", "group": "feet",
                     "curves": self._of_feet("dragging"), "limits": [],
                 },
                 {
-                    "title": "friction used, share of the cone", "unit": "1", "group": "feet",
+                    "title": "friction, share of cone", "unit": "1", "group": "feet",
                     "curves": self._of_feet("used"), "span": [-0.05, 1.1],
                     "limits": [{"label": "edge of the cone", "level": 1.0}],
                 },

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -62,7 +63,8 @@ class History:
         for name, rows in self._rows.items():
             rows[self._end : self._end + len(run.time)] = getattr(run, name)
         self._end += len(run.time)
-        known = {(e.time, e.kind, e.contact) for e in self.events if e.time >= run.time[0] - SAME}
+        newest = takewhile(lambda e: e.time >= run.time[0] - SAME, reversed(self.events))
+        known = {(e.time, e.kind, e.contact) for e in newest}
         new = [e for e in run.events if (e.time, e.kind, e.contact) not in known]
         self.events = (self.events + new)[-MOST_EVENTS:]
         return new

@@ -76,7 +76,10 @@ class Session:
         rate: float = 1.0,
     ) -> None:
         self._board, self._stage, self._run = board, stage, run
-        self.values: dict[str, Any] = {} if stage is None else stage.fitted({})
+        self.values: dict[str, Any] = {}
+        self._controls: list[dict[str, Any]] = []
+        if stage is not None:
+            self._set(stage.fitted({}))
         self.rate = rate
         self.playing = True
         self.cursor = 0.0
@@ -252,9 +255,14 @@ class Session:
         if control.at_once:
             live = self._needs_live()
             live.lay(stage.ground(chosen, live.simulation))
-            self.values = chosen
+            self._set(chosen)
         else:
             self.begin(chosen)
+
+    def _set(self, values: dict[str, Any]) -> None:
+        """Have other values, and the controls that go with them."""
+        self.values = values
+        self._controls = [c.described() for c in self._needs_stage().controls(values)]
 
     def _reset(self, *_: Any) -> None:
         if self._stage is None:
@@ -297,7 +305,8 @@ class Session:
                 return
             finally:
                 self._tell_busy("")
-            self.values, self.live, self.history = dict(wanted), live, History()
+            self._set(dict(wanted))
+            self.live, self.history = live, History()
             self.history.take(run)
             self._show_scene(run)
         self._tell()
@@ -447,7 +456,6 @@ class Session:
     def _tell(self) -> None:
         """Show how things are, where that has changed."""
         times, run = self.history.time, self.history.newest
-        controls = () if self._stage is None else self._stage.controls(self.values)
         self._board.state(
             {
                 "playing": self.playing,
@@ -461,7 +469,7 @@ class Session:
                 "over": self.live is not None and not self.live.can_go_on,
                 "light": self._lit(),
                 "returns": self.live is not None and self.live.returns,
-                "controls": [control.described() for control in controls],
+                "controls": self._controls,
                 "values": self.values,
             }
         )
