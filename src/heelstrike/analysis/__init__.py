@@ -13,7 +13,6 @@ from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
 from heelstrike.analysis.slip import max_slip, slip_distance
-from heelstrike.analysis.sole import Sole, soles
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
     Stance,
@@ -36,6 +35,7 @@ from heelstrike.analysis.zero_moment_point import (
     zero_moment_point,
     zero_moment_point_limits,
 )
+from heelstrike.robot.sole import Sole, soles
 
 __all__ = [
     "CostOfTransport",
