@@ -77,6 +77,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
     from heelstrike.sim import Push as Push
     from heelstrike.sim import Run as Run
+    from heelstrike.sim import RunStatus as RunStatus
     from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import Simulation as Simulation
     from heelstrike.sim import Snapshot as Snapshot
@@ -116,6 +117,7 @@ _HOME = {
     "RobotWarning": "heelstrike.robot",
     "Run": "heelstrike.sim",
     "RunFileError": "heelstrike.errors",
+    "RunStatus": "heelstrike.sim",
     "Scheme": "heelstrike.sim",
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",

@@ -12,12 +12,14 @@ from heelstrike.analysis.friction import FrictionUse, friction_use
 from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
+from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.analysis.slip import max_slip, slip_distance
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
     Stance,
     SupportPhase,
     double_support_fraction,
+    phase_time,
     single_support,
     stances,
     support_phases,
@@ -43,6 +45,7 @@ __all__ = [
     "FrictionUse",
     "LimitCycle",
     "Motion",
+    "Recovery",
     "ReferenceMotion",
     "Sole",
     "Stance",
@@ -60,6 +63,8 @@ __all__ = [
     "friction_use",
     "max_slip",
     "penetration",
+    "phase_time",
+    "recovery",
     "reference_motion",
     "run_motion",
     "single_support",

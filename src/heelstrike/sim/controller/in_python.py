@@ -53,6 +53,7 @@ class AskedLaw:
             "robot": control.robot,
             "parameters": ready.parameters,
             "memory": ready.memory,
+            "log": ready.log,
             "torque": self._torque,
         }
         self._names: Iterable[str] = law.function.arguments
@@ -100,7 +101,7 @@ class AskedLaw:
         """Return the same array, or a bundle of the same arrays, each knowing what it is."""
         if not isinstance(value, Bundle):
             return _shown(name, value, self.name, writable=True)
-        free = name in ("robot", "memory")
+        free = name in ("robot", "memory", "log")
         members: dict[str, Any] = value.members()
         kind = type(value)
         if kind is ControlledRobot:

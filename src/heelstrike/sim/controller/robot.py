@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.compiler.bundle import Bundle, array, number, part
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.dynamics.inverse_kinematics import Reaching, leg_joints, reach
@@ -73,6 +73,11 @@ class ControlledRobot(Bundle):
         Positions, velocities, actuators, contact points, links and feet.
     mass : float
         Of the whole robot (kg).
+    period : float
+        Seconds between two calls; zero if the controller acts continuously.
+    trial : int
+        Whether the method only tries a state within a step: what is written to memory and log in
+        such a call is forgotten, and a plan is best left as it is.
     foot_link, foot_contact : (nf,) int
         Link of each foot, and the first of its contact points.
     foot_sole : (nf, 2, 2) float
@@ -99,6 +104,8 @@ class ControlledRobot(Bundle):
     nl: int = number(int)
     nf: int = number(int)
     mass: float = number(float)
+    period: float = cell(float)
+    trial: int = cell(int)
     foot_link: Integers = array("nf", of=int)
     foot_contact: Integers = array("nf", of=int)
     foot_sole: Floats = array("nf", 2, 2)
