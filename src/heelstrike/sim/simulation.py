@@ -528,6 +528,11 @@ class Simulation:
         setting = self._setting
         if self._given_period is None:
             setting = replace(setting, control_period=None if law is None else law.period)
+        elif law is not None and law.keeps_period and setting.control_period != law.period:
+            raise ControllerError(
+                f"controller {law.function.name!r} keeps time by its own period of {law.period} s: "
+                f"leave control_period = {setting.control_period} s out, or make it with that one"
+            )
         python: Any = controller if law is None else None
         if law is not None and controller is not None:
             in_python = setting.checked or not law.function.compiles
@@ -685,6 +690,8 @@ class Simulation:
 
     @property
     def _can_be_kept(self) -> bool:
+        if isinstance(self._python, AskedLaw):
+            return self._python.takes_part
         return self._python is None or isinstance(self._python, Partaking)
 
     def _decide_last(self) -> tuple[RunStatus, str]:
@@ -870,7 +877,8 @@ def _place(thing: Any) -> str:
 
 
 def _partaking(controller: Any, name: str) -> Partaking:
-    if not isinstance(controller, Partaking):
+    asked = controller.partner if isinstance(controller, AskedLaw) else None
+    if not isinstance(controller if asked is None else asked, Partaking):
         raise ControllerError(
             f"{name} takes no part in snapshots: give its class methods snapshot(), which returns "
             "an array of numbers, and restore(numbers)"

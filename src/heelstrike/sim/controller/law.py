@@ -7,7 +7,7 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, update_wrapper
-from typing import Any, overload
+from typing import Any, ClassVar, overload
 
 import numpy as np
 from numba import types
@@ -51,6 +51,7 @@ class ControllerFunction:
         update_wrapper(self, self.python)
         self.function = function
         self.compiles = compiles
+        self.partner: Any = None
         self.is_ours = is_ours(self.python)
         self.arguments = list(inspect.signature(self.python).parameters)
         strange = [name for name in self.arguments if name not in ARGUMENTS]
@@ -258,6 +259,9 @@ class Law:
     ControllerError
         If the parameters are not those that the function takes, or the period is none.
     """
+
+    keeps_period: ClassVar[bool] = False
+    """Whether it cannot be called at other times than its own."""
 
     def __init__(
         self,
