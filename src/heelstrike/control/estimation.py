@@ -166,6 +166,21 @@ def stop_standing(robot: ControlledRobot, count: int, memory: Memory, v: Floats)
 
 
 @kernel
+def carry_trunk(robot: ControlledRobot, count: int, memory: Memory, change: Floats) -> None:
+    """Move the trunk along with corrected joints, so that the standing points stay in the mean.
+
+    The trunk is heavy: the least change of the velocities would rather undo the corrections.
+    """
+    z, x = 0.0, 0.0
+    for row in range(0, count, 2):
+        for j in range(robot.nv):
+            z += memory.rows[row, j] * change[j]
+            x += memory.rows[row + 1, j] * change[j]
+    change[0] -= 2.0 * x / count
+    change[1] -= 2.0 * z / count
+
+
+@kernel
 def note_standing(contacts: Contacts, parameters: Parameters, memory: Memory) -> None:
     """Look which points stand, and keep where they came to do so."""
     for i in range(memory.standing.shape[0]):
@@ -199,18 +214,20 @@ def correct(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
     """Bring joints and pitch nearer to what was measured, standing points to their place."""
-    seen = memory.state
+    seen, change = memory.state, memory.force
+    for j in range(robot.nv):
+        change[j] = 0.0
     position, speed = parameters.position_gain, parameters.velocity_gain / parameters.period
     for i in range(robot.nu):
         joint = robot.model.actuator_joint[i]
         error = state.q[joint] - seen.q[joint]
         seen.q[joint] += position * error
-        seen.v[joint] += speed * error
+        change[joint] = speed * error
     pitch = parameters.pitch
     if pitch >= 0:
         error = state.q[pitch] - seen.q[pitch]
         seen.q[pitch] += position * error
-        seen.v[pitch] += speed * error
+        change[pitch] = speed * error
     robot.update(seen)
     find_points(robot, parameters, memory)
     x, z, count = 0.0, 0.0, 0
@@ -225,6 +242,10 @@ def correct(
         robot.update(seen)
         find_points(robot, parameters, memory)
     rows = find_rows(robot, parameters, memory)
+    if rows > 0 and pitch >= 0:
+        carry_trunk(robot, rows, memory, change)
+    for j in range(robot.nv):
+        seen.v[j] += change[j]
     if rows > 0:
         stop_standing(robot, rows, memory, seen.v)
     robot.update(seen)
@@ -313,7 +334,7 @@ class Estimated(Around):
     """
 
     def __init__(
-        self, robot: Robot, controller: Controller, *, bandwidth: float = 16.0,
+        self, robot: Robot, controller: Controller, *, bandwidth: float = 8.0,
         threshold: float = 0.05, period: float | None = None,
     ) -> None:  # fmt: skip
         model = robot.model
