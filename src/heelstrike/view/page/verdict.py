@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from heelstrike.analysis.actuation import distance_travelled
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.slip import max_slip
-from heelstrike.analysis.sole import soles
 from heelstrike.analysis.support import walking_steps
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.sole import soles
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
 from heelstrike.view.drawing import are_around
