@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from heelstrike.analysis.actuation import distance_travelled
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.slip import max_slip
-from heelstrike.analysis.sole import soles
 from heelstrike.analysis.support import walking_steps
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.sole import soles
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run
 from heelstrike.view.drawing import are_around
@@ -170,7 +170,7 @@ def _of_motors(run: Run) -> Iterator[Limit]:
             k, used, reached = found
             unit = "N m" if model.axis[model.actuator_joint[i], 0] != 0.0 else "N"
             time = float(run.time[k])
-            detail = f"{torque[k]:.3g} of {ends[k]:.3g} {unit} at {time:.3g} s"
+            detail = f"{torque[k]:.3g} of {ends[k]:.3g} {unit} at {time:.3g} s".replace("-", "−")
             yield Limit(f"torque of {in_words(name)}", "torque", used, time, reached, detail)
 
 
