@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-PATIENCE = 90.0
+PATIENCE = 300.0
 """Seconds that a page may take for anything, on a machine under load."""
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 

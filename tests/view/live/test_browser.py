@@ -37,6 +37,7 @@ def chromium() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    walking.walk(steps=1)  # compiled, before anybody waits for it
     path = tmp_path_factory.mktemp("gait") / "gait.json"
     walking.gait().save(path)
     return path
