@@ -269,6 +269,16 @@ class Simulation:
     def parameters(self, parameters: Bundle) -> None:
         self._numbers.set_parameters(parameters)
 
+    @property
+    def memory(self) -> Bundle:
+        """What a law remembers now; what is written into it, it remembers at its next call."""
+        return self._numbers.memory
+
+    @property
+    def log(self) -> Bundle:
+        """What a controller told of itself when it was last called."""
+        return self._logs.log
+
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
 
