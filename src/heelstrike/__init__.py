@@ -92,6 +92,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
+    from heelstrike.view.report import report as report
 
 __version__ = "0.1.0"
 
@@ -155,6 +156,7 @@ _HOME = {
     "load_snapshot": "heelstrike.sim",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
+    "report": "heelstrike.view.report",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",

@@ -70,6 +70,11 @@ class LimitCycle:
         """Whether every small disturbance dies out."""
         return bool(np.all(np.abs(self.multipliers) < 1.0))
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import limit_cycle_card
+
+        return limit_cycle_card(self)
+
     def __repr__(self) -> str:
         largest = np.abs(self.multipliers).max(initial=0.0)
         return (

@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.summary import Summary
+    from heelstrike.gait.gait import Gait
     from heelstrike.sim.method import Method, UnknownMethod
     from heelstrike.sim.record.record import Record
+    from heelstrike.view.notebook.cards import Film
 
 Floats = NDArray[np.float64]
 
@@ -299,6 +301,11 @@ class Run:
             f"{self.status.value}, {self.steps} steps)"
         )
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import run_card
+
+        return run_card(self)
+
     @property
     def completed(self) -> bool:
         """Whether the run lasted as long as it was asked to."""
@@ -370,6 +377,70 @@ class Run:
         from heelstrike.view.animation import animate
 
         return animate(self, path, **options)
+
+    def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the run as one HTML file; see :func:`heelstrike.view.page.page.save_html`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.page.page import save_html
+
+        return save_html(self, path, **options)
+
+    def show(self, *, gait: Gait | None = None, height: int = 820) -> Film:
+        """Show the run in a notebook: the page of :meth:`save_html`, in place.
+
+        Parameters
+        ----------
+        gait : Gait, optional
+            The gait that it followed.
+        height : int
+            Of the frame, in pixels.
+
+        Returns
+        -------
+        object
+            What a notebook shows, if it is the last value of a cell.
+
+        Raises
+        ------
+        ViewError
+            If the run has no rows.
+        GaitError
+            If the gait does not fit the robot of the run.
+        """
+        from heelstrike.view.notebook.cards import film
+
+        return film(self, gait, height)
+
+    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a report of the run; see :func:`heelstrike.report`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.report.writing import report
+
+        return report(self, path, **options)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""

@@ -35,8 +35,10 @@ STANDING_SPEED = 1e-6
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
     tally = memory.tally
+    deepest = tally.penetration
     for contact in range(model.contact_link.shape[0]):
-        tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
+        deepest = max(deepest, -memory.contacts.gap[contact])
+    tally.penetration = deepest
     note_residual(memory.assembly.answer.residual, tally)
 
 
@@ -199,7 +201,7 @@ def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
 @dissolved_kernel
 def sound(memory: Memory) -> bool:
     """Whether the state is finite and not absurd."""
+    good = 0
     for i in range(memory.v.shape[0]):
-        if not (abs(memory.q[i]) < 1e9 and abs(memory.v[i]) < 1e6):
-            return False
-    return True
+        good += (abs(memory.q[i]) < 1e9) & (abs(memory.v[i]) < 1e6)
+    return good == memory.v.shape[0]
