@@ -38,6 +38,10 @@ class EventKind(enum.IntEnum):
     ``JOINT_SLIP``, ``JOINT_STICK``
         A joint with dry friction broke away, or turned round; it came to rest. The event's
         `contact` is the index of the joint.
+    ``BRIDGE``
+        Contact events piled up without time moving on, or no forces agreed with the laws: a short
+        time is bridged by impulses, which are told of by events of their own. The event's `impulse`
+        is the length of the bridge (s) and zero, its `contact` zero.
     """
 
     TOUCHDOWN = 0
@@ -52,6 +56,7 @@ class EventKind(enum.IntEnum):
     JOINT_STOP = 9
     JOINT_SLIP = 10
     JOINT_STICK = 11
+    BRIDGE = 12
 
 
 class Scheme(enum.IntEnum):

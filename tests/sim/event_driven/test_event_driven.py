@@ -19,7 +19,7 @@ from heelstrike.sim import (
     EventKind,
     RunStatus,
 )
-from heelstrike.sim.event_driven.method import EVENTS_WITHOUT_END, LOOKS
+from heelstrike.sim.event_driven.method import NO_BRIDGE, LOOKS
 from heelstrike.sim.event_driven.phase import allocate_phase
 from heelstrike.sim.frame import Outcome
 
@@ -290,7 +290,7 @@ def test_why_it_could_not_go_on_is_told() -> None:
     simulation = hs.Simulation(
         walking.bravo7(), state=walking.gait().initial_state, method=hs.EventDriven()
     )
-    simulation._work.reason = EVENTS_WITHOUT_END
+    simulation._work.reason = NO_BRIDGE
     _, message = simulation._ending(Outcome.DIVERGED)
     assert "events followed each other" in message
 

@@ -36,6 +36,12 @@ from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 
+# How far (m) a projection may end from the constraints: more says that they contradict each other.
+ARRIVED = 1e-10
+# How far it may move a state, as a multiple of the error that a step may make: beyond that, the
+# motion has not kept its constraints.
+EXPLAINED = 1000.0
+
 
 @kernel
 def tangential_place(model: Model, tree: Workspace, contacts: Contacts, contact: int) -> float:
@@ -291,11 +297,11 @@ def displacement(
 
 
 @kernel
-def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> None:
+def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> bool:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
     Closed points return to the ground, sticking ones (and joints) to where they began to stick, and
-    their velocities along these directions vanish.
+    their velocities along these directions vanish. Returns whether they got there.
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
@@ -305,7 +311,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
         weigh(model, equations)
         count = gather_closed(model, contacts, phase, equations, assembly)
         if count == 0:
-            return
+            return True
         size = list_unknowns(count, assembly.candidate, memory.surface.friction, phase)
         worst = 0.0
         for i in range(size):
@@ -324,4 +330,16 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
             assembly.answer.impulse[row[i]] = phase.unknown[i]
         add_impulse(model, assembly, count, equations, q if positions else v)
         if not positions:
-            return
+            return worst <= ARRIVED
+    return False
+
+
+@kernel
+def explained(before: Floats, after: Floats, phase: Phase) -> bool:
+    """Whether the error that a step may make explains how far a state was moved."""
+    size = before.shape[0]
+    total = 0.0
+    for i in range(size):
+        scale = phase.absolute + phase.relative * max(abs(before[i]), abs(after[i]))
+        total += ((after[i] - before[i]) / scale) ** 2
+    return bool(total <= size * EXPLAINED**2)

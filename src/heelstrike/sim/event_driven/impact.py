@@ -18,7 +18,7 @@ from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Memory, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
 
@@ -152,6 +152,16 @@ def short_bounces(
 
 
 @kernel
+def restore(before: Floats, phase: Phase, reported: Reported) -> None:
+    """Go back to the state and the modes before an impact."""
+    for i in range(before.shape[0]):
+        phase.begin[i] = before[i]
+    for contact in range(phase.first_dry):
+        phase.closed[contact] = reported.closed[contact]
+        phase.slide[contact] = reported.slipping[contact]
+
+
+@kernel
 def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, record: Record) -> bool:
     """Let the points in ``phase.hit`` meet the ground now, and report it; return success.
 
@@ -165,14 +175,11 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     for attempt in range(2):
         solved, made = collide(model, 0.0, memory, phase, state)
         if not solved:
+            restore(before, phase, reported)
             return False
         if attempt == 1 or not short_bounces(model, ground, state, memory, phase):
             break
-        for i in range(state.shape[0]):
-            state[i] = before[i]
-        for contact in range(phase.first_dry):
-            phase.closed[contact] = reported.closed[contact]
-            phase.slide[contact] = reported.slipping[contact]
+        restore(before, phase, reported)
     phase.last_blow = time
     largest = 0
     for contact in range(phase.first_dry):

@@ -21,7 +21,7 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import evaluate, look
+from heelstrike.sim.event_driven.dynamics import evaluate, explained, look, project
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
@@ -40,6 +40,9 @@ GAP_NOISE = 1e-13
 SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
 
+
+# How much a step is shortened that does not.
+SHORTENED = 0.25
 
 # Shortest step as a multiple of the rounding of time.
 SHORTEST_STEP = 8.0
@@ -256,6 +259,16 @@ def end_at_event(
 
 
 @kernel
+def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
+    """Put the end of the step on its constraints; return whether its error explains how far."""
+    end, before = phase.end, phase.trial
+    for i in range(end.shape[0]):
+        before[i] = end[i]
+    fits = project(scene.model, scene.ground, memory, phase, end)
+    return fits and explained(before, end, phase)
+
+
+@kernel
 def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase) -> bool:
     """Take one good step that ends at its first event, or at `stop` at the latest.
 
@@ -277,13 +290,13 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
             phase.next_length = max(min(wish, 10.0 * length), length * factor)
         part = first_event(scene, length, control, memory, phase)
         phase.has_fired = 0 if part == NO_EVENT else 1
-        if part == NO_EVENT:
-            break
-        length, good = end_at_event(scene, length * part, control, memory, phase)
-        if good:
+        good = True
+        if part < NO_EVENT:
+            length, good = end_at_event(scene, length * part, control, memory, phase)
+        if good and settle(scene, memory, phase):
             break
         # Where a torque saturates the shorter step can be the worse one: take less of it.
-        length *= 0.5
+        length *= SHORTENED if good else 0.5
         rejected = True
         evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         copy_events(phase.value, phase.rate, phase.before, phase.before_rate)

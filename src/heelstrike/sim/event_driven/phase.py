@@ -109,6 +109,12 @@ class Phase(Bundle):
         Whether contact forces at their limits made it so; whether those that grow without bound.
     closed_count, deficient : int
         Closed contact points at the last evaluation; whether it found their forces ambiguous.
+    bridging, bridges : int
+        Whether this instant is left by a bridge; how many there were in the series.
+    series, bridge_end : float
+        When the series of bridges began, and when the last of them ended, s.
+    allowance : float
+        Events that are allowed for until time has moved on.
     reason : int
         Why the simulation could not go on.
     let_pass : int
@@ -181,6 +187,11 @@ class Phase(Bundle):
     jammed: int = cell(int)
     closed_count: int = cell(int)
     deficient: int = cell(int)
+    bridging: int = cell(int)
+    bridges: int = cell(int)
+    series: float = cell(float)
+    bridge_end: float = cell(float)
+    allowance: float = cell(float)
     reason: int = cell(int)
     let_pass: int = cell(int)
 

@@ -1,0 +1,240 @@
+"""Bridges: impulsive steps where events pile up and time does not move on.
+
+Chatter, contact forces that no mode explains, modes that contradict each other within rounding: in
+all of these the motion goes on, but not as smooth phases between events. One step of time stepping
+does not ask for modes. Contacts that touch must not approach at its end, others not go through::
+
+    w = G λ + b,   b_n = J_n v_f + e J_n v,  or  J_n v_f + gap / h  where the gap is open
+
+with v_f the velocity that the known forces lead to. It is kept as short as suffices: each further
+one without progress is longer. The impulses act at its beginning, as those of an impact; then the
+robot moves on freely to its end, where a smooth phase begins again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel
+from heelstrike.contact.modes import OPEN, SOLVED, STICK
+from heelstrike.robot.model import Model
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.geometry import (
+    add_impulse,
+    assemble_delassus,
+    evaluate_equations,
+    locate_contacts,
+    row_product,
+)
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
+from heelstrike.sim.event_driven.gaps import gap_now, gap_rows, gap_velocity
+from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
+from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.rows import write_row
+from heelstrike.sim.frame import Scene
+from heelstrike.sim.memory import Assembly, Memory, Reported
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
+
+BRIDGE = int(EventKind.BRIDGE)
+
+# Length (s) of the first bridge of a series, how much longer each further one is, and how many
+# there may be until time has moved on by the progress (s) that ends a series.
+SHORTEST_BRIDGE = 1e-6
+LONGER = 4.0
+MOST_BRIDGES = 10
+PROGRESS = 1e-3
+# Gap (m) up to which a contact touches; speed (m/s, rad/s) at which another might within a bridge.
+TOUCHING = 1e-9
+CLOSING_SPEED = 20.0
+# Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
+SLOW = 1e-3
+
+
+@kernel
+def gather_near(model: Model, length: float, memory: Memory, phase: Phase) -> tuple[int, bool]:
+    """List what could touch within a bridge, and dry joints, with Jacobian rows and free terms.
+
+    The free velocity is in ``phase.trial``. Returns how many, and whether any of them bounces.
+    """
+    assembly, state, trial = memory.assembly, phase.begin, phase.trial
+    jacobian, free = assembly.jacobian, assembly.problem.free
+    v, free_v = state[model.nq :], trial[model.nq :]
+    count = 0
+    bounces = False
+    for contact in range(phase.closed.shape[0]):
+        if contact < model.nc and phase.passing[contact] == 1:
+            continue
+        gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
+        normal = row_product(jacobian, 2 * count, free_v)
+        if contact >= phase.first_dry:
+            joint = phase.dry_joint[contact - phase.first_dry]
+            assembly.problem.bound[count] = length * model.dry_friction[joint]
+        else:
+            gap = gap_now(contact, memory.contacts, phase, state)
+            if gap > length * max(CLOSING_SPEED, -2.0 * normal):
+                continue
+            came = row_product(jacobian, 2 * count, v)
+            if gap > TOUCHING:
+                normal += gap / length
+            elif came < -SLOW and memory.surface.restitution[contact] > 0.0:
+                normal += memory.surface.restitution[contact] * came
+                bounces = True
+        free[2 * count] = normal
+        free[2 * count + 1] = row_product(jacobian, 2 * count + 1, free_v)
+        assembly.candidate[count] = contact
+        count += 1
+    return count, bounces
+
+
+@kernel
+def made_energy(model: Model, count: int, assembly: Assembly, phase: Phase) -> bool:
+    """Whether the impulses that lead from ``phase.trial`` to ``phase.end`` made energy."""
+    made = 0.0
+    through = 0.0
+    for row in range(2 * count):
+        impulse = assembly.answer.impulse[row]
+        before = impulse * row_product(assembly.jacobian, row, phase.trial[model.nq :])
+        after = impulse * row_product(assembly.jacobian, row, phase.end[model.nq :])
+        made += before + after
+        through += abs(before) + abs(after)
+    return made > NOTICEABLE * through
+
+
+@kernel
+def find_impulses(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> bool:
+    """Find a bridge of some length from ``phase.begin`` to ``phase.end``; return success.
+
+    The velocities behind the impulses of the contacts go to ``phase.trial``, the impulses to
+    ``phase.impulse``, what the contacts do at the end of it to ``memory.reaction.mode``.
+    """
+    model, equations, assembly = scene.model, memory.equations, memory.assembly
+    begin, end, trial, answer = phase.begin, phase.end, phase.trial, memory.assembly.answer
+    evaluate(scene, phase.time, begin, control, memory, phase, phase.slopes[0])
+    for contact in range(phase.first_dry, phase.closed.shape[0]):
+        phase.slide[contact] = 0
+    free_acceleration(model, begin, memory.torque, phase, memory.pushes, equations)
+    for i in range(model.nv):
+        trial[model.nq + i] = begin[model.nq + i] + length * equations.rate[i]
+        end[model.nq + i] = trial[model.nq + i]
+    for contact in range(phase.closed.shape[0]):
+        memory.reaction.mode[contact] = OPEN
+        phase.impulse[contact, 0] = 0.0
+        phase.impulse[contact, 1] = 0.0
+    count, bounces = gather_near(model, length, memory, phase)
+    if count > 0:
+        assemble_delassus(model, equations, count, assembly)
+        guess, friction = memory.reaction.mode, memory.surface.friction
+        status = solve_candidates(count, False, friction, guess, phase, assembly)
+        note_residual(answer.residual, memory.tally)
+        if status != SOLVED:
+            return False
+        add_impulse(model, assembly, count, equations, end[model.nq :])
+        if not bounces and made_energy(model, count, assembly, phase):
+            return False
+    for place in range(count):
+        contact = assembly.candidate[place]
+        phase.impulse[contact, 0] = answer.impulse[2 * place]
+        phase.impulse[contact, 1] = answer.impulse[2 * place + 1]
+        if row_product(assembly.jacobian, 2 * place, end[model.nq :]) <= TOUCHING:
+            memory.reaction.mode[contact] = answer.mode[place]
+        if contact >= phase.first_dry:  # a finite force: it does its work on the way
+            answer.impulse[2 * place] = 0.0
+            answer.impulse[2 * place + 1] = 0.0
+    finite = True
+    for i in range(model.nv):
+        end[i] = begin[i] + length * end[model.nq + i]
+        finite = finite and np.isfinite(end[i])
+        trial[i] = begin[i]
+        trial[model.nq + i] = begin[model.nq + i]
+    if count > 0:
+        add_impulse(model, assembly, count, equations, trial[model.nq :])
+    return finite
+
+
+@kernel
+def report_impulses(model: Model, phase: Phase, reported: Reported, record: Record) -> None:
+    """Append the bridge to the events, and the impulses of the contacts."""
+    log_event(phase.time, BRIDGE, 0, phase.length, 0.0, record)
+    for contact in range(phase.first_dry):
+        normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
+        if not normal > 0.0:
+            continue
+        if contact >= model.nc:
+            joint = phase.stop_joint[contact - model.nc]
+            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
+            reported.closed[contact] = 1
+            continue
+        kind = IMPACT
+        if reported.closed[contact] == 0:
+            kind = TOUCHDOWN
+            reported.closed[contact] = 1
+            reported.slipping[contact] = 0
+        log_event(phase.time, kind, contact, normal, tangent, record)
+
+
+@kernel
+def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:
+    """Let the contacts do at the end of the bridge what it found."""
+    tree, contacts, mode = memory.equations.tree, memory.contacts, memory.reaction.mode
+    evaluate_equations(model, phase.begin[: model.nq], phase.begin[model.nq :], memory.equations)
+    locate_contacts(model, ground, tree, contacts, memory.surface)
+    for contact in range(phase.closed.shape[0]):
+        phase.stuck[contact] = 0
+        phase.slide[contact] = 0
+        if contact >= phase.first_dry:
+            if mode[contact] != STICK:
+                joint = phase.dry_joint[contact - phase.first_dry]
+                phase.slide[contact] = heading(phase.begin[model.nq + joint])
+            continue
+        touches = gap_now(contact, contacts, phase, phase.begin) <= TOUCHING
+        phase.closed[contact] = 1 if touches and mode[contact] != OPEN else 0
+        if phase.closed[contact] == 1 and mode[contact] != STICK:
+            _, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
+            phase.slide[contact] = heading(tangent)
+
+
+@kernel
+def cross(
+    scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, record: Record
+) -> bool:
+    """Lay a bridge from now on, to `stop` at the longest; return success.
+
+    ``phase.begin`` becomes the state at its end, ``phase.length`` its length.
+    """
+    model = scene.model
+    if phase.last_row < phase.time:
+        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    if phase.time - phase.series >= PROGRESS:
+        phase.series = phase.time
+        phase.bridges = 0
+    while True:
+        if phase.bridges >= MOST_BRIDGES:
+            return False
+        phase.length = min(SHORTEST_BRIDGE * LONGER**phase.bridges, stop - phase.time)
+        phase.bridges += 1
+        if find_impulses(scene, phase.length, control, memory, phase):
+            break
+    report_impulses(model, phase, memory.reported, record)
+    for contact in range(phase.closed.shape[0]):
+        if contact < phase.first_dry:
+            phase.closed[contact] = 0
+        phase.carrier[contact] = 0
+        phase.holder[contact] = 0
+    for i in range(model.nv):
+        phase.begin[model.nq + i] = phase.trial[model.nq + i]
+    row = record.rows
+    write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    for dry in range(phase.dry_joint.shape[0]):
+        torque = phase.impulse[phase.first_dry + dry, 1] / phase.length
+        record.friction_torque[row, phase.dry_joint[dry]] = torque
+    for i in range(phase.begin.shape[0]):
+        phase.begin[i] = phase.end[i]
+    adopt_end(model, scene.ground, memory, phase)
+    phase.bridging = 0
+    return True
