@@ -19,7 +19,7 @@ from heelstrike.sim import (
     EventKind,
     RunStatus,
 )
-from heelstrike.sim.event_driven.method import NO_BRIDGE, LOOKS
+from heelstrike.sim.event_driven.method import LOOKS, NO_BRIDGE
 from heelstrike.sim.event_driven.phase import allocate_phase
 from heelstrike.sim.frame import Outcome
 

@@ -24,12 +24,19 @@ from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     evaluate_equations,
-    locate_contacts,
     row_product,
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
+from heelstrike.sim.event_driven.faces import (
+    NO_FACE,
+    closes_corner,
+    distance_to,
+    locate,
+    locate_on_face,
+    nearest_face,
+)
 from heelstrike.sim.event_driven.gaps import gap_now, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
 from heelstrike.sim.event_driven.phase import Phase
@@ -42,7 +49,7 @@ from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, no
 BRIDGE = int(EventKind.BRIDGE)
 
 # Length (s) of the first bridge of a series, how much longer each further one is, and how many
-# there may be until time has moved on by the progress (s) that ends a series.
+# lengths are tried; progress (s) that ends a series.
 SHORTEST_BRIDGE = 1e-6
 LONGER = 4.0
 MOST_BRIDGES = 10
@@ -55,39 +62,115 @@ SLOW = 1e-3
 
 
 @kernel
-def gather_near(model: Model, length: float, memory: Memory, phase: Phase) -> tuple[int, bool]:
+def write_free(
+    gap: float, length: float, contact: int, place: int, phase: Phase, assembly: Assembly
+) -> None:
+    """Make a contact a candidate: what is left of its gap may still close, at leisure."""
+    nv = phase.begin.shape[0] // 2
+    free, free_v = assembly.problem.free, phase.trial[nv:]
+    free[2 * place] = row_product(assembly.jacobian, 2 * place, free_v)
+    free[2 * place + 1] = row_product(assembly.jacobian, 2 * place + 1, free_v)
+    if gap > TOUCHING:
+        free[2 * place] += gap / length
+    assembly.candidate[place] = contact
+
+
+@kernel
+def gather_near(model: Model, length: float, phase: Phase, memory: Memory) -> tuple[int, bool]:
     """List what could touch within a bridge, and dry joints, with Jacobian rows and free terms.
 
     The free velocity is in ``phase.trial``. Returns how many, and whether any of them bounces.
     """
     assembly, state, trial = memory.assembly, phase.begin, phase.trial
     jacobian, free = assembly.jacobian, assembly.problem.free
-    v, free_v = state[model.nq :], trial[model.nq :]
     count = 0
     bounces = False
     for contact in range(phase.closed.shape[0]):
         if contact < model.nc and phase.passing[contact] == 1:
             continue
         gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
-        normal = row_product(jacobian, 2 * count, free_v)
         if contact >= phase.first_dry:
             joint = phase.dry_joint[contact - phase.first_dry]
             assembly.problem.bound[count] = length * model.dry_friction[joint]
-        else:
-            gap = gap_now(contact, memory.contacts, phase, state)
-            if gap > length * max(CLOSING_SPEED, -2.0 * normal):
-                continue
-            came = row_product(jacobian, 2 * count, v)
-            if gap > TOUCHING:
-                normal += gap / length
-            elif came < -SLOW and memory.surface.restitution[contact] > 0.0:
-                normal += memory.surface.restitution[contact] * came
-                bounces = True
-        free[2 * count] = normal
-        free[2 * count + 1] = row_product(jacobian, 2 * count + 1, free_v)
-        assembly.candidate[count] = contact
+            write_free(0.0, length, contact, count, phase, assembly)
+            count += 1
+            continue
+        gap = gap_now(contact, memory.contacts, phase, state)
+        normal = row_product(jacobian, 2 * count, trial[model.nq :])
+        if gap > length * max(CLOSING_SPEED, -2.0 * normal):
+            continue
+        write_free(gap, length, contact, count, phase, assembly)
+        came = row_product(jacobian, 2 * count, state[model.nq :])
+        if gap <= TOUCHING and came < -SLOW and memory.surface.restitution[contact] > 0.0:
+            free[2 * count] += memory.surface.restitution[contact] * came
+            bounces = True
         count += 1
     return count, bounces
+
+
+@kernel
+def gather_corners(
+    model: Model, ground: GroundModel, length: float, count: int, memory: Memory, phase: Phase
+) -> int:
+    """Add the other faces of concave corners that candidates are in, as far as there is room.
+
+    The face of each goes to ``phase.row``. Returns how many candidates there are then.
+    """
+    assembly, contacts, surface = memory.assembly, memory.contacts, memory.surface
+    tree, scratch = memory.equations.tree, phase.scratch[0]
+    first = count
+    for place in range(first):
+        contact = assembly.candidate[place]
+        if contact >= model.nc:
+            continue
+        radius, position = model.contact_radius[contact], contacts.position[contact]
+        normal = contacts.normal[contact]
+        scratch[0], scratch[1] = normal[0], normal[1]
+        x, z = position[0] + radius * normal[0], position[1] + radius * normal[1]
+        gap, friction = contacts.gap[contact], surface.friction[contact]
+        restitution, face = surface.restitution[contact], phase.face[contact]
+        if face == NO_FACE:
+            face = nearest_face(ground, x, z, radius)
+        for other in range(ground.friction.shape[0]):
+            far = distance_to(ground, other, x, z) - radius > length * CLOSING_SPEED
+            if far or count == assembly.candidate.shape[0]:
+                continue
+            if closes_corner(ground, face, other, x, z, radius):
+                locate_on_face(model, ground, tree, contact, 2 * other, contacts, surface)
+                gap_rows(model, tree, contacts, phase, contact, count, assembly)
+                write_free(contacts.gap[contact], length, contact, count, phase, assembly)
+                phase.row[count] = 2 * other
+                count += 1
+        normal[0], normal[1] = scratch[0], scratch[1]
+        position[0], position[1] = x - radius * normal[0], z - radius * normal[1]
+        contacts.gap[contact] = gap
+        surface.friction[contact] = friction
+        surface.restitution[contact] = restitution
+    return count
+
+
+@kernel
+def collect_impulses(
+    ground: GroundModel, first: int, count: int, memory: Memory, phase: Phase
+) -> None:
+    """Write what the bridge found: impulses in the frames of the contact points, and modes.
+
+    From candidate `first` on they are other faces of points in corners.
+    """
+    assembly, mode = memory.assembly, memory.reaction.mode
+    normals, nv = memory.contacts.normal, phase.begin.shape[0] // 2
+    for place in range(count):
+        contact, found = assembly.candidate[place], assembly.answer.mode[place]
+        press, rub = assembly.answer.impulse[2 * place], assembly.answer.impulse[2 * place + 1]
+        if place >= first:
+            own, its = normals[contact], ground.normal[phase.row[place] // 2]
+            cosine, sine = own[0] * its[0] + own[1] * its[1], own[0] * its[1] - own[1] * its[0]
+            press, rub = cosine * press + sine * rub, cosine * rub - sine * press
+        phase.impulse[contact, 0] += press
+        phase.impulse[contact, 1] += rub
+        leaves = row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING
+        if mode[contact] == OPEN and not leaves:
+            mode[contact] = found
 
 
 @kernel
@@ -126,7 +209,8 @@ def find_impulses(
         memory.reaction.mode[contact] = OPEN
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
-    count, bounces = gather_near(model, length, memory, phase)
+    first, bounces = gather_near(model, length, phase, memory)
+    count = gather_corners(model, scene.ground, length, first, memory, phase)
     if count > 0:
         assemble_delassus(model, equations, count, assembly)
         guess, friction = memory.reaction.mode, memory.surface.friction
@@ -137,13 +221,9 @@ def find_impulses(
         add_impulse(model, assembly, count, equations, end[model.nq :])
         if not bounces and made_energy(model, count, assembly, phase):
             return False
+    collect_impulses(scene.ground, first, count, memory, phase)
     for place in range(count):
-        contact = assembly.candidate[place]
-        phase.impulse[contact, 0] = answer.impulse[2 * place]
-        phase.impulse[contact, 1] = answer.impulse[2 * place + 1]
-        if row_product(assembly.jacobian, 2 * place, end[model.nq :]) <= TOUCHING:
-            memory.reaction.mode[contact] = answer.mode[place]
-        if contact >= phase.first_dry:  # a finite force: it does its work on the way
+        if assembly.candidate[place] >= phase.first_dry:  # a finite force works on the way
             answer.impulse[2 * place] = 0.0
             answer.impulse[2 * place + 1] = 0.0
     finite = True
@@ -183,7 +263,9 @@ def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -
     """Let the contacts do at the end of the bridge what it found."""
     tree, contacts, mode = memory.equations.tree, memory.contacts, memory.reaction.mode
     evaluate_equations(model, phase.begin[: model.nq], phase.begin[model.nq :], memory.equations)
-    locate_contacts(model, ground, tree, contacts, memory.surface)
+    for contact in range(model.nc):
+        phase.face[contact] = NO_FACE
+    locate(model, ground, tree, phase, contacts, memory.surface)
     for contact in range(phase.closed.shape[0]):
         phase.stuck[contact] = 0
         phase.slide[contact] = 0
@@ -213,13 +295,17 @@ def cross(
     if phase.time - phase.series >= PROGRESS:
         phase.series = phase.time
         phase.bridges = 0
-    while True:
-        if phase.bridges >= MOST_BRIDGES:
-            return False
-        phase.length = min(SHORTEST_BRIDGE * LONGER**phase.bridges, stop - phase.time)
-        phase.bridges += 1
-        if find_impulses(scene, phase.length, control, memory, phase):
+    found = False
+    for _ in range(MOST_BRIDGES):
+        wish = SHORTEST_BRIDGE * LONGER**phase.bridges
+        phase.length = min(wish, stop - phase.time)
+        found = find_impulses(scene, phase.length, control, memory, phase)
+        if phase.length == wish or not found:
+            phase.bridges = min(phase.bridges + 1, MOST_BRIDGES)
+        if found:
             break
+    if not found:
+        return False
     report_impulses(model, phase, memory.reported, record)
     for contact in range(phase.closed.shape[0]):
         if contact < phase.first_dry:

@@ -7,10 +7,12 @@ this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of th
 
 from __future__ import annotations
 
+import math
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
-from heelstrike.dynamics.kernels import passive_force
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
@@ -19,8 +21,6 @@ from heelstrike.sim.contacts.geometry import (
     assemble_delassus,
     contact_velocity,
     evaluate_equations,
-    locate_contacts,
-    observe,
     row_product,
     solve_mass_matrix,
     weigh,
@@ -30,6 +30,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import try_torque
 from heelstrike.sim.event_driven.candidates import share_redundant
+from heelstrike.sim.event_driven.faces import has_corners, locate, watch_corners
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
@@ -44,10 +45,15 @@ EXPLAINED = 1000.0
 
 
 @kernel
-def tangential_place(model: Model, tree: Workspace, contacts: Contacts, contact: int) -> float:
+def tangential_place(
+    model: Model, tree: Workspace, contacts: Contacts, contact: int, phase: Phase
+) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled."""
     position, normal = contacts.position[contact], contacts.normal[contact]
     rolled = model.contact_radius[contact] * tree.angle[model.contact_link[contact]]
+    if phase.face[contact] >= 0 and phase.face[contact] % 2 == 1:
+        # The way of the contact point round the disc that pivots on a corner.
+        return model.contact_radius[contact] * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
 
 
@@ -118,13 +124,16 @@ def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
 
 @kernel
 def watch_geometry(
-    model: Model, tree: Workspace, contacts: Contacts, state: Floats, phase: Phase
-) -> None:
-    """Event functions that need no forces: gaps of open points, speeds of what slides.
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
+    phase: Phase,
+) -> None:  # fmt: skip
+    """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
     That of a point that is let pass below the ground is its depth.
     """
     value, rate = phase.value, phase.rate
+    if has_corners(ground):
+        watch_corners(model, ground, contacts, phase, value)
     for dry in range(phase.dry_joint.shape[0]):
         contact = phase.first_dry + dry
         slide = phase.slide[contact]
@@ -237,10 +246,21 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
 
 
 @kernel
+def observe_faces(
+    model: Model, ground: GroundModel, state: Floats, phase: Phase, memory: Memory
+) -> None:
+    """Kinematics, velocities and contact points of a state (q, v)."""
+    tree = memory.equations.tree
+    forward_kinematics(model, state[: model.nq], tree)
+    link_velocities(model, state[model.nq :], tree)
+    locate(model, ground, tree, phase, memory.contacts, memory.surface)
+
+
+@kernel
 def look(model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase) -> None:
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe(model, ground, state[: model.nq], state[model.nq :], memory)
-    watch_geometry(model, memory.equations.tree, memory.contacts, state, phase)
+    observe_faces(model, ground, state, phase, memory)
+    watch_geometry(model, ground, memory.equations.tree, memory.contacts, state, phase)
 
 
 @kernel
@@ -258,8 +278,8 @@ def evaluate(
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
     rate = equations.rate
     evaluate_equations(model, q, v, equations)
-    locate_contacts(model, scene.ground, equations.tree, memory.contacts, memory.surface)
-    watch_geometry(model, equations.tree, memory.contacts, state, phase)
+    locate(model, scene.ground, equations.tree, phase, memory.contacts, memory.surface)
+    watch_geometry(model, scene.ground, equations.tree, memory.contacts, state, phase)
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
@@ -292,7 +312,7 @@ def displacement(
     if contact >= phase.first_dry:
         return state[phase.dry_joint[contact - phase.first_dry]] - phase.anchor[contact]
     if phase.stuck[contact] == 1:
-        return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact)
+        return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact, phase)
     return 0.0
 
 
@@ -307,7 +327,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     system, row = phase.system, phase.row
     for attempt in range(5):
-        observe(model, ground, q, v, memory)
+        observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
         count = gather_closed(model, contacts, phase, equations, assembly)
         if count == 0:

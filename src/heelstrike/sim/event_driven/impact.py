@@ -11,11 +11,11 @@ from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     evaluate_equations,
-    locate_contacts,
     row_product,
 )
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
+from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory, Reported
@@ -118,7 +118,7 @@ def short_bounces(
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     friction = memory.surface.friction
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
-    locate_contacts(model, ground, equations.tree, contacts, memory.surface)
+    locate(model, ground, equations.tree, phase, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
     count = gather_closed(model, contacts, phase, equations, assembly)
     for place in range(count):
@@ -136,7 +136,7 @@ def short_bounces(
         free_gap_acceleration(model, contacts, equations, contact, count, phase, assembly)
         normal, _ = gap_velocity(contact, model, contacts, equations.tree, phase, state)
         pull = -assembly.problem.free[2 * count]
-        if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
+        if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
         last = time - phase.last_blow
@@ -152,7 +152,7 @@ def short_bounces(
 
 
 @kernel
-def restore(before: Floats, phase: Phase, reported: Reported) -> None:
+def restore(before: Floats, reported: Reported, phase: Phase) -> None:
     """Go back to the state and the modes before an impact."""
     for i in range(before.shape[0]):
         phase.begin[i] = before[i]
@@ -175,11 +175,11 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     for attempt in range(2):
         solved, made = collide(model, 0.0, memory, phase, state)
         if not solved:
-            restore(before, phase, reported)
+            restore(before, reported, phase)
             return False
         if attempt == 1 or not short_bounces(model, ground, state, memory, phase):
             break
-        restore(before, phase, reported)
+        restore(before, reported, phase)
     phase.last_blow = time
     largest = 0
     for contact in range(phase.first_dry):

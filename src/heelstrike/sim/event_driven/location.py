@@ -22,6 +22,7 @@ from heelstrike.sim.event_driven.dormand_prince import (
     stage_point,
 )
 from heelstrike.sim.event_driven.dynamics import evaluate, explained, look, project
+from heelstrike.sim.event_driven.faces import has_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
@@ -37,6 +38,7 @@ EVENT_TIME = 1e-12
 
 # How far an event function must be below zero to count: m, m/s, and a fraction of the weight.
 GAP_NOISE = 1e-13
+CORNER_NOISE = 1e-11
 SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
 
@@ -110,6 +112,8 @@ def take_step(scene: Scene, length: float, control: Control, memory: Memory, pha
 def is_geometric(function: int, phase: Phase) -> bool:
     """Whether an event function needs no forces: a gap, or the speed of what slides."""
     contact = function // 2
+    if contact >= phase.closed.shape[0]:
+        return True
     slides = function % 2 == 1 and phase.slide[contact] != 0
     return bool(phase.closed[contact] == 0 or slides)
 
@@ -117,8 +121,12 @@ def is_geometric(function: int, phase: Phase) -> bool:
 @kernel
 def noise(function: int, phase: Phase) -> float:
     """How far an event function may be below zero without meaning it."""
+    if function >= 2 * phase.closed.shape[0]:
+        return CORNER_NOISE
     if phase.closed[function // 2] == 0:
-        return GAP_NOISE
+        # An event is found to a time, and so a gap to what it closes in that time.
+        speed = max(abs(phase.before_rate[function]), abs(phase.sample_rate[function]))
+        return max(GAP_NOISE, EVENT_TIME * speed)
     return SPEED_NOISE if is_geometric(function, phase) else FORCE_NOISE * phase.weight
 
 
@@ -165,7 +173,8 @@ def crossing(
     """Fraction of the step at which an event function passes zero, between two samples of it."""
     value, end = phase.sample[function], high
     rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
-    is_gap = function % 2 == 0 and phase.closed[function // 2] == 0
+    is_gap = function < 2 * phase.closed.shape[0]
+    is_gap = is_gap and function % 2 == 0 and phase.closed[function // 2] == 0
     if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
         # An open point came down and went up again: how close was it?
         bracket = low, -rate, high, -later_rate
@@ -187,6 +196,7 @@ def first_event(
     ``phase.before_rate`` must hold the event functions at the start of the step.
     """
     sample, sample_rate = phase.sample, phase.sample_rate
+    functions = sample.shape[0] if has_corners(scene.ground) else 2 * phase.closed.shape[0]
     together = EVENT_TIME / length
     low = 0.0
     for k in range(1, SAMPLES + 1):
@@ -197,7 +207,7 @@ def first_event(
         else:
             copy_events(phase.end_value, phase.end_rate, sample, sample_rate)
         first = NO_EVENT
-        for i in range(sample.shape[0]):
+        for i in range(functions):
             phase.fired[i] = 0
             root = crossing(scene, i, low, high, length, control, memory, phase)
             if root < first - together:

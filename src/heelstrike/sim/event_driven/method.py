@@ -18,7 +18,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.dynamics.kernels import forward_kinematics, momentum
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
@@ -27,14 +27,19 @@ from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
-    locate_contacts,
-    observe,
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import cross
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import evaluate, project
+from heelstrike.sim.event_driven.faces import (
+    NO_FACE,
+    choose_faces,
+    locate,
+    locate_on_face,
+    turn_corner,
+)
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
 from heelstrike.sim.event_driven.impact import REST, collide, heading, strike
 from heelstrike.sim.event_driven.location import integrate, shortest_step
@@ -42,7 +47,7 @@ from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_m
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
 from heelstrike.sim.frame import DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Memory, Reported, contact_capacity
+from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
 from heelstrike.sim.record.record import Record
@@ -223,6 +228,7 @@ class EventDriven(Method):
         """Look for what touches the ground as at the beginning."""
         for told in (work.closed, work.slide, work.stuck, work.passing):
             told[: robot.nc] = 0
+        work.face[:] = NO_FACE
         work.accumulation[: robot.nc] = np.inf
         work.fired[:] = 0
         clock.begun = 0
@@ -330,7 +336,8 @@ def begin_phase(
     adopt_modes(model, count, assembly, phase, memory.reaction)
     tree, contacts = memory.equations.tree, memory.contacts
     forward_kinematics(model, phase.begin[: model.nq], tree)
-    locate_contacts(model, ground, tree, contacts, memory.surface)
+    choose_faces(model, ground, tree, phase)
+    locate(model, ground, tree, phase, contacts, memory.surface)
     form_groups(model, tree, contacts, friction, phase)
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
@@ -416,8 +423,8 @@ def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
 
 @kernel
 def find_what_happened(
-    starting: bool, direction: float, model: Model, tree: Workspace, contacts: Contacts,
-    phase: Phase,
+    starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
+    contacts: Contacts, surface: Surface, phase: Phase,
 ) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
@@ -432,6 +439,12 @@ def find_what_happened(
         phase.hit[contact] = 0
         first = phase.fired[2 * contact] == 1
         second = phase.fired[2 * contact + 1] == 1
+        turns = contact < model.nc and phase.fired[2 * phase.closed.shape[0] + contact] == 1
+        if turns:
+            phase.fired[2 * phase.closed.shape[0] + contact] = 0
+            if turn_corner(model, ground, contact, contacts, phase):
+                locate_on_face(model, ground, tree, contact, phase.face[contact], contacts, surface)
+                phase.closed[contact] = 0
         if phase.closed[contact] == 1:
             if second and phase.slide[contact] != 0:
                 for other in range(phase.closed.shape[0]):
@@ -448,6 +461,8 @@ def find_what_happened(
                 phase.passing[contact] = phase.let_pass
             first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
         may_pass = first and not starting and contact < model.nc
+        if turns:
+            first = normal <= rest
         if phase.passing[contact] == 1:
             phase.passing[contact] = 0 if first else 1
         elif may_pass and behind(contact, direction, contacts, phase):
@@ -535,7 +550,9 @@ def meet_event(
     """
     contacts, tree, direction = memory.contacts, memory.equations.tree, phase.scratch[0]
     momentum(model, tree, direction)
-    impact, forced = find_what_happened(starting, direction[0], model, tree, contacts, phase)
+    impact, forced = find_what_happened(
+        starting, direction[0], model, ground, tree, contacts, memory.surface, phase
+    )
     if impact and not strike(model, ground, memory, phase, record):
         phase.bridging = 1
     elif impact:
@@ -562,7 +579,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
         phase.begin[model.nq + i] = v[i]
     begin_dry_joints(v, phase, memory.reported)
     evaluate_equations(model, q, v, equations)
-    locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    locate(model, ground, equations.tree, phase, memory.contacts, memory.surface)
     code = meet_event(True, model, ground, memory, phase, record)
     for i in range(model.nv):
         v[i] = phase.begin[model.nq + i]
@@ -570,9 +587,11 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
 
 
 @kernel
-def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:  # noqa: ARG001
+def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:
     """Kinematics, velocities and contact points of the state now."""
-    observe(model, ground, memory.q, memory.v, memory)
+    forward_kinematics(model, memory.q, memory.equations.tree)
+    link_velocities(model, memory.v, memory.equations.tree)
+    locate(model, ground, memory.equations.tree, phase, memory.contacts, memory.surface)
 
 
 @kernel
@@ -630,12 +649,13 @@ def move_over(
     """Leave an instant by a bridge, behind which it is looked for what there is to be met."""
     end = stop
     if phase.output_period > 0.0:  # a row is due no later than at its end
-        due = phase.next_row * phase.output_period * phase.row_every
-        end = min(stop, due) if due > phase.time else stop
+        period = phase.output_period * phase.row_every
+        due = phase.next_row * period
+        end = min(stop, due if due > phase.time + 1e-12 else due + period)
     if not cross(scene, end, control, memory, phase, record):
         phase.reason = NO_BRIDGE
         return SOLVER_FAILED
-    pass_time(phase.length, stop, phase)
+    pass_time(phase.length, end, phase)
     clock.time = phase.time
     phase.bridge_end = phase.time
     end_bounces(scene.model, phase, record)
