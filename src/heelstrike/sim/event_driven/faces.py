@@ -132,6 +132,15 @@ def locate(
 
 
 @kernel
+def is_beside(face: int, other: int) -> bool:
+    """Whether a disc rolls from one face to another without a jump: a line and one of its ends."""
+    if face % 2 == other % 2:
+        return False
+    apart = face - other if face % 2 == 1 else other - face
+    return apart in (1, 3)
+
+
+@kernel
 def following_face(
     ground: GroundModel, face: int, x: float, z: float, radius: float
 ) -> tuple[float, int]:
@@ -160,14 +169,19 @@ def following_face(
     for other in range(segments):
         if other == segment or (face % 2 == 1 and other == segment - 1):
             continue
-        # A corner of the face is never nearer than the face.
         ahead, behind = along_segment(ground, other, x, z)
-        if (ahead < 0.0 and other > 0) or (behind < 0.0 and other < segments - 1):
+        its = 2 * other
+        if ahead < 0.0 and other > 0:
+            its += 1
+        elif behind < 0.0 and other < segments - 1:
+            its += 3
+        # A corner of the face is never nearer than the face.
+        if its % 2 == 1 and is_beside(face, its):
             continue
         room = distance_to(ground, other, x, z) - radius
         if room < left:
             left = room
-            following = 2 * other
+            following = its
     return left, following
 
 
@@ -182,7 +196,7 @@ def turn_corner(
     _, following = following_face(ground, face, x, z, radius)
     phase.face[contact] = following
     phase.stuck[contact] = 0
-    return face % 2 == following % 2
+    return not is_beside(face, following)
 
 
 @kernel

@@ -484,11 +484,18 @@ def find_what_happened(
 
 
 @kernel
-def next_stop(phase: Phase, clock: Clock) -> float:
-    """Time that the next step may not pass."""
+def next_due(phase: Phase, clock: Clock) -> float:
+    """Time at which something from outside is due, or the end."""
     stop = min(clock.until, phase.next_push)
     if clock.control_period > 0.0:
         stop = min(stop, clock.calls * clock.control_period)
+    return stop
+
+
+@kernel
+def next_stop(phase: Phase, clock: Clock) -> float:
+    """Time that the next step may not pass."""
+    stop = next_due(phase, clock)
     for contact in range(phase.accumulation.shape[0]):
         stop = min(stop, phase.accumulation[contact])
     return stop
@@ -658,7 +665,9 @@ def move_over(
     pass_time(phase.length, end, phase)
     clock.time = phase.time
     phase.bridge_end = phase.time
-    end_bounces(scene.model, phase, record)
+    for contact in range(phase.closed.shape[0]):
+        if phase.accumulation[contact] <= phase.time:
+            phase.accumulation[contact] = np.inf
     memory.tally.steps += 1
     for i in range(phase.fired.shape[0]):
         phase.fired[i] = 0
@@ -677,7 +686,7 @@ def move(
     """Take a step to the next event, at the longest to where something is due."""
     model, ground = scene.model, scene.ground
     if phase.finished == 0:
-        stop = next_stop(phase, clock)
+        stop = next_due(phase, clock) if phase.bridging == 1 else next_stop(phase, clock)
         if stop - phase.time < shortest_step(phase.time):
             # The same time but for rounding: 0.3 for one, 3 · 0.1 for the other.
             phase.time = stop
