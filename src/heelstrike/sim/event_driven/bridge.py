@@ -37,7 +37,12 @@ from heelstrike.sim.event_driven.faces import (
     locate_on_face,
     nearest_face,
 )
-from heelstrike.sim.event_driven.gaps import gap_now, gap_rows, gap_velocity
+from heelstrike.sim.event_driven.gaps import (
+    free_gap_acceleration,
+    gap_now,
+    gap_rows,
+    gap_velocity,
+)
 from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.rows import write_row
@@ -63,15 +68,21 @@ SLOW = 1e-3
 
 @kernel
 def write_free(
-    gap: float, length: float, contact: int, place: int, phase: Phase, assembly: Assembly
+    gap: float, length: float, contact: int, place: int, model: Model, phase: Phase, memory: Memory
 ) -> None:
-    """Make a contact a candidate: what is left of its gap may still close, at leisure."""
-    nv = phase.begin.shape[0] // 2
-    free, free_v = assembly.problem.free, phase.trial[nv:]
-    free[2 * place] = row_product(assembly.jacobian, 2 * place, free_v)
-    free[2 * place + 1] = row_product(assembly.jacobian, 2 * place + 1, free_v)
+    """Make a contact a candidate: what is left of its gap may still close, at leisure.
+
+    The free acceleration is in ``equations.rate``.
+    """
+    assembly, v = memory.assembly, phase.begin[model.nq :]
+    free, jacobian = assembly.problem.free, assembly.jacobian
+    free_gap_acceleration(model, memory.contacts, memory.equations, contact, place, phase, assembly)
+    for row in range(2 * place, 2 * place + 2):
+        free[row] = row_product(jacobian, row, v) + length * free[row]
     if gap > TOUCHING:
         free[2 * place] += gap / length
+    if contact >= phase.first_dry:
+        assembly.problem.bound[place] *= length
     assembly.candidate[place] = contact
 
 
@@ -90,16 +101,14 @@ def gather_near(model: Model, length: float, phase: Phase, memory: Memory) -> tu
             continue
         gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
         if contact >= phase.first_dry:
-            joint = phase.dry_joint[contact - phase.first_dry]
-            assembly.problem.bound[count] = length * model.dry_friction[joint]
-            write_free(0.0, length, contact, count, phase, assembly)
+            write_free(0.0, length, contact, count, model, phase, memory)
             count += 1
             continue
         gap = gap_now(contact, memory.contacts, phase, state)
         normal = row_product(jacobian, 2 * count, trial[model.nq :])
         if gap > length * max(CLOSING_SPEED, -2.0 * normal):
             continue
-        write_free(gap, length, contact, count, phase, assembly)
+        write_free(gap, length, contact, count, model, phase, memory)
         came = row_product(jacobian, 2 * count, state[model.nq :])
         if gap <= TOUCHING and came < -SLOW and memory.surface.restitution[contact] > 0.0:
             free[2 * count] += memory.surface.restitution[contact] * came
@@ -138,7 +147,8 @@ def gather_corners(
             if closes_corner(ground, face, other, x, z, radius):
                 locate_on_face(model, ground, tree, contact, 2 * other, contacts, surface)
                 gap_rows(model, tree, contacts, phase, contact, count, assembly)
-                write_free(contacts.gap[contact], length, contact, count, phase, assembly)
+                gap_there = contacts.gap[contact]
+                write_free(gap_there, length, contact, count, model, phase, memory)
                 phase.row[count] = 2 * other
                 count += 1
         normal[0], normal[1] = scratch[0], scratch[1]

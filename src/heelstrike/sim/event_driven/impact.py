@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
@@ -97,7 +99,7 @@ def collide(
         through += abs(pressing) + abs(rubbing)
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        rests = normal <= REST or phase.plastic[contact] == 1
+        rests = normal <= REST
         phase.closed[contact] = 1 if rests else 0
         phase.slide[contact] = heading(tangent) if rests else 0
     for dry in range(phase.dry_joint.shape[0]):
@@ -184,6 +186,9 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     largest = 0
     for contact in range(phase.first_dry):
         normal, tangent = impulse[contact, 0], impulse[contact, 1]
+        if phase.plastic[contact] == 1 and phase.closed[contact] == 0:
+            # Others throw it up again, and it is followed.
+            phase.accumulation[contact] = np.inf
         phase.plastic[contact] = 0
         if phase.hit[contact] == 1:
             phase.last_impact[contact] = time

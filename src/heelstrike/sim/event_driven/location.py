@@ -132,15 +132,15 @@ def noise(function: int, phase: Phase) -> float:
 
 @kernel
 def find_root(
-    scene: Scene, function: int, of_rate: bool, bracket: tuple[float, float, float, float],
+    scene: Scene, function: int, turn: float, bracket: tuple[float, float, float, float],
     length: float, control: Control, memory: Memory, phase: Phase,
 ) -> float:  # fmt: skip
-    """Fraction of the step at which an event function, or its rate, first changes sign.
+    """Fraction of the step at which an event function first changes sign, or turns round.
 
-    In the bracket (low, its value, high, its value) it is positive (its rate negative) at `low` and
-    the other way round at `high`. Regula falsi that halves the interval every third time. An event
-    function that is zero at `low`, where its phase begins, is first followed back from `high` to
-    where it is positive.
+    In the bracket (low, its value, high, its value) it is positive at `low` and negative at `high`;
+    with `turn` not zero these are `turn` times its rate. Regula falsi that halves the interval
+    every third time. An event function that is zero at `low`, where its phase begins, is first
+    followed back from `high` to where it is positive.
     """
     low, low_value, high, high_value = bracket
     forces = not is_geometric(function, phase)
@@ -154,7 +154,7 @@ def find_root(
             part = high - high_value * (high - low) / (high_value - low_value)
             part = min(max(part, low + 0.4 * width), high - 0.4 * width)
         evaluate_within(scene, part, length, forces, control, memory, phase)
-        value = -phase.rate[function] if of_rate else phase.value[function]
+        value = turn * phase.rate[function] if turn != 0.0 else phase.value[function]
         if value > 0.0:
             low = part
             low_value = value
@@ -170,7 +170,12 @@ def crossing(
     scene: Scene, function: int, low: float, high: float, length: float, control: Control,
     memory: Memory, phase: Phase,
 ) -> float:  # fmt: skip
-    """Fraction of the step at which an event function passes zero, between two samples of it."""
+    """Fraction of the step at which an event function passes zero, between two samples of it.
+
+    Of a point that has just left the ground the gap is zero but for rounding: it cannot come back
+    before it turned round. If it got no higher than noise until then, it ends there, at rest.
+    """
+    before, begin = phase.before[function], low
     value, end = phase.sample[function], high
     rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
     is_gap = function < 2 * phase.closed.shape[0]
@@ -178,12 +183,23 @@ def crossing(
     if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
         # An open point came down and went up again: how close was it?
         bracket = low, -rate, high, -later_rate
-        end = find_root(scene, function, True, bracket, length, control, memory, phase)
+        end = find_root(scene, function, -1.0, bracket, length, control, memory, phase)
         value = phase.value[function]
-    if not value < -noise(function, phase):
+    least = noise(function, phase)
+    if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
+        # It rises: it is no nearer than before, but for the error of the dense output.
+        least = phase.absolute + phase.relative
+    # What is below zero from the beginning tells nothing new until it falls further.
+    if not value < -least - max(-before, 0.0):
         return NO_EVENT
-    bracket = low, phase.before[function], end, value
-    return find_root(scene, function, False, bracket, length, control, memory, phase)
+    if is_gap and rate > 0.0 and later_rate < 0.0 and before <= least:
+        bracket = low, rate, high, later_rate
+        begin = find_root(scene, function, 1.0, bracket, length, control, memory, phase)
+        before = phase.value[function]
+        if before <= least:
+            return begin
+    bracket = begin, before, end, value
+    return find_root(scene, function, 0.0, bracket, length, control, memory, phase)
 
 
 @kernel
@@ -261,8 +277,8 @@ def end_at_event(
         for i in range(phase.fired.shape[0]):
             if phase.fired[i] == 1 and is_geometric(i, phase) and phase.end_rate[i] < 0.0:
                 change = -phase.end_value[i] / phase.end_rate[i]
-        change = max(change, -length)
-        if attempt == 3 or not 1e-15 < abs(change) < 1e-6:
+        # Where it turns round rather than passes zero, its rate does not tell where zero is.
+        if attempt == 3 or not 1e-15 < abs(change) < min(1e-6, 0.5 * length):
             break
         length += change
     return length, True

@@ -41,7 +41,7 @@ from heelstrike.sim.event_driven.faces import (
     turn_corner,
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
-from heelstrike.sim.event_driven.impact import REST, collide, heading, strike
+from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, heading, strike
 from heelstrike.sim.event_driven.location import integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
@@ -76,6 +76,7 @@ TOO_MANY = 100
 # Events that a second of simulated time may have on the average, and steps too short to see, each
 # as this part of an event; what is more calls for bridges.
 EVENTS_A_SECOND = 1e4
+EVENTS_A_BRIDGE = 10.0
 SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
@@ -470,7 +471,7 @@ def find_what_happened(
         elif normal < -rest and (first or gap <= TOGETHER):
             phase.hit[contact] = 1
             impact = True
-        elif first:
+        elif first and normal <= rest:
             phase.closed[contact] = 1
             phase.slide[contact] = 0
             if abs(tangent) > rest:
@@ -539,8 +540,9 @@ def end_step(model: Model, clock: Clock, memory: Memory, phase: Phase, record: R
     phase.finished = 0
     memory.tally.steps += 1
     if phase.has_fired == 1:
-        together = phase.time - phase.last_event < INSTANT
-        phase.burst = phase.burst + 1 if together else 0
+        since = phase.time - phase.last_event
+        phase.burst = phase.burst + 1 if since < INSTANT else 0
+        phase.chatter = phase.chatter + 1 if since < SHORTEST_BOUNCE else 0
         phase.last_event = phase.time
         phase.allowance -= 1.0
     elif phase.length < min(SHORT_STEP, 0.01 * phase.longest):
@@ -672,6 +674,8 @@ def move_over(
     for i in range(phase.fired.shape[0]):
         phase.fired[i] = 0
     phase.burst = 0
+    phase.chatter = 0
+    phase.allowance = max(phase.allowance, EVENTS_A_BRIDGE)
     phase.next_length = 1e-6
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     meet_event(False, scene.model, scene.ground, memory, phase, record)
@@ -717,7 +721,7 @@ def move(
     if phase.has_fired == 1:
         evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         meet_event(False, model, ground, memory, phase, record)
-    if phase.burst > TOO_MANY or phase.allowance < 0.0:
+    if phase.chatter > TOO_MANY or phase.allowance < 0.0:
         phase.bridging = 1
     show_state(model, phase, memory)
     return DONE

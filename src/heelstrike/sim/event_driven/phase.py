@@ -99,8 +99,9 @@ class Phase(Bundle):
     last_row, next_push, last_event, last_blow : float
         When the last row was, a push begins or ends next, the modes changed last, and the robot was
         hit last, s.
-    burst : int
-        Events since time moved on.
+    burst, chatter : int
+        Events since time moved on; events that followed each other faster than bounces that are
+        followed.
     started : int
         Whether the first contact modes are being, or have been, decided.
     finished, has_fired : int
@@ -182,6 +183,7 @@ class Phase(Bundle):
     last_event: float = cell(float)
     last_blow: float = cell(float)
     burst: int = cell(int)
+    chatter: int = cell(int)
     started: int = cell(int)
     finished: int = cell(int)
     has_fired: int = cell(int)
