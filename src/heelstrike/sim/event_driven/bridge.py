@@ -2,13 +2,15 @@
 
 Chatter, contact forces that no mode explains, modes that contradict each other within rounding: in
 all of these the motion goes on, but not as smooth phases between events. One step of time stepping
-does not ask for modes. Contacts that touch must not approach at its end, others not go through::
+does not ask for modes. At its end, contacts that touch must not approach, others not go through::
 
-    w = G λ + b,   b_n = J_n v_f + e J_n v,  or  J_n v_f + gap / h  where the gap is open
+    w = G λ + b,   b = J v + h (J a_f + J̇ v),   b_n more by e J_n v,  or by gap / h where it is open
 
-with v_f the velocity that the known forces lead to. It is kept as short as suffices: each further
-one without progress is longer. The impulses act at its beginning, as those of an impact; then the
-robot moves on freely to its end, where a smooth phase begins again.
+with a_f the acceleration that the known forces lead to. It is kept as short as suffices: each
+further one without progress is longer. The impulses act at its beginning, as those of an impact;
+then the robot moves on freely to its end, where a smooth phase begins again. Impulses that make
+energy are refused, with restitution first and then without. Two bridges of half the length tell how
+far a bridge may be wrong: its order is one.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -54,7 +56,7 @@ from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, no
 BRIDGE = int(EventKind.BRIDGE)
 
 # Length (s) of the first bridge of a series, how much longer each further one is, and how many
-# lengths are tried; progress (s) that ends a series.
+# there may be; progress (s) that ends a series.
 SHORTEST_BRIDGE = 1e-6
 LONGER = 4.0
 MOST_BRIDGES = 10
@@ -64,6 +66,10 @@ TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
 # Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
 SLOW = 1e-3
+# The two halves of a bridge of order one are half as wrong as the whole.
+SAFETY = 2.0
+# Slopes of the step to come, where states can be kept until then.
+HERE, HALVED = 2, 3
 
 
 @kernel
@@ -72,30 +78,32 @@ def write_free(
 ) -> None:
     """Make a contact a candidate: what is left of its gap may still close, at leisure.
 
-    The free acceleration is in ``equations.rate``.
+    The free acceleration is in ``equations.rate``. What is no velocity of the normal free term
+    goes to ``phase.lean``, too.
     """
     assembly, v = memory.assembly, phase.begin[model.nq :]
     free, jacobian = assembly.problem.free, assembly.jacobian
     free_gap_acceleration(model, memory.contacts, memory.equations, contact, place, phase, assembly)
     for row in range(2 * place, 2 * place + 2):
         free[row] = row_product(jacobian, row, v) + length * free[row]
-    if gap > TOUCHING:
-        free[2 * place] += gap / length
+    phase.lean[place] = gap / length if gap > TOUCHING else 0.0
+    free[2 * place] += phase.lean[place]
     if contact >= phase.first_dry:
         assembly.problem.bound[place] *= length
     assembly.candidate[place] = contact
 
 
 @kernel
-def gather_near(model: Model, length: float, phase: Phase, memory: Memory) -> tuple[int, bool]:
+def gather_near(
+    model: Model, length: float, bouncing: bool, phase: Phase, memory: Memory
+) -> int:
     """List what could touch within a bridge, and dry joints, with Jacobian rows and free terms.
 
-    The free velocity is in ``phase.trial``. Returns how many, and whether any of them bounces.
+    The free velocity is in ``phase.trial``. Returns how many.
     """
     assembly, state, trial = memory.assembly, phase.begin, phase.trial
-    jacobian, free = assembly.jacobian, assembly.problem.free
+    jacobian, restitution = assembly.jacobian, memory.surface.restitution
     count = 0
-    bounces = False
     for contact in range(phase.closed.shape[0]):
         if contact < model.nc and phase.passing[contact] == 1:
             continue
@@ -110,11 +118,11 @@ def gather_near(model: Model, length: float, phase: Phase, memory: Memory) -> tu
             continue
         write_free(gap, length, contact, count, model, phase, memory)
         came = row_product(jacobian, 2 * count, state[model.nq :])
-        if gap <= TOUCHING and came < -SLOW and memory.surface.restitution[contact] > 0.0:
-            free[2 * count] += memory.surface.restitution[contact] * came
-            bounces = True
+        if bouncing and gap <= TOUCHING and came < -SLOW:
+            phase.lean[count] = restitution[contact] * came
+            assembly.problem.free[2 * count] += phase.lean[count]
         count += 1
-    return count, bounces
+    return count
 
 
 @kernel
@@ -184,22 +192,26 @@ def collect_impulses(
 
 
 @kernel
-def made_energy(model: Model, count: int, assembly: Assembly, phase: Phase) -> bool:
-    """Whether the impulses that lead from ``phase.trial`` to ``phase.end`` made energy."""
+def made_energy(count: int, assembly: Assembly, phase: Phase) -> bool:
+    """Whether the impulses, beside what the known forces did, made energy."""
+    delassus, impulse = assembly.problem.delassus, assembly.answer.impulse
     made = 0.0
     through = 0.0
     for row in range(2 * count):
-        impulse = assembly.answer.impulse[row]
-        before = impulse * row_product(assembly.jacobian, row, phase.trial[model.nq :])
-        after = impulse * row_product(assembly.jacobian, row, phase.end[model.nq :])
-        made += before + after
-        through += abs(before) + abs(after)
+        before = assembly.problem.free[row]
+        if row % 2 == 0:
+            before -= phase.lean[row // 2]
+        after = before
+        for column in range(2 * count):
+            after += delassus[row, column] * impulse[column]
+        made += impulse[row] * (before + after)
+        through += abs(impulse[row]) * (abs(before) + abs(after))
     return made > NOTICEABLE * through
 
 
 @kernel
 def find_impulses(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+    scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase
 ) -> bool:
     """Find a bridge of some length from ``phase.begin`` to ``phase.end``; return success.
 
@@ -219,7 +231,7 @@ def find_impulses(
         memory.reaction.mode[contact] = OPEN
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
-    first, bounces = gather_near(model, length, phase, memory)
+    first = gather_near(model, length, bouncing, phase, memory)
     count = gather_corners(model, scene.ground, length, first, memory, phase)
     if count > 0:
         assemble_delassus(model, equations, count, assembly)
@@ -228,9 +240,9 @@ def find_impulses(
         note_residual(answer.residual, memory.tally)
         if status != SOLVED:
             return False
-        add_impulse(model, assembly, count, equations, end[model.nq :])
-        if not bounces and made_energy(model, count, assembly, phase):
+        if made_energy(count, assembly, phase):
             return False
+        add_impulse(model, assembly, count, equations, end[model.nq :])
     collect_impulses(scene.ground, first, count, memory, phase)
     for place in range(count):
         if assembly.candidate[place] >= phase.first_dry:  # a finite force works on the way
@@ -248,9 +260,55 @@ def find_impulses(
 
 
 @kernel
-def report_impulses(model: Model, phase: Phase, reported: Reported, record: Record) -> None:
+def copy_state(source: Floats, state: Floats) -> None:
+    """Copy a state (q, v)."""
+    for i in range(source.shape[0]):
+        state[i] = source[i]
+
+
+@kernel
+def halves_end(
+    scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase,
+    end: Floats,
+) -> bool:  # fmt: skip
+    """Write where two bridges of half the length end; return whether there are such."""
+    here = phase.slopes[HERE]
+    copy_state(phase.begin, here)
+    found = True
+    for _ in range(2):
+        found = found and find_impulses(
+            scene, 0.5 * length, bouncing, control, memory, phase
+        )
+        copy_state(phase.end, phase.begin)
+    copy_state(phase.begin, end)
+    copy_state(here, phase.begin)
+    return found
+
+
+@kernel
+def find_bridge(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> tuple[bool, float]:
+    """Find a bridge of some length; return success, and how far its end may be wrong."""
+    other = phase.slopes[HALVED]
+    for attempt in range(2):
+        bouncing = attempt == 0
+        sure = halves_end(scene, length, bouncing, control, memory, phase, other)
+        if find_impulses(scene, length, bouncing, control, memory, phase):
+            wrong = 0.0
+            for i in range(other.shape[0]):
+                apart = phase.end[i] - (other[i] if sure else phase.begin[i])
+                wrong = max(wrong, SAFETY * abs(apart))
+            return True, wrong
+    return False, 0.0
+
+
+@kernel
+def report_impulses(
+    model: Model, wrong: float, phase: Phase, reported: Reported, record: Record
+) -> None:
     """Append the bridge to the events, and the impulses of the contacts."""
-    log_event(phase.time, BRIDGE, 0, phase.length, 0.0, record)
+    log_event(phase.time, BRIDGE, 0, phase.length, wrong, record)
     for contact in range(phase.first_dry):
         normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
         if not normal > 0.0:
@@ -306,17 +364,16 @@ def cross(
         phase.series = phase.time
         phase.bridges = 0
     found = False
-    for _ in range(MOST_BRIDGES):
+    wrong = 0.0
+    while not found and phase.bridges < MOST_BRIDGES:
         wish = SHORTEST_BRIDGE * LONGER**phase.bridges
         phase.length = min(wish, stop - phase.time)
-        found = find_impulses(scene, phase.length, control, memory, phase)
+        found, wrong = find_bridge(scene, phase.length, control, memory, phase)
         if phase.length == wish or not found:
-            phase.bridges = min(phase.bridges + 1, MOST_BRIDGES)
-        if found:
-            break
+            phase.bridges += 1
     if not found:
         return False
-    report_impulses(model, phase, memory.reported, record)
+    report_impulses(model, wrong, phase, memory.reported, record)
     for contact in range(phase.closed.shape[0]):
         if contact < phase.first_dry:
             phase.closed[contact] = 0

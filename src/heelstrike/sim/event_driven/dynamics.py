@@ -37,10 +37,8 @@ from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 
-# How far (m) a projection may end from the constraints: more says that they contradict each other.
-ARRIVED = 1e-10
-# How far it may move a state, as a multiple of the error that a step may make: beyond that, the
-# motion has not kept its constraints.
+# How far a projection may move a state, as a multiple of the error that a step may make: beyond
+# that, the motion has not kept its constraints.
 EXPLAINED = 1000.0
 
 
@@ -75,15 +73,27 @@ def list_unknowns(count: int, candidate: Integers, friction: Floats, phase: Phas
 
 
 @kernel
-def constraint_matrix(size: int, friction: float, delassus: Floats, phase: Phase) -> None:
-    """Write the matrix of the equations of the contact forces, with friction (1) or without (0)."""
-    row, lean = phase.row, phase.lean
+def solve_constraints(size: int, friction: float, delassus: Floats, phase: Phase) -> int:
+    """Solve the equations of the contact forces, with friction (1) or without (0); return the rank.
+
+    Their right-hand side is there. A contact may be a million times heavier than another: only in
+    units in which all weigh the same does the size of a pivot tell whether it is one.
+    """
+    row, lean, scale, system = phase.row, phase.lean, phase.scale, phase.system
+    for i in range(size):
+        weight = delassus[row[i], row[i]]
+        scale[i] = 1.0 / math.sqrt(weight) if weight > 0.0 else 1.0
     for i in range(size):
         for j in range(size):
             entry = delassus[row[i], row[j]]
             if lean[j] != 0.0:
                 entry += friction * lean[j] * delassus[row[i], row[j] + 1]
-            phase.system[i, j] = entry
+            system[i, j] = scale[i] * scale[j] * entry
+        system[i, size] *= scale[i]
+    rank = solve_to_rank(size, system, phase.column, phase.unknown)
+    for i in range(size):
+        phase.unknown[i] *= scale[i]
+    return rank
 
 
 @dissolved_kernel
@@ -233,10 +243,9 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
             joint = phase.dry_joint[contact - phase.first_dry]
             impulse[2 * place] = model.dry_friction[joint]
     size = list_unknowns(count, assembly.candidate, friction, phase)
-    constraint_matrix(size, 1.0, assembly.problem.delassus, phase)
     for i in range(size):
         phase.system[i, size] = -assembly.problem.free[phase.row[i]]
-    rank = solve_to_rank(size, phase.system, phase.column, phase.unknown)
+    rank = solve_constraints(size, 1.0, assembly.problem.delassus, phase)
     phase.deficient = 1 if rank < size else 0
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
@@ -317,11 +326,14 @@ def displacement(
 
 
 @kernel
-def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> bool:
+def project(
+    model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
+) -> float:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
     Closed points return to the ground, sticking ones (and joints) to where they began to stick, and
-    their velocities along these directions vanish. Returns whether they got there.
+    their velocities along these directions vanish. Returns how far (m) the worst is left from its
+    place: constraints that say the same twice need not agree.
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
@@ -331,7 +343,7 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
         weigh(model, equations)
         count = gather_closed(model, contacts, phase, equations, assembly)
         if count == 0:
-            return True
+            return 0.0
         size = list_unknowns(count, assembly.candidate, memory.surface.friction, phase)
         worst = 0.0
         for i in range(size):
@@ -342,16 +354,15 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
         if not positions:
             for i in range(size):
                 system[i, size] = -row_product(assembly.jacobian, row[i], v)
-        constraint_matrix(size, 0.0, assembly.problem.delassus, phase)
-        solve_to_rank(size, system, phase.column, phase.unknown)
+        solve_constraints(size, 0.0, assembly.problem.delassus, phase)
         for i in range(2 * count):
             assembly.answer.impulse[i] = 0.0
         for i in range(size):
             assembly.answer.impulse[row[i]] = phase.unknown[i]
         add_impulse(model, assembly, count, equations, q if positions else v)
         if not positions:
-            return worst <= ARRIVED
-    return False
+            return worst
+    return math.inf
 
 
 @kernel

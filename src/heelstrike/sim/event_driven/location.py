@@ -36,6 +36,9 @@ SAMPLES = 4
 EVENT_TIME = 1e-12
 """Seconds to which events are located."""
 
+TOGETHER = 1e-10
+"""Points nearer to the ground than this (m) share an impact."""
+
 # How far an event function must be below zero to count: m, m/s, and a fraction of the weight.
 GAP_NOISE = 1e-13
 CORNER_NOISE = 1e-11
@@ -290,8 +293,8 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     end, before = phase.end, phase.trial
     for i in range(end.shape[0]):
         before[i] = end[i]
-    fits = project(scene.model, scene.ground, memory, phase, end)
-    return fits and explained(before, end, phase)
+    left = project(scene.model, scene.ground, memory, phase, end)
+    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, phase)
 
 
 @kernel

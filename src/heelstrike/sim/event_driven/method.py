@@ -30,7 +30,7 @@ from heelstrike.sim.contacts.geometry import (
 )
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.bridge import cross
+from heelstrike.sim.event_driven.bridge import TOUCHING, cross
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
@@ -41,8 +41,8 @@ from heelstrike.sim.event_driven.faces import (
     turn_corner,
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
-from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, heading, strike
-from heelstrike.sim.event_driven.location import integrate, shortest_step
+from heelstrike.sim.event_driven.impact import REST, collide, heading, strike
+from heelstrike.sim.event_driven.location import TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
@@ -58,9 +58,7 @@ from heelstrike.sim.setting import Setting
 ZENO = int(EventKind.ZENO)
 PAINLEVE = int(EventKind.PAINLEVE)
 
-# Points nearer to the ground than this (m) share an impact; at the start of a run, and slower than
-# this (m/s), they are on it.
-TOGETHER = 1e-10
+# At the start of a run, points nearer to the ground than this (m) and slower (m/s) are on it.
 ON_THE_GROUND = 1e-6
 # Speed (m/s) of approach that makes a sliding point without consistent force collide.
 NUDGE = 1e-10
@@ -70,20 +68,22 @@ JUMP = 1e-7
 INSTANT = 1e-10
 # Mark of a point that touches the ground without force or speed, until it is known what happens.
 UNPRESSED = 2
-# So many in a row are switched by what fired; so many call for a bridge.
+# So many in a row are switched by what fired.
 INSISTENT = 8
-TOO_MANY = 100
-# Events that a second of simulated time may have on the average, and steps too short to see, each
-# as this part of an event; what is more calls for bridges.
-EVENTS_A_SECOND = 1e4
-EVENTS_A_BRIDGE = 10.0
+# Events that may follow each other at once, and at once behind a bridge; how many more as time goes
+# on, 1/s; steps too short to see count as a part of an event. What is more calls for a bridge.
+EVENTS_AT_ONCE, EVENTS_A_BRIDGE = 100.0, 25.0
+EVENTS_A_SECOND = 1e5
 SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
 # How far the first projection of a phase may move coordinates and velocities (m, rad, m/s, rad/s;
-# of large ones, this part), and how much further after a bridge, for each second of its length.
+# of large ones, this part): at the start of a run, later, and how much further after a bridge, for
+# each second of its length, up to a longest. Impacts and events leave nothing to be projected.
 FITTING = 1e-4
-BRIDGED = 1e7
+UNSEEN = 1e-6
+BRIDGED = 1e3
+LONG_BRIDGE = 1e-6
 
 # How far ahead (s) forces that reached a limit are looked at, first and last; how far beyond it, as
 # a fraction of the weight, they must be by then; how often modes are tried in one instant.
@@ -175,7 +175,7 @@ class EventDriven(Method):
         phase.longest = self.max_step
         phase.relative, phase.absolute = self.rtol, self.atol
         phase.next_push = np.inf
-        phase.allowance = EVENTS_A_SECOND
+        phase.allowance = EVENTS_AT_ONCE
         phase.series = phase.bridge_end = -np.inf
         phase.last_event = phase.last_blow = phase.last_row = -np.inf
         phase.let_pass = int(self.swing_feet_pass)
@@ -343,12 +343,13 @@ def begin_phase(
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    fits = project(model, ground, memory, phase, begin)
-    # A bridge ends with the Jacobian of its beginning.
-    bridge = phase.length if phase.bridge_end == phase.time else 0.0
+    phase.left = project(model, ground, memory, phase, begin)
+    closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
+    if phase.bridge_end == phase.time:
+        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
+    fits = phase.left <= closest
     for i in range(begin.shape[0]):
-        most = FITTING * (1.0 + abs(before[i])) * (1.0 + BRIDGED * bridge)
-        fits = fits and abs(begin[i] - before[i]) <= most
+        fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
     if fits:
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
     else:
@@ -526,7 +527,7 @@ def pass_time(length: float, stop: float, phase: Phase) -> None:
     phase.time += length
     if abs(phase.time - stop) <= 4e-16 * max(abs(stop), 1e-3):
         phase.time = stop
-    phase.allowance = min(phase.allowance + EVENTS_A_SECOND * length, EVENTS_A_SECOND)
+    phase.allowance = min(phase.allowance + EVENTS_A_SECOND * length, EVENTS_AT_ONCE)
 
 
 @kernel
@@ -540,9 +541,8 @@ def end_step(model: Model, clock: Clock, memory: Memory, phase: Phase, record: R
     phase.finished = 0
     memory.tally.steps += 1
     if phase.has_fired == 1:
-        since = phase.time - phase.last_event
-        phase.burst = phase.burst + 1 if since < INSTANT else 0
-        phase.chatter = phase.chatter + 1 if since < SHORTEST_BOUNCE else 0
+        together = phase.time - phase.last_event < INSTANT
+        phase.burst = phase.burst + 1 if together else 0
         phase.last_event = phase.time
         phase.allowance -= 1.0
     elif phase.length < min(SHORT_STEP, 0.01 * phase.longest):
@@ -674,8 +674,7 @@ def move_over(
     for i in range(phase.fired.shape[0]):
         phase.fired[i] = 0
     phase.burst = 0
-    phase.chatter = 0
-    phase.allowance = max(phase.allowance, EVENTS_A_BRIDGE)
+    phase.allowance = EVENTS_A_BRIDGE
     phase.next_length = 1e-6
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     meet_event(False, scene.model, scene.ground, memory, phase, record)
@@ -721,7 +720,7 @@ def move(
     if phase.has_fired == 1:
         evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         meet_event(False, model, ground, memory, phase, record)
-    if phase.chatter > TOO_MANY or phase.allowance < 0.0:
+    if phase.allowance < 0.0:
         phase.bridging = 1
     show_state(model, phase, memory)
     return DONE

@@ -64,12 +64,12 @@ class Phase(Bundle):
     last_impact, accumulation : (nc,) float
         When each point hit the ground last; when its accumulating impacts come to rest.
     row : (2 nc,) int
-    lean : (2 nc,) float
+    lean, scale : (2 nc,) float
     system : (2 nc, 2 nc + 1) float
     unknown : (2 nc,) float
     column : (2 nc,) int
-        Equations of the contact forces: row of the Jacobian, tangential per normal force, the
-        equations themselves, their solution, and its order.
+        Equations of the contact forces: row of the Jacobian, tangential per normal force, unit of
+        each, the equations themselves, their solution, and its order.
     value, rate, end_value, end_rate : (2 nc + points,) float
     before, before_rate, sample, sample_rate : (2 nc + points,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
@@ -99,9 +99,8 @@ class Phase(Bundle):
     last_row, next_push, last_event, last_blow : float
         When the last row was, a push begins or ends next, the modes changed last, and the robot was
         hit last, s.
-    burst, chatter : int
-        Events since time moved on; events that followed each other faster than bounces that are
-        followed.
+    burst : int
+        Events since time moved on.
     started : int
         Whether the first contact modes are being, or have been, decided.
     finished, has_fired : int
@@ -113,6 +112,8 @@ class Phase(Bundle):
         Whether contact forces at their limits made it so; whether those that grow without bound.
     closed_count, deficient : int
         Closed contact points at the last evaluation; whether it found their forces ambiguous.
+    left : float
+        How far from its constraints the phase began, because they cannot all be met (m).
     bridging, bridges : int
         Whether this instant is left by a bridge; how many there were in the series.
     series, bridge_end : float
@@ -150,6 +151,7 @@ class Phase(Bundle):
     accumulation: Floats = array("contacts")
     row: Integers = array("2 contacts", of=int)
     lean: Floats = array("2 contacts")
+    scale: Floats = array("2 contacts")
     system: Floats = array("2 contacts", "2 contacts + 1")
     unknown: Floats = array("2 contacts")
     column: Integers = array("2 contacts", of=int)
@@ -183,7 +185,6 @@ class Phase(Bundle):
     last_event: float = cell(float)
     last_blow: float = cell(float)
     burst: int = cell(int)
-    chatter: int = cell(int)
     started: int = cell(int)
     finished: int = cell(int)
     has_fired: int = cell(int)
@@ -193,6 +194,7 @@ class Phase(Bundle):
     jammed: int = cell(int)
     closed_count: int = cell(int)
     deficient: int = cell(int)
+    left: float = cell(float)
     bridging: int = cell(int)
     bridges: int = cell(int)
     series: float = cell(float)

@@ -44,7 +44,8 @@ def write_row(
     trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
     for i in range(state.shape[0]):
         trial[i] = state[i]
-    if not (project(model, scene.ground, memory, phase, trial) and explained(state, trial, phase)):
+    project(model, scene.ground, memory, phase, trial)
+    if not explained(state, trial, phase):
         for i in range(state.shape[0]):
             trial[i] = state[i]
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
