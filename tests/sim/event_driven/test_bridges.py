@@ -6,41 +6,33 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes.event_judge import judge_events
 from scenes.methods import Setting
 from scenes.scene import random_scene
 
 import heelstrike as hs
 from heelstrike.sim import EventKind, RunStatus
 
-# Random scenes on flat ground that ended without time moving on, or without a certified solution.
-PILED_UP = (55, 66, 68, 118)
+# Random scenes that ended with events without end, or without a certified solution; no bridge now.
+PILED_UP = (37, 48, 55, 66, 118)
+
+
+def bridges(run: hs.Run) -> list[hs.sim.Event]:
+    return [event for event in run.events if event.kind is EventKind.BRIDGE]
 
 
 @pytest.mark.parametrize("seed", PILED_UP)
 def test_a_robot_on_which_events_pile_up_arrives(seed: int) -> None:
     run = Setting.of(random_scene(seed)).run("event_driven")
     assert run.status is RunStatus.COMPLETED, run.message
-    bridges = [event for event in run.events if event.kind is EventKind.BRIDGE]
-    lengths = [event.impulse[0] for event in bridges]
-    assert bridges
-    assert 0.0 < sum(lengths) <= 1e-3 * run.time[-1]
     assert np.all(np.diff(run.time) >= 0.0)
-    for event in bridges:
-        # Velocities jump at its beginning and position does not; there is a row at its end.
-        first, last = np.flatnonzero(np.abs(run.time - event.time) <= 1e-14)[[0, -1]]
-        assert first < last
-        np.testing.assert_allclose(run.position[last], run.position[first], rtol=0.0, atol=1e-7)
-        end = event.time + event.impulse[0]
-        assert np.min(np.abs(run.time - end)) <= 1e-14
+    assert sum(event.impulse[0] for event in bridges(run)) <= 1e-3 * run.time[-1]
 
 
-def test_bridges_are_kept_in_files(tmp_path: Path) -> None:
-    run = Setting.of(random_scene(118)).run("event_driven")
-    run.save(tmp_path / "run.nc")
-    assert hs.load_run(tmp_path / "run.nc").events == run.events
-
-
-def test_a_run_that_needs_no_bridge_has_none() -> None:
-    run = Setting.of(random_scene(2)).run("event_driven")
+@pytest.mark.parametrize("seed", [3, 9, 21])
+def test_a_run_that_needs_no_bridge_has_none(seed: int) -> None:
+    """Points that chatter to rest within microseconds, several of them at once."""
+    setting = Setting.of(random_scene(seed))
+    run = setting.run("event_driven")
     assert run.status is RunStatus.COMPLETED
-    assert not [event for event in run.events if event.kind is EventKind.BRIDGE]
+    assert not bridges(run)

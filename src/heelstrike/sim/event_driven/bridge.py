@@ -94,9 +94,7 @@ def write_free(
 
 
 @kernel
-def gather_near(
-    model: Model, length: float, bouncing: bool, phase: Phase, memory: Memory
-) -> int:
+def gather_near(model: Model, length: float, bouncing: bool, phase: Phase, memory: Memory) -> int:
     """List what could touch within a bridge, and dry joints, with Jacobian rows and free terms.
 
     The free velocity is in ``phase.trial``. Returns how many.
@@ -276,9 +274,7 @@ def halves_end(
     copy_state(phase.begin, here)
     found = True
     for _ in range(2):
-        found = found and find_impulses(
-            scene, 0.5 * length, bouncing, control, memory, phase
-        )
+        found = found and find_impulses(scene, 0.5 * length, bouncing, control, memory, phase)
         copy_state(phase.end, phase.begin)
     copy_state(phase.begin, end)
     copy_state(here, phase.begin)

@@ -31,8 +31,11 @@ ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 REST = 1e-9
 # Energy counts as made when it exceeds this part of the energy that went through the contacts.
 NOTICEABLE = 1e-9
-# Bounces shorter than this (s) are not followed: their limit is computed.
+# Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
+# rest: what speed is left of them is less than anyone could see.
 SHORTEST_BOUNCE = 1e-6
+NO_BOUNCE = 1e-8
+PLASTIC, AT_REST = 1, 2
 # Ratio of successive bounces beyond which there is no limit in sight.
 PERPETUAL = 0.999999
 
@@ -99,7 +102,7 @@ def collide(
         through += abs(pressing) + abs(rubbing)
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        rests = normal <= REST
+        rests = normal <= REST or phase.plastic[contact] == AT_REST
         phase.closed[contact] = 1 if rests else 0
         phase.slide[contact] = heading(tangent) if rests else 0
     for dry in range(phase.dry_joint.shape[0]):
@@ -147,7 +150,7 @@ def short_bounces(
         ratio = bounce / last
         if not ratio < PERPETUAL:
             ratio = min(memory.surface.restitution[contact], PERPETUAL)
-        phase.plastic[contact] = 1
+        phase.plastic[contact] = AT_REST if bounce <= NO_BOUNCE else PLASTIC
         phase.accumulation[contact] = time + bounce / (1.0 - ratio)
         found = True
     return found
@@ -186,7 +189,7 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     largest = 0
     for contact in range(phase.first_dry):
         normal, tangent = impulse[contact, 0], impulse[contact, 1]
-        if phase.plastic[contact] == 1 and phase.closed[contact] == 0:
+        if phase.plastic[contact] != 0 and phase.closed[contact] == 0:
             # Others throw it up again, and it is followed.
             phase.accumulation[contact] = np.inf
         phase.plastic[contact] = 0

@@ -41,7 +41,7 @@ from heelstrike.sim.event_driven.faces import (
     turn_corner,
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
-from heelstrike.sim.event_driven.impact import REST, collide, heading, strike
+from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, heading, strike
 from heelstrike.sim.event_driven.location import TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
@@ -60,6 +60,8 @@ PAINLEVE = int(EventKind.PAINLEVE)
 
 # At the start of a run, points nearer to the ground than this (m) and slower (m/s) are on it.
 ON_THE_GROUND = 1e-6
+# Feet nearer to each other than this (m) are beside each other.
+BESIDE = 1e-6
 # Speed (m/s) of approach that makes a sliding point without consistent force collide.
 NUDGE = 1e-10
 # Torque (relative) that a controller may change between two looks at the same instant.
@@ -72,7 +74,7 @@ UNPRESSED = 2
 INSISTENT = 8
 # Events that may follow each other at once, and at once behind a bridge; how many more as time goes
 # on, 1/s; steps too short to see count as a part of an event. What is more calls for a bridge.
-EVENTS_AT_ONCE, EVENTS_A_BRIDGE = 100.0, 25.0
+EVENTS_AT_ONCE, EVENTS_A_BRIDGE = 200.0, 50.0
 EVENTS_A_SECOND = 1e5
 SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
@@ -119,8 +121,8 @@ class EventDriven(Method):
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``.
     swing_feet_pass : bool
         A rule for passive walkers, whose legs of equal length scuff the ground at mid-stance: a
-        point that reaches the ground behind a point already on it, seen in the direction in which
-        the robot moves, passes below the ground until it comes up again.
+        point that reaches the ground beside or behind a point already on it, seen in the direction
+        in which the robot moves, passes below the ground until it comes up again.
 
     Raises
     ------
@@ -405,10 +407,15 @@ def decide_modes(
 
 @kernel
 def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> bool:
-    """Whether a point is behind one on the ground and, by the rule, may pass below it."""
+    """Whether a point is behind one on the ground and, by the rule, may pass below it.
+
+    Feet of legs of one length reach the ground where they pass each other: a foot beside the other
+    is not ahead of it, whatever rounding says.
+    """
+    forward = -1.0 if direction < 0.0 else 1.0
     for other in range(contacts.gap.shape[0]):
         ahead = contacts.position[other, 0] - contacts.position[contact, 0]
-        if phase.closed[other] == 1 and direction * ahead > 0.0:
+        if phase.closed[other] == 1 and forward * ahead > -BESIDE:
             return phase.let_pass == 1
     return False
 
@@ -477,6 +484,8 @@ def find_what_happened(
             phase.slide[contact] = 0
             if abs(tangent) > rest:
                 phase.slide[contact] = 1 if tangent > 0.0 else -1
+            if phase.time - phase.last_blow < SHORTEST_BOUNCE:  # too low a bounce to be followed
+                phase.accumulation[contact] = phase.time
         elif gap <= TOGETHER and normal <= rest:
             phase.hit[contact] = UNPRESSED
     for contact in range(phase.closed.shape[0]):

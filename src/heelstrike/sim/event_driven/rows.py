@@ -111,5 +111,9 @@ def write_rows_within(
             part = 1.0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return False
-        interpolate(part, phase.begin, phase.dense, state)
+        if part < 1.0:
+            interpolate(part, phase.begin, phase.dense, state)
+        else:  # the end has been put on its constraints, and on the event
+            for i in range(state.shape[0]):
+                state[i] = phase.end[i]
         write_row(scene, time, state, control, memory, phase, record)
