@@ -285,9 +285,7 @@ class _Events:
             if most.get(k, 0) == 1 and b - a <= 1:
                 self.impact_law(found, one, p, s, before, after, size)
 
-    def bridge_law(
-        self, found: Findings, k: int, one: slice, p: Array, size: float
-    ) -> None:
+    def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
         """What holds at the end of the bridge that begins at instant k."""
         rows, (length, wrong) = self.rows, self.bridges[k]
         end = int(np.argmin(np.abs(self.instant - self.instant[k] - length)))
@@ -302,9 +300,7 @@ class _Events:
         work = length * float(force @ rows.v[last])
         # Forces go on to act for the length; what they do in it is small of second order.
         slack = 0.5 * size * (length * self.force_size[last]) + size * wrong
-        found.look(
-            "bridge makes energy", np.array([(gained - work - slack) / size**2]), GAIN, time
-        )
+        found.look("bridge makes energy", np.array([(gained - work - slack) / size**2]), GAIN, time)
         if not rows.contacts:
             return
         weight = np.maximum(rows.metric_of(one).weight(rows.jacobian[one]), 1e-300)

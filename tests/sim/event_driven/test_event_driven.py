@@ -291,8 +291,10 @@ def test_why_it_could_not_go_on_is_told() -> None:
         walking.bravo7(), state=walking.gait().initial_state, method=hs.EventDriven()
     )
     simulation._work.reason = NO_BRIDGE
-    _, message = simulation._ending(Outcome.DIVERGED)
+    status, message = simulation._ending(Outcome.SOLVER_FAILED)
+    assert status is RunStatus.SOLVER_FAILED
     assert "events followed each other" in message
+    assert message.endswith("TimeStepping() asks less of an instant")
 
 
 def test_a_robot_sunk_in_the_ground_is_refused_whatever_swing_feet_may_do() -> None:
