@@ -22,7 +22,7 @@ SINGULAR = 2e-15
 CONSISTENT = 1e-12
 """Equations that are left with less than this, relative to the largest, are met."""
 
-NO_PIVOT = 1e-13
+NO_PIVOT = 1e-11
 """Pivots of any matrix below this, relative to its largest entry, count as zero."""
 
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
-from scenes.event_judge import judge_events
 from scenes.methods import Setting
 from scenes.scene import random_scene
 

@@ -39,7 +39,7 @@ from heelstrike.sim.push import Pushes, add_pushes
 
 # How far a projection may move a state, as a multiple of the error that a step may make: beyond
 # that, the motion has not kept its constraints.
-EXPLAINED = 1000.0
+EXPLAINED = 100.0
 
 
 @kernel

@@ -44,9 +44,9 @@ GAP_NOISE = 1e-13
 CORNER_NOISE = 1e-11
 SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
-
-
-# How much a step is shortened that does not.
+# An event function that is nearer to zero than this part of its noise is zero.
+NEAR_ENOUGH = 0.1
+# How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
 # Shortest step as a multiple of the rounding of time.
@@ -266,28 +266,6 @@ def longest_good_step(
 
 
 @kernel
-def end_at_event(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
-) -> tuple[float, bool]:
-    """Repeat the step to end at the event, and correct its length by what is left there.
-
-    Returns the length, and whether the step is good enough.
-    """
-    for attempt in range(4):
-        if not take_step(scene, length, control, memory, phase) <= 1.0:
-            return length, False
-        change = 0.0
-        for i in range(phase.fired.shape[0]):
-            if phase.fired[i] == 1 and is_geometric(i, phase) and phase.end_rate[i] < 0.0:
-                change = -phase.end_value[i] / phase.end_rate[i]
-        # Where it turns round rather than passes zero, its rate does not tell where zero is.
-        if attempt == 3 or not 1e-15 < abs(change) < min(1e-6, 0.5 * length):
-            break
-        length += change
-    return length, True
-
-
-@kernel
 def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     """Put the end of the step on its constraints; return whether its error explains how far."""
     end, before = phase.end, phase.trial
@@ -295,6 +273,33 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
         before[i] = end[i]
     left = project(scene.model, scene.ground, memory, phase, end)
     return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, phase)
+
+
+@kernel
+def end_at_event(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> tuple[float, bool, bool]:
+    """Repeat the step to end at the event, and correct its length by what is left there.
+
+    Returns the length, whether the step is good enough, and whether its end fits its constraints.
+    """
+    for attempt in range(4):
+        if not take_step(scene, length, control, memory, phase) <= 1.0:
+            return length, False, True
+        if not settle(scene, memory, phase):
+            return length, True, False
+        look(scene.model, scene.ground, phase.end, memory, phase)
+        value, rate = phase.value, phase.rate
+        change = 0.0
+        for i in range(phase.fired.shape[0]):
+            passes = phase.fired[i] == 1 and is_geometric(i, phase) and rate[i] < 0.0
+            if passes and abs(value[i]) > NEAR_ENOUGH * noise(i, phase):
+                change = -value[i] / rate[i]
+        # Where it turns round rather than passes zero, its rate does not tell where zero is.
+        if attempt == 3 or change == 0.0 or abs(change) > 0.5 * length:
+            break
+        length += change
+    return length, True, True
 
 
 @kernel
@@ -321,8 +326,10 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
         phase.has_fired = 0 if part == NO_EVENT else 1
         good = True
         if part < NO_EVENT:
-            length, good = end_at_event(scene, length * part, control, memory, phase)
-        if good and settle(scene, memory, phase):
+            length, good, fits = end_at_event(scene, length * part, control, memory, phase)
+        else:
+            fits = settle(scene, memory, phase)
+        if good and fits:
             break
         # Where a torque saturates the shorter step can be the worse one: take less of it.
         length *= SHORTENED if good else 0.5
