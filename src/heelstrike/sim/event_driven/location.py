@@ -46,6 +46,8 @@ SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
 # An event function that is nearer to zero than this part of its noise is zero.
 NEAR_ENOUGH = 0.1
+# How often a step is looked through for its first event.
+ATTEMPTS = 3
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
@@ -303,6 +305,26 @@ def end_at_event(
 
 
 @kernel
+def missed(phase: Phase) -> bool:
+    """Whether a point is in the ground at the end of a step that ends with another's event.
+
+    The step is not the one on whose dense output that was found first.
+    """
+    for contact in range(phase.first_dry):
+        gap = phase.value[2 * contact]
+        if phase.closed[contact] == 0 and phase.fired[2 * contact] == 0 and gap < -TOGETHER:
+            return True
+    return False
+
+
+@kernel
+def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase) -> None:
+    """Evaluate the beginning of the step again."""
+    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
+
+
+@kernel
 def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase) -> bool:
     """Take one good step that ends at its first event, or at `stop` at the latest.
 
@@ -324,18 +346,23 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
             phase.next_length = max(min(wish, 10.0 * length), length * factor)
         part = first_event(scene, length, control, memory, phase)
         phase.has_fired = 0 if part == NO_EVENT else 1
-        good = True
-        if part < NO_EVENT:
+        good, fits = True, True
+        for attempt in range(ATTEMPTS):
+            if part == NO_EVENT:
+                break
             length, good, fits = end_at_event(scene, length * part, control, memory, phase)
-        else:
+            if not (good and fits and missed(phase)):
+                break
+            look_back(scene, control, memory, phase)
+            part = first_event(scene, length, control, memory, phase)
+        if phase.has_fired == 0:
             fits = settle(scene, memory, phase)
         if good and fits:
             break
         # Where a torque saturates the shorter step can be the worse one: take less of it.
         length *= SHORTENED if good else 0.5
         rejected = True
-        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-        copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
+        look_back(scene, control, memory, phase)
     phase.length = length
     phase.finished = 1
     return True
