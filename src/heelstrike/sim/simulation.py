@@ -491,9 +491,10 @@ class Simulation:
                 "gains"
             )
         if outcome is Outcome.SOLVER_FAILED:
+            reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
