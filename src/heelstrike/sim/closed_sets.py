@@ -54,6 +54,10 @@ class EventKind(enum.IntEnum):
         time is bridged by impulses at its beginning, which are told of by events of their own. The
         event's `impulse` is the length of the bridge (s) and how far its end may be wrong (the
         largest error of a coordinate or velocity), its `contact` zero.
+    ``WEDGED``
+        It is in the ground, by so little as rounding and turning explain, and neither it nor a
+        joint can be pushed out without the other being pressed in: from here on they are left where
+        they are until that ends.
     """
 
     TOUCHDOWN = 0
@@ -69,6 +73,7 @@ class EventKind(enum.IntEnum):
     JOINT_SLIP = 10
     JOINT_STICK = 11
     BRIDGE = 12
+    WEDGED = 13
 
 
 class Scheme(enum.IntEnum):
@@ -85,8 +90,10 @@ class Scheme(enum.IntEnum):
         is computed at the new position, where the vertices whose gap is not positive are active.
     ``MOREAU_JEAN``
         Moreau's scheme with Newton's restitution: points whose gap is foreseen to close within
-        half a step get ``v_n⁺ + e v_n ≥ 0``; positions move with the mean velocity (Moreau 1988;
-        Jean 1999, with Siconos' θ = γ = 1/2).
+        half a step get ``v_n⁺ + e v_n ≥ 0``; positions move with the mean velocity, and joint
+        springs and dampers act as in the middle of the step, to first order (Moreau 1988; Jean
+        1999; θ = γ = 1/2). Gravity, Coriolis forces and motors act as at its beginning: a pendulum
+        that swings with ω gains (ω h)²/2 of its energy a step.
     ``LINEARLY_IMPLICIT``
         ``GAP_LINEARISED`` with joint springs, dampers and controller gains at the end of the step,
         to first order (Anitescu and Potra 2002, the paper's [17]).
