@@ -36,6 +36,10 @@ from heelstrike.sim.controller.stance import (
 
 # A swing foot that meets the ground before this share of the step scuffs; after it, it lands.
 LANDS_AFTER = 0.5
+# In parts of half a step: so far beyond either end the series goes on, and so far beyond that the
+# postures become straight.
+BEYOND = 0.01
+FADING = 0.1
 
 
 class Parameters(Bundle):
@@ -91,8 +95,8 @@ class Memory(Bundle):
 
 @kernel
 def series(coefficients: Floats, joint: int, x: float) -> Spatial:
-    """Value, slope and curvature of a Chebyshev series on [−1, 1] (Clenshaw); straight beyond."""
-    inside = min(max(x, -1.0), 1.0)
+    """Value, slope and curvature of a Chebyshev series on [−1, 1] (Clenshaw) and beyond."""
+    inside = min(max(x, -1.0 - BEYOND), 1.0 + BEYOND)
     b1, b2, d1, d2, e1, e2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(coefficients.shape[0] - 1, 0, -1):
         b1, b2 = coefficients[k, joint] + 2.0 * inside * b1 - b2, b1
@@ -101,10 +105,16 @@ def series(coefficients: Floats, joint: int, x: float) -> Spatial:
     value = coefficients[0, joint] + inside * b1 - b2
     slope = b1 + inside * d1 - d2
     curvature = 2.0 * d1 + inside * e1 - e2
-    if inside != x:
-        value += (x - inside) * slope
-        curvature = 0.0
-    return value, slope, curvature
+    if inside == x:
+        return value, slope, curvature
+    # Near the ends the series itself goes on, so that the return map has derivatives: what a later
+    # or an earlier touchdown leads to has no kink. Then its curvature fades.
+    bent = min(abs(x - inside), FADING)
+    bend = math.copysign(curvature * (bent - 0.5 * bent**2 / FADING), x)
+    sag = curvature * bent**2 * (0.5 - bent / (6.0 * FADING))
+    straight = x - inside - math.copysign(bent, x)
+    value += (x - inside) * slope + sag + bend * straight
+    return value, slope + bend, curvature * (1.0 - bent / FADING)
 
 
 @kernel
@@ -221,7 +231,7 @@ class VirtualConstraints(Law):
     its steps do to that speed is in :func:`~heelstrike.zero_dynamics`.
 
     Left and right change places when the swing foot has met the ground in the second half of a
-    step. Beyond either end of the range of the phase the postures go on along their tangents.
+    step. Beyond either end of the range of the phase the postures soon go on along a straight line.
 
     Parameters
     ----------
@@ -282,6 +292,33 @@ class VirtualConstraints(Law):
             virtual_constraints, parameters, memory={"stance": gait.stance_foot}, robot=robot
         )
         self.gait = gait
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return parameters and memory for a robot, which must be of the same kind.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot that is simulated.
+
+        Returns
+        -------
+        tuple of Bundle
+            Parameters and memory.
+
+        Raises
+        ------
+        ControllerError
+            If it does not stand on two points, or they do not fit it.
+        """
+        if [foot.contacts[:1] for foot in robot.feet] != [
+            foot.contacts for foot in self.gait.robot.feet
+        ]:
+            raise ControllerError(
+                f"these virtual constraints are for robot {self.gait.robot.name!r} on its two "
+                f"point feet; robot {robot.name!r} has others"
+            )
+        return super().numbers(robot)
 
 
 def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:

@@ -150,7 +150,7 @@ class PhasedGait:
         gait: Gait,
         *,
         phase: Mapping[str, float] | None = None,
-        degree: int = 20,
+        degree: int = 24,
     ) -> PhasedGait:
         """Read a gait in time over a phase instead.
 

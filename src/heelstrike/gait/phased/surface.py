@@ -21,7 +21,7 @@ from heelstrike.gait.phased.phased_gait import PhasedGait
 Floats = NDArray[np.float64]
 
 # A touchdown is looked for within this much of the range of the phase about its end.
-NEAR_THE_END = 0.2
+NEAR_THE_END = 0.05
 LOOKS = 21
 
 
