@@ -33,6 +33,8 @@ if _plain_code.is_asked_for():  # before anything else is imported
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
+    from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
     from heelstrike.compiler.bundle import Bundle as Bundle
     from heelstrike.compiler.bundle import array as array
     from heelstrike.compiler.bundle import cell as cell
@@ -46,6 +48,7 @@ if TYPE_CHECKING:
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import ComputedTorque as ComputedTorque
     from heelstrike.control import Encoder as Encoder
+    from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import controller as controller
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
@@ -60,7 +63,9 @@ if TYPE_CHECKING:
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
+    from heelstrike.gait import PhasedGait as PhasedGait
     from heelstrike.gait import load_gait as load_gait
+    from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
@@ -109,6 +114,7 @@ _HOME = {
     "KelvinVoigt": "heelstrike.sim",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
+    "PhasedGait": "heelstrike.gait",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
@@ -123,7 +129,9 @@ _HOME = {
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "ViewError": "heelstrike.errors",
+    "VirtualConstraints": "heelstrike.control",
     "WriteError": "heelstrike.errors",
+    "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
@@ -139,12 +147,14 @@ _HOME = {
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
+    "make_invariant": "heelstrike.gait",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
+    "zero_dynamics": "heelstrike.analysis.stability.zero_dynamics",
 }
 
 

@@ -14,6 +14,7 @@ from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
 from heelstrike.analysis.slip import max_slip, slip_distance
 from heelstrike.analysis.sole import Sole, soles
+from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics, zero_dynamics
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
     Stance,
@@ -49,6 +50,7 @@ __all__ = [
     "Summary",
     "SupportPhase",
     "TrackingError",
+    "ZeroDynamics",
     "ZeroMomentPoint",
     "actuator_power",
     "cost_of_transport",
@@ -71,6 +73,7 @@ __all__ = [
     "torque_cost",
     "tracking_error",
     "walking_steps",
+    "zero_dynamics",
     "zero_moment_point",
     "zero_moment_point_limits",
 ]

@@ -110,7 +110,7 @@ def series(coefficients: Floats, joint: int, x: float) -> Spatial:
     # Near the ends the series itself goes on, so that the return map has derivatives: what a later
     # or an earlier touchdown leads to has no kink. Then its curvature fades.
     bent = min(abs(x - inside), FADING)
-    bend = math.copysign(curvature * (bent - 0.5 * bent**2 / FADING), x)
+    bend = math.copysign(bent - 0.5 * bent**2 / FADING, x) * curvature
     sag = curvature * bent**2 * (0.5 - bent / (6.0 * FADING))
     straight = x - inside - math.copysign(bent, x)
     value += (x - inside) * slope + sag + bend * straight
@@ -159,7 +159,9 @@ def exchange_at_touchdown(
 
 
 @kernel
-def want(state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory) -> None:
+def want(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
     """Find what the joints are to do: `memory.wanted` + θ̈ `memory.slope`."""
     foot, half = memory.stance, parameters.half
     x = phase_of_foot(state, parameters, foot)

@@ -1,8 +1,8 @@
 """Hybrid zero dynamics of a gait over its phase, in closed form but for a quadrature.
 
-Where virtual constraints hold, a robot on a point has one degree of freedom left: θ, and the angular
-momentum σ about the stance foot, with θ̇ = κ₁(θ) σ and σ̇ = κ₂(θ), the moment of gravity. Then
-d(σ²/2)/dθ = κ₂/κ₁ whatever the speed, an impact multiplies σ by δ, and the return map of
+Where virtual constraints hold, a robot on a point has one degree of freedom left: θ, and the
+angular momentum σ about the stance foot, with θ̇ = κ₁(θ) σ and σ̇ = κ₂(θ), the moment of gravity.
+Then d(σ²/2)/dθ = κ₂/κ₁ whatever the speed, an impact multiplies σ by δ, and the return map of
 ζ = σ²/2 just before touchdown is the line ζ → δ² ζ + ∫ κ₂/κ₁ dθ (Westervelt, Grizzle and
 Koditschek 2003, *Hybrid zero dynamics of planar biped walkers*, IEEE Transactions on Automatic
 Control 48(1), section V).
@@ -41,6 +41,8 @@ class ZeroDynamics:
     ----------
     gait : PhasedGait
         The gait.
+    ground : Ground
+        Level or sloping ground.
     touchdown : Touchdown
         Where its steps end, and what the impact does.
     contraction : float

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.polynomial.chebyshev import chebfit, chebvander
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import comb
 
 from heelstrike import dynamics
 from heelstrike.errors import GaitError
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.phased.series import fitted, interpolated
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.mirror import Mirror
 
@@ -62,11 +62,10 @@ class PhasedGait:
 
     def __post_init__(self) -> None:
         check_robot(self.robot)
+        _check_foot(self.stance_foot)
         phase = np.array(self.phase, dtype=np.float64)
         coefficients = np.array(self.coefficients, dtype=np.float64)
         first, last = (float(end) for end in self.phase_range)
-        if self.stance_foot not in (0, 1):
-            raise GaitError(f"stance_foot must be 0 or 1, got {self.stance_foot}")
         if phase.shape != (self.robot.nv,) or not np.all(np.isfinite(phase)):
             raise GaitError(f"phase must be {self.robot.nv} finite numbers, got {self.phase!r}")
         if np.any(phase[:2] != 0.0) or phase[2] == 0.0:
@@ -124,6 +123,7 @@ class PhasedGait:
         GaitError
             If the robot or the numbers do not fit.
         """
+        factors = phase_of(robot, stance_foot, phase)
         points = np.asarray(points, dtype=np.float64)
         if points.ndim != 2 or points.shape[0] != robot.nu:
             raise GaitError(
@@ -132,15 +132,20 @@ class PhasedGait:
             )
         degree = points.shape[1] - 1
         order = np.arange(degree + 1)
-        nodes = np.cos(np.pi * (order + 0.5) / (degree + 1))
-        s = 0.5 * (nodes[:, None] + 1.0)
-        bernstein = comb(degree, order) * s**order * (1.0 - s) ** (degree - order)
+
+        def bezier(x: Floats) -> Floats:
+            s = 0.5 * (x[:, None] + 1.0)
+            curve: Floats = (
+                comb(degree, order) * s**order * (1.0 - s) ** (degree - order)
+            ) @ points.T
+            return curve
+
         return cls(
             robot=robot,
             stance_foot=stance_foot,
-            phase=phase_of(robot, stance_foot, phase),
+            phase=factors,
             phase_range=phase_range,
-            coefficients=np.linalg.solve(chebvander(nodes, degree), bernstein @ points.T),
+            coefficients=interpolated(bezier, degree),
         )
 
     @classmethod
@@ -200,22 +205,14 @@ class PhasedGait:
             )
         ends = np.array([theta[0], theta[-1]])
         x = 2.0 * (theta - ends[0]) / (ends[1] - ends[0]) - 1.0
-        slope = 0.5 * (ends[1] - ends[0]) * gait.in_step(time, order=1) / rate[:, None]
-        joints = gait.in_step(time)
-        cubic = chebfit([-1.0, 1.0], joints[[0, -1]], 1)
-        base = _padded(cubic, degree) + _bump(joints, slope, cubic, degree)
-        # What is left is zero at both ends with its slope: (1 - x²)² times a polynomial.
-        window = (1.0 - x**2) ** 2
-        rest = joints - chebvander(x, degree) @ base
-        inner = np.linalg.lstsq(window[:, None] * chebvander(x, max(degree - 4, 0)), rest)[0]
-        if degree >= 4:
-            base = base + _times_window(inner, degree)
+        slopes = 0.5 * (ends[1] - ends[0]) * gait.in_step(time[[0, -1]], order=1)
+        slopes = slopes / rate[[0, -1], None]
         return cls(
             robot=robot,
             stance_foot=gait.stance_foot,
             phase=factors,
             phase_range=(float(ends[0]), float(ends[1])),
-            coefficients=base,
+            coefficients=fitted(x, gait.in_step(time), slopes, degree),
         )
 
     def joints(self, theta: ArrayLike, *, order: int = 0) -> Floats:
@@ -235,23 +232,47 @@ class PhasedGait:
         """
         theta = np.asarray(theta, dtype=np.float64)
         series = [
-            Chebyshev(one, domain=list(self.phase_range)).deriv(order) for one in self.coefficients.T
+            Chebyshev(one, domain=list(self.phase_range)).deriv(order)
+            for one in self.coefficients.T
         ]
         return np.stack([one(theta) for one in series], axis=-1)
 
     def phase_at(self, q: ArrayLike) -> float:
-        """Return the phase of a position in which `stance_foot` stands."""
+        """Return the phase of a position.
+
+        Parameters
+        ----------
+        q : (nq,) array
+            Position in which `stance_foot` stands.
+
+        Returns
+        -------
+        float
+            θ in rad.
+        """
         return float(self.phase @ np.asarray(q, dtype=np.float64))
 
     def joint_mirror(self) -> Floats:
-        """Return the matrix (nu, nu) that mirrors errors or velocities of the actuated joints."""
+        """Return the matrix that mirrors errors or velocities of the actuated joints.
+
+        Returns
+        -------
+        (nu, nu) float
+            Of entries -1, 0 and 1.
+        """
         mirror = self._mirror
         matrix = np.zeros((self.robot.nu, self.robot.nu))
         matrix[np.arange(self.robot.nu), mirror.joint] = mirror.sign
         return matrix
 
     def on_both_feet(self) -> tuple[Floats, Floats]:
-        """Return the factors of the phase, (2, nv), and its constant part, (2,), on either foot."""
+        """Return the phase on either foot.
+
+        Returns
+        -------
+        (2, nv) and (2,) float
+            Factors of the coordinates while foot 0 and foot 1 stand, and what is constant (rad).
+        """
         mirror = self.robot.mirror
         assert mirror is not None  # see check_robot
         factors, constant = np.zeros((2, self.robot.nv)), np.zeros(2)
@@ -261,7 +282,13 @@ class PhasedGait:
         return factors, constant
 
     def coefficients_on_both_feet(self) -> Floats:
-        """Return the series of the joints while either foot stands, (2, terms, nu)."""
+        """Return the series of the joints on either foot.
+
+        Returns
+        -------
+        (2, terms, nu) float
+            `coefficients` while foot 0 and foot 1 stand.
+        """
         mirrored = self.coefficients @ self.joint_mirror().T
         mirrored[0] += self._mirror.offset
         both = [self.coefficients, mirrored]
@@ -290,16 +317,37 @@ class PhasedGait:
             This gait and the cubic that changes its beginning.
         """
         last = self.phase_range[1]
-        degree = max(len(self.coefficients) - 1, 3)
-        nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-        s = 0.5 * (nodes[:, None] + 1.0)
         width = last - theta
-        joints = self.joints(theta + width * s[:, 0])
         missing = position - self.joints(theta)
         bend = width * (slope - self.joints(theta, order=1))
-        joints = joints + (1.0 - s) ** 2 * ((1.0 + 2.0 * s) * missing + s * bend)
-        coefficients = np.linalg.solve(chebvander(nodes, degree), joints)
-        return replace(self, phase_range=(theta, last), coefficients=coefficients)
+
+        def changed(x: Floats) -> Floats:
+            s = 0.5 * (x[:, None] + 1.0)
+            cubic = (1.0 - s) ** 2 * ((1.0 + 2.0 * s) * missing + s * bend)
+            return self.joints(theta + width * s[:, 0]) + cubic
+
+        degree = max(len(self.coefficients) - 1, 3)
+        return replace(self, phase_range=(theta, last), coefficients=interpolated(changed, degree))
+
+    def with_end(self, theta: float) -> PhasedGait:
+        """Return the same gait on a range of the phase that ends elsewhere.
+
+        Parameters
+        ----------
+        theta : float
+            Phase at the end (rad).
+
+        Returns
+        -------
+        PhasedGait
+            The gait.
+        """
+        first = self.phase_range[0]
+        half = 0.5 * (theta - first)
+        coefficients = interpolated(
+            lambda x: self.joints(first + half * (x + 1.0)), len(self.coefficients) - 1
+        )
+        return replace(self, phase_range=(first, theta), coefficients=coefficients)
 
 
 def check_robot(robot: Robot) -> None:
@@ -333,6 +381,7 @@ def check_robot(robot: Robot) -> None:
 def phase_of(robot: Robot, stance_foot: int, factors: Mapping[str, float] | None) -> Floats:
     """Return the factors of a phase, (nv,): those named, or of the angle of the stance leg."""
     check_robot(robot)
+    _check_foot(stance_foot)
     if factors is not None:
         unknown = set(factors) - set(robot.joint_names)
         if unknown:
@@ -360,22 +409,6 @@ def phase_of(robot: Robot, stance_foot: int, factors: Mapping[str, float] | None
     return np.asarray(phase, dtype=np.float64)
 
 
-def _padded(series: Floats, degree: int) -> Floats:
-    return np.pad(series, ((0, degree + 1 - len(series)), (0, 0)))
-
-
-def _bump(joints: Floats, slope: Floats, line: Floats, degree: int) -> Floats:
-    """Cubic, zero at both ends, that mends the slopes of a line there."""
-    begin, end = slope[0] - line[1], slope[-1] - line[1]
-    # (1 - x²)(a + b x): slope 2 (a - b) at -1, and -2 (a + b) at 1.
-    a, b = 0.25 * (begin - end), -0.25 * (begin + end)
-    # 1 - x² = (T₀ - T₂)/2, x - x³ = (T₁ - T₃)/4.
-    return _padded(np.array([0.5 * a, 0.25 * b, -0.5 * a, -0.25 * b]), degree)
-
-
-def _times_window(inner: Floats, degree: int) -> Floats:
-    """Series of (1 - x²)² times a series."""
-    window = np.array([0.375, 0.0, -0.5, 0.0, 0.125])  # in T₀ … T₄
-    return np.stack([np.polynomial.chebyshev.chebmul(window, one) for one in inner.T], axis=1)[
-        : degree + 1
-    ]
+def _check_foot(stance_foot: int) -> None:
+    if stance_foot not in (0, 1):
+        raise GaitError(f"stance_foot must be 0 or 1, got {stance_foot!r}")

@@ -182,10 +182,12 @@ class Surface:
                 "ground"
             )
         place = min(down, key=lambda k: abs(phases[k] - last))
-        return float(brentq(self.swing_gap, phases[place], phases[place + 1], xtol=1e-15, rtol=1e-15))
+        return float(
+            brentq(self.swing_gap, phases[place], phases[place + 1], xtol=1e-15, rtol=1e-15)
+        )
 
 
-def invariant(gait: PhasedGait, ground: Ground | None = None) -> PhasedGait:
+def make_invariant(gait: PhasedGait, ground: Ground | None = None) -> PhasedGait:
     """Change the beginning of a gait so that its own impact leads there, with the right slopes.
 
     After Westervelt, Grizzle and Koditschek (2003), theorem 4: the first two coefficients of the
@@ -212,21 +214,5 @@ def invariant(gait: PhasedGait, ground: Ground | None = None) -> PhasedGait:
     if not end.rate > 0.0:
         raise GaitError("the impact at the end of the gait turns its phase back; it cannot repeat")
     driven = gait.robot.model.actuator_joint
-    whole = gait.with_start(gait.phase_range[0], *_start(gait, gait.phase_range[0]))
-    ended = PhasedGait(
-        robot=gait.robot, stance_foot=gait.stance_foot, phase=gait.phase,
-        phase_range=(gait.phase_range[0], end.before), coefficients=_on(whole, end.before),
-    )  # fmt: skip
-    return ended.with_start(end.after, end.position[driven], end.velocity[driven] / end.rate)
-
-
-def _start(gait: PhasedGait, theta: float) -> tuple[Floats, Floats]:
-    return gait.joints(theta), gait.joints(theta, order=1)
-
-
-def _on(gait: PhasedGait, last: float) -> Floats:
-    """Coefficients of the same joints' motion on a range that ends elsewhere."""
-    first, degree = gait.phase_range[0], len(gait.coefficients) - 1
-    nodes = np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    joints = gait.joints(first + 0.5 * (last - first) * (nodes + 1.0))
-    return np.linalg.solve(np.polynomial.chebyshev.chebvander(nodes, degree), joints)
+    start = end.position[driven], end.velocity[driven] / end.rate
+    return gait.with_end(end.before).with_start(end.after, *start)
