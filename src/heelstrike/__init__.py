@@ -33,6 +33,12 @@ if _plain_code.is_asked_for():  # before anything else is imported
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.analysis.stability.largest import Largest as Largest
+    from heelstrike.analysis.stability.largest import largest_ground_step as largest_ground_step
+    from heelstrike.analysis.stability.largest import largest_push as largest_push
+    from heelstrike.analysis.stability.largest import largest_roughness as largest_roughness
+    from heelstrike.analysis.stability.largest import largest_slope as largest_slope
+    from heelstrike.analysis.stability.trial import Trial as Trial
     from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
     from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
     from heelstrike.compiler.bundle import Bundle as Bundle
@@ -112,6 +118,7 @@ _HOME = {
     "HuntCrossley": "heelstrike.sim",
     "InfeasibleGaitError": "heelstrike.errors",
     "KelvinVoigt": "heelstrike.sim",
+    "Largest": "heelstrike.analysis.stability.largest",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
     "PhasedGait": "heelstrike.gait",
@@ -128,6 +135,7 @@ _HOME = {
     "Snapshot": "heelstrike.sim",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",
     "VirtualConstraints": "heelstrike.control",
     "WriteError": "heelstrike.errors",
@@ -143,6 +151,10 @@ _HOME = {
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
+    "largest_ground_step": "heelstrike.analysis.stability.largest",
+    "largest_push": "heelstrike.analysis.stability.largest",
+    "largest_roughness": "heelstrike.analysis.stability.largest",
+    "largest_slope": "heelstrike.analysis.stability.largest",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",

@@ -136,14 +136,16 @@ def largest_push(
     Examples
     --------
     >>> import heelstrike as hs
-    >>> robot = hs.load_robot("bravo7")
-    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, friction=0.75)
+    >>> robot = hs.load_robot("rabbit")
+    >>> gait = hs.optimize_gait(robot, step_length=0.3, step_duration=0.4, friction=0.6, starts=1)
+    >>> phased = hs.PhasedGait.from_gait(robot, gait)
+    >>> zero = hs.zero_dynamics(phased)
     >>> trial = hs.Trial(
-    ...     robot=robot, controller=hs.ComputedTorque(robot, gait), state=gait.initial_state,
-    ...     step_length=0.30, step_duration=0.70, settling=2.0,
+    ...     robot=robot, controller=hs.VirtualConstraints(phased), state=zero.initial_state,
+    ...     step_length=zero.step_length, step_duration=zero.period,
     ... )
-    >>> print(hs.largest_push(trial, phase=0.4, most=16.0, strides=2, halvings=0))
-    0 N s (not 8)
+    >>> print(hs.largest_push(trial, phase=0.4, most=20.0, strides=2, halvings=0))
+    10 N s (not 20)
     """
     size = float(np.hypot(*direction))
     if not (0.0 <= phase <= 1.0 and size > 0.0 and duration > 0.0):
