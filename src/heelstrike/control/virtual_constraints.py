@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import point_bias_acceleration
-from heelstrike.dynamics.spatial import Spatial
+from heelstrike.dynamics.places import point_columns
+from heelstrike.dynamics.spatial import Spatial, cross
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats
@@ -26,13 +27,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller, per_actuator
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import (
-    complete,
-    cross,
-    force_wanted,
-    joint_torques,
-    point_columns,
-)
+from heelstrike.sim.controller.stance import complete, force_wanted, joint_torques
 
 # A swing foot that meets the ground before this share of the step scuffs; after it, it lands.
 LANDS_AFTER = 0.5

@@ -161,7 +161,7 @@ def largest_push(
             link, force=(force * direction[0], force * direction[1]), start=begin, duration=duration
         )
         run = trial.run(begin + duration, pushes=[push] if impulse > 0.0 else [])
-        return trial.recovered(run)
+        return bool(trial.recovered(run, (begin, begin + duration)))
 
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="N s")
 
@@ -198,7 +198,7 @@ def largest_slope(
         edge = _edge(trial)
         rise = sign * np.tan(np.deg2rad(degrees)) * FAR
         ground = _ground(trial, [(edge - 1.0, 0.0), (edge, 0.0), (edge + FAR, rise)])
-        return trial.recovered(trial.run(trial.begins, ground=ground), same_speed=False)
+        return _walks_on(trial, ground, same_speed=False)
 
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="degrees")
 
@@ -235,7 +235,7 @@ def largest_ground_step(
         edge, rise = _edge(trial), sign * height
         corners = [(edge - 1.0, 0.0), (edge, 0.0), (edge, rise), (edge + FAR, rise)]
         ground = trial.ground if height == 0.0 else _ground(trial, corners)
-        return trial.recovered(trial.run(trial.begins, ground=ground))
+        return _walks_on(trial, ground, same_speed=True)
 
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="m")
 
@@ -276,9 +276,14 @@ def largest_roughness(
             amplitude=amplitude, spacing=spacing, length=length, seed=seed, start=_edge(trial),
             friction=_friction(trial),
         )  # fmt: skip
-        return trial.recovered(trial.run(trial.begins, ground=ground), same_speed=False)
+        return _walks_on(trial, ground, same_speed=False)
 
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="m")
+
+
+def _walks_on(trial: Trial, ground: Ground, *, same_speed: bool) -> bool:
+    run = trial.run(trial.begins, ground=ground)
+    return bool(trial.recovered(run, (trial.begins, trial.begins), same_speed=same_speed))
 
 
 def _edge(trial: Trial) -> float:

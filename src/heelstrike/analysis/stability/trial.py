@@ -1,9 +1,4 @@
-"""A walk that is disturbed, and whether it recovers.
-
-Strict recovery: the run completes, the hip stays above 0.65 of its height over the ground, the
-trunk leans less than 0.6 rad from where it began, and at the end the robot walks as it did before.
-To have completed is not enough: a robot that kneels, stands or walks backwards completes.
-"""
+"""A walk that is disturbed, and whether it recovers."""
 
 from __future__ import annotations
 
@@ -12,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.contact.ground import Ground
 from heelstrike.control import Law
 from heelstrike.errors import SimulationError
@@ -24,14 +20,13 @@ from heelstrike.sim.simulation import simulate
 from heelstrike.sim.time_stepping.method import TimeStepping
 from heelstrike.sim.whole_run import whole
 
-# Hip height as a part of that at first, and lean (rad) from it, that still count as upright.
-LOWEST_HIP = 0.65
-MOST_LEAN = 0.6
-# Over so many last steps the speed is taken, and this part of it may differ after a push.
-LAST_STEPS = 4.0
-NORMAL = 0.2
-# On other ground a walk is another one; it must get on at this part of its speed.
-GETS_ON = 0.3
+# Steps of the method between two rows, of which a verdict needs few.
+ROWS = 5
+# Time (s) simulated beyond the verdict: methods with steps end on one.
+BEYOND = 0.02
+# Part of the speed that may differ after a push, and on other ground.
+NORMAL = 0.25
+GETS_ON = 0.7
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -56,6 +51,8 @@ class Trial:
         Steps before a disturbance.
     settling : float
         How long after a disturbance the walk has to be normal again, in s.
+    pitch : float
+        Largest angle of the trunk from the upright, in rad.
     control_period : float or None
         As of :func:`~heelstrike.simulate`.
 
@@ -74,6 +71,7 @@ class Trial:
     ground: Ground = field(default_factory=Ground)
     undisturbed: int = 2
     settling: float = 7.0
+    pitch: float = 0.6
     control_period: float | None = None
 
     def __post_init__(self) -> None:
@@ -82,7 +80,7 @@ class Trial:
                 f"trials of balance need a robot with a trunk that floats; {self.robot.name!r} is "
                 "none"
             )
-        for name in ("step_length", "step_duration", "settling"):
+        for name in ("step_length", "step_duration", "settling", "pitch"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise SimulationError(f"{name} of a trial must be positive, got {value!r}")
@@ -117,40 +115,42 @@ class Trial:
         SimulationError
             If an argument is not usable.
         """
-        given: dict[str, Any] = {"ground": self.ground, "control_period": self.control_period}
+        given: dict[str, Any] = {
+            "ground": self.ground, "control_period": self.control_period, "record_every": ROWS,
+        }  # fmt: skip
         return whole(
             simulate(
-                self.robot, self.controller, state=self.state, duration=until + self.settling,
-                method=self.method, **(given | disturbed),
+                self.robot, self.controller, state=self.state,
+                duration=until + self.settling + BEYOND, method=self.method, **(given | disturbed),
             )
         )  # fmt: skip
 
-    def recovered(self, run: Run, *, same_speed: bool = True) -> bool:
-        """Whether a disturbed walk is upright throughout and walks on at its end.
+    def recovered(
+        self, run: Run, disturbed: tuple[float, float], *, same_speed: bool = True
+    ) -> Recovery:
+        """Judge a disturbed walk; see :func:`~heelstrike.recovery`.
 
         Parameters
         ----------
         run : Run
             The walk.
+        disturbed : (2,) float
+            When the disturbance began and ended, in s.
         same_speed : bool
-            Whether its speed must be the old one, to a fifth; else it must get on at all, at three
-            tenths of it.
+            Whether the speed must be the old one, to a quarter; else the robot must get on at all,
+            between three and seventeen tenths of it: on other ground a walk is another one.
 
         Returns
         -------
-        bool
-            Whether it is.
+        Recovery
+            True in a condition if it recovered.
+
+        Raises
+        ------
+        SimulationError
+            If the run has no rows.
         """
-        if not run.completed:
-            return False
-        height = run.position[:, 1] - run.ground.height(run.position[:, 0])
-        first = self.state.q[1] - run.ground.height(self.state.q[0])
-        lean = np.abs(run.position[:, 2] - self.state.q[2])
-        if height.min() < LOWEST_HIP * first or lean.max() > MOST_LEAN:
-            return False
-        last = run.time >= run.time[-1] - LAST_STEPS * self.step_duration
-        place = run.position[last, 0]
-        speed = float((place[-1] - place[0]) / np.ptp(run.time[last]))
-        if same_speed:
-            return abs(speed - self.speed) <= NORMAL * abs(self.speed)
-        return speed / self.speed >= GETS_ON
+        return recovery(
+            run, pushed=disturbed, normal_speed=self.speed, after=self.settling, pitch=self.pitch,
+            speed=NORMAL if same_speed else GETS_ON,
+        )  # fmt: skip
