@@ -269,6 +269,16 @@ class Simulation:
     def parameters(self, parameters: Bundle) -> None:
         self._numbers.set_parameters(parameters)
 
+    @property
+    def memory(self) -> Bundle:
+        """What a law remembers now; what is written into it, it remembers at its next call."""
+        return self._numbers.memory
+
+    @property
+    def log(self) -> Bundle:
+        """What a controller told of itself when it was last called."""
+        return self._logs.log
+
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
 
@@ -481,9 +491,10 @@ class Simulation:
                 "gains"
             )
         if outcome is Outcome.SOLVER_FAILED:
+            reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
