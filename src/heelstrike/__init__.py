@@ -103,6 +103,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
+    from heelstrike.view.live import watch as watch
     from heelstrike.view.report import report as report
 
 __version__ = "0.1.0"
@@ -182,6 +183,7 @@ _HOME = {
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
+    "watch": "heelstrike.view.live",
     "zero_dynamics": "heelstrike.analysis.stability.zero_dynamics",
 }
 
