@@ -78,7 +78,9 @@ def test_a_socket_without_an_origin_is_no_browser_of_ours() -> None:
     assert admitted("/live?token=TOKEN", Origin=None) is None
 
 
-@pytest.mark.parametrize("path", ["//live", "/live/", "/../live", "/favicon.ico", "", "/LIVE"])
+@pytest.mark.parametrize(
+    "path", ["//live", "//[", "http://[/live", "/live/", "/../live", "/favicon.ico", "", "/LIVE"]
+)
 def test_there_are_no_other_paths(path: str) -> None:
     assert admitted(f"{path}?token=TOKEN") is None
 

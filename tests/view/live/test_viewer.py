@@ -67,6 +67,7 @@ def test_the_browser_is_given_a_file_that_nobody_else_reads(
     pytest.importorskip("websockets")
     opened: list[str] = []
     monkeypatch.setattr(webbrowser, "open", lambda url: bool(opened.append(url)) or True)
+    monkeypatch.setattr(webbrowser, "get", lambda: webbrowser.BackgroundBrowser("some"))
     with hs.watch(walking.walk(steps=1), block=False) as viewer:
         (given,) = opened
         token = viewer.url.partition("token=")[2]
@@ -78,6 +79,21 @@ def test_the_browser_is_given_a_file_that_nobody_else_reads(
         if sys.platform != "win32":
             assert stat.S_IMODE(way.parent.stat().st_mode) == 0o700
     assert not way.exists()
+
+
+def test_a_browser_of_texts_does_not_take_the_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("websockets")
+    monkeypatch.delenv("BROWSER", raising=False)
+    monkeypatch.setattr(webbrowser, "get", lambda: webbrowser.GenericBrowser("w3m"))
+    monkeypatch.setattr(webbrowser, "open", lambda url: pytest.fail("opened a browser"))
+    with hs.watch(walking.walk(steps=1), browser=False, block=False) as viewer:
+        assert not viewer.open()
+
+        def none() -> None:
+            raise webbrowser.Error("there is none")
+
+        monkeypatch.setattr(webbrowser, "get", none)
+        assert not viewer.open()
 
 
 def test_when_it_is_closed_the_simulation_is_there_to_go_on() -> None:

@@ -45,7 +45,10 @@ class Gate:
         host = header("Host")
         if host not in [f"{name}:{port}" for name in NAMES]:
             return None
-        parts = urlsplit(target)
+        try:
+            parts = urlsplit(target)
+        except ValueError:  # no address at all
+            return None
         given = parse_qs(parts.query).get("token", [""])
         if len(given) != 1 or not secrets.compare_digest(given[0].encode(), self.token.encode()):
             return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import os
 import sys
 import tempfile
 import threading
@@ -99,7 +100,7 @@ class Viewer:
             encoding="utf-8",
         )
         with suppress(webbrowser.Error):
-            return webbrowser.open(way.as_uri())
+            return not _in_terminal() and webbrowser.open(way.as_uri())
         return False
 
     def wait(self) -> None:
@@ -203,6 +204,11 @@ def view(
     board = Board()
     session = Session(board, stage=stage, run=run, rate=rate)
     return Viewer(session, Server(board, session.ask, live_page(), port=port))
+
+
+def _in_terminal() -> bool:
+    """Whether the browser found is one of texts, which would take the terminal and draw nothing."""
+    return type(webbrowser.get()) is webbrowser.GenericBrowser and "BROWSER" not in os.environ
 
 
 def _in_notebook() -> bool:
