@@ -347,7 +347,7 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
         part = first_event(scene, length, control, memory, phase)
         phase.has_fired = 0 if part == NO_EVENT else 1
         good, fits = True, True
-        for attempt in range(ATTEMPTS):
+        for _ in range(ATTEMPTS):
             if part == NO_EVENT:
                 break
             length, good, fits = end_at_event(scene, length * part, control, memory, phase)
