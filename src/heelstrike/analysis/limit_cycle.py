@@ -162,18 +162,7 @@ def find_limit_cycle(
     """
     ground = Ground() if ground is None else ground
     method = EventDriven(rtol=1e-12, atol=1e-13) if method is None else method
-    if not isinstance(method, EventDriven):
-        raise SimulationError(
-            f"limit cycles need the event-driven method, got {type(method).__name__}: no other "
-            "finds touchdowns sharply enough"
-        )
-    if len(ground.model().friction) > 1:
-        raise SimulationError("limit cycles need flat or sloping ground, the same at every step")
-    if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
-        raise SimulationError(
-            f"limit cycles need a robot that is free to move along the ground; the first two "
-            f"coordinates of {robot.name!r} are not its position x, z"
-        )
+    _check(robot, ground, method)
     section = Section(robot, ground)
     step = PoincareMap(
         section, controller, method, landing, symmetry, longest_step, control_period,
@@ -207,6 +196,22 @@ def find_limit_cycle(
         f"no limit cycle of robot {robot.name!r} in {max_iterations} iterations: its state still "
         f"changes by {residual:.3g} from step to step; begin nearer to the cycle"
     )
+
+
+def _check(robot: Robot, ground: Ground, method: Any) -> None:
+    """Refuse what has no limit cycles that are found here."""
+    if not isinstance(method, EventDriven):
+        raise SimulationError(
+            f"limit cycles need the event-driven method, got {type(method).__name__}: no other "
+            "finds touchdowns sharply enough"
+        )
+    if len(ground.model().friction) > 1:
+        raise SimulationError("limit cycles need flat or sloping ground, the same at every step")
+    if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
+        raise SimulationError(
+            f"limit cycles need a robot that is free to move along the ground; the first two "
+            f"coordinates of {robot.name!r} are not its position x, z"
+        )
 
 
 @dataclass(frozen=True)

@@ -569,17 +569,9 @@ class Simulation:
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
         self._shown = read_only(memory.contacts)
-        memory.stiffness[:] = robot.model.stiffness
-        memory.damping[:] = robot.model.damping
         if law is not None:
             self._name = f"controller {law.function.name!r}"
-            driven = robot.model.actuator_joint
-            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
-            memory.damping[driven] += 0.0 if law.damping is None else law.damping
-        if voltage:
-            driven = robot.model.actuator_joint
-            speed = robot.model.no_load_speed[driven]
-            memory.damping[driven] += robot.model.stall_torque[driven] / speed
+        self._take_gains(law, voltage)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
@@ -594,6 +586,18 @@ class Simulation:
         clock.answered = 0
         known = self._numbers.robot
         self._watch = Watch((robot,) if known is robot else (robot, known), ready, memory)
+
+    def _take_gains(self, law: Law | None, voltage: bool) -> None:
+        """Note which joint forces an implicit scheme takes at the end of a step."""
+        model, memory = self.robot.model, self._memory
+        driven = model.actuator_joint
+        memory.stiffness[:] = model.stiffness
+        memory.damping[:] = model.damping
+        if law is not None:
+            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
+            memory.damping[driven] += 0.0 if law.damping is None else law.damping
+        if voltage:
+            memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course hangs on.

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.method import Method
+from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import simulate
 from heelstrike.sim.time_stepping.method import TimeStepping
@@ -95,15 +96,19 @@ class Trial:
         """When a disturbance may begin, in s."""
         return self.undisturbed * self.step_duration
 
-    def run(self, until: float, **disturbed: Any) -> Run:
+    def run(
+        self, until: float, *, pushes: Sequence[Push] = (), ground: Ground | None = None
+    ) -> Run:
         """Walk for as long as it takes to settle after an instant.
 
         Parameters
         ----------
         until : float
             When the disturbance is over, in s.
-        **disturbed
-            Arguments of :func:`~heelstrike.simulate` that make the disturbance.
+        pushes : sequence of Push
+            What pushes the robot.
+        ground : Ground, optional
+            What lies there instead of the trial's own ground.
 
         Returns
         -------
@@ -115,15 +120,19 @@ class Trial:
         SimulationError
             If an argument is not usable.
         """
-        given: dict[str, Any] = {
-            "ground": self.ground, "control_period": self.control_period, "record_every": ROWS,
-        }  # fmt: skip
         return whole(
             simulate(
-                self.robot, self.controller, state=self.state,
-                duration=until + self.settling + BEYOND, method=self.method, **(given | disturbed),
+                self.robot,
+                self.controller,
+                state=self.state,
+                duration=until + self.settling + BEYOND,
+                method=self.method,
+                ground=self.ground if ground is None else ground,
+                control_period=self.control_period,
+                record_every=ROWS,
+                pushes=pushes,
             )
-        )  # fmt: skip
+        )
 
     def recovered(
         self, run: Run, disturbed: tuple[float, float], *, same_speed: bool = True
