@@ -175,11 +175,13 @@ def test_a_robot_that_does_not_walk() -> None:
 
 
 def test_no_solver_certifies_the_first_instant() -> None:
-    """A run without rows is a step that is not completed, told in words.
+    """A run that ends after some bridges is a step that is not completed, told in words.
 
     The mass matrix of a wheel with next to no inertia is singular to working precision.
     """
-    with pytest.raises(hs.LimitCycleError, match=r"did not complete a step \(no contact solver"):
+    with pytest.raises(
+        hs.LimitCycleError, match=r"did not complete a step in [\d.e-]+ s \(no contact solver"
+    ):
         hs.find_limit_cycle(
             mechanisms.rimless_wheel(inertia=1e-12),
             wheel_state(0.15, 1.5),

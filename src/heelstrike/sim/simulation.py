@@ -492,9 +492,10 @@ class Simulation:
                 "gains"
             )
         if outcome is Outcome.SOLVER_FAILED:
+            reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
@@ -647,6 +648,22 @@ class Simulation:
         self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
         self.error = None
 
+    def forget(self) -> None:
+        """Forget what was: the record begins anew, and pushes that are over are gone from it.
+
+        How it goes on does not change. For simulations without an end, whose record is looked at
+        piece by piece.
+        """
+        self._recorded_until = self.time
+        self._records.clear()
+        if any(push.end < self.time for push in self._pushes):
+            kept = [i for i, push in enumerate(self._pushes) if push.end >= self.time]
+            share = self._memory.pushes.share[kept].copy()
+            self._pushes = tuple(self._pushes[i] for i in kept)
+            pushes = pushes_on(self.robot, self._pushes)
+            pushes.share[:] = share
+            self._memory = self._memory.replaced(pushes=pushes)
+
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
         before: list[tuple[Bundle, dict[str, Any]]] = []
@@ -732,6 +749,8 @@ class Simulation:
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
+        if not self._records:
+            self._new_record()
         return Run(
             robot=self.robot,
             ground=self._ground,

@@ -40,7 +40,12 @@ from heelstrike.sim.run import (
 
 _ENDED_WELL = (RunStatus.COMPLETED, RunStatus.FELL, RunStatus.INTERRUPTED)
 """Ends of runs of which every number is finite."""
-_JOINT_EVENTS = (EventKind.JOINT_STOP, EventKind.JOINT_SLIP, EventKind.JOINT_STICK)
+_JOINT_EVENTS = (
+    EventKind.JOINT_STOP,
+    EventKind.JOINT_SLIP,
+    EventKind.JOINT_STICK,
+    EventKind.BRIDGE,  # of the whole robot, but every robot has a joint
+)
 
 
 def stored_run(
