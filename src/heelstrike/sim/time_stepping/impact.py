@@ -49,8 +49,8 @@ TOUCHING = 1e-9
 NEVER = -2
 
 # What is no deeper in the ground or beyond a stop than this (m, rad) may be left there, if there is
-# no way out: a few times what turning makes of a gap that is closed.
-WEDGED_BY = 1e-6
+# no way out: what turning makes of a gap that is closed, h² ω² l / 2, at 20 rad/s and 1 ms.
+WEDGED_BY = 1e-4
 WEDGED = int(EventKind.WEDGED)
 
 
