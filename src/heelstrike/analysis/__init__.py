@@ -12,13 +12,15 @@ from heelstrike.analysis.friction import FrictionUse, friction_use
 from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
+from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.analysis.slip import max_slip, slip_distance
-from heelstrike.analysis.sole import Sole, soles
+from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics, zero_dynamics
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
     Stance,
     SupportPhase,
     double_support_fraction,
+    phase_time,
     single_support,
     stances,
     support_phases,
@@ -36,6 +38,7 @@ from heelstrike.analysis.zero_moment_point import (
     zero_moment_point,
     zero_moment_point_limits,
 )
+from heelstrike.robot.sole import Sole, soles
 
 __all__ = [
     "CostOfTransport",
@@ -43,12 +46,14 @@ __all__ = [
     "FrictionUse",
     "LimitCycle",
     "Motion",
+    "Recovery",
     "ReferenceMotion",
     "Sole",
     "Stance",
     "Summary",
     "SupportPhase",
     "TrackingError",
+    "ZeroDynamics",
     "ZeroMomentPoint",
     "actuator_power",
     "cost_of_transport",
@@ -60,6 +65,8 @@ __all__ = [
     "friction_use",
     "max_slip",
     "penetration",
+    "phase_time",
+    "recovery",
     "reference_motion",
     "run_motion",
     "single_support",
@@ -71,6 +78,7 @@ __all__ = [
     "torque_cost",
     "tracking_error",
     "walking_steps",
+    "zero_dynamics",
     "zero_moment_point",
     "zero_moment_point_limits",
 ]

@@ -194,6 +194,11 @@ class Ground:
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import ground_card
+
+        return ground_card(self)
+
     def numbers(self) -> dict[str, Floats]:
         """Return the ground as arrays that :meth:`of_numbers` makes it of."""
         return {

@@ -6,7 +6,17 @@ import enum
 
 
 class RunStatus(enum.Enum):
-    """How a run ended."""
+    """How a run ended; ``run.message`` says it in words, with the time.
+
+    ``COMPLETED``, ``FELL``
+        The time is up; the centre of mass sank below half its first height.
+    ``DIVERGED``
+        The state stopped being finite.
+    ``SOLVER_FAILED``
+        No contact forces or impulses could be certified. An event-driven run tries bridges first.
+    ``CONTROLLER_FAILED``, ``INTERRUPTED``
+        The controller raised, or asked for what is no number; somebody pressed Ctrl-C.
+    """
 
     COMPLETED = "completed"
     FELL = "fell"
@@ -26,7 +36,8 @@ class EventKind(enum.IntEnum):
     ``IMPACT``
         It was on the ground and received an impulse from an impact elsewhere.
     ``ZENO``
-        Its ever smaller bounces have come to an end, and it stays on the ground.
+        Its ever smaller bounces have come to an end, and it stays on the ground. Bounces shorter
+        than 1e-8 s are not followed, nor what restitution is in those shorter than 1e-6 s.
     ``PAINLEVE``
         No contact force, or several, agreed with the laws of motion and friction. With an impulse:
         the velocity jumped without a collision. Without: one of the solutions was chosen.
@@ -38,6 +49,11 @@ class EventKind(enum.IntEnum):
     ``JOINT_SLIP``, ``JOINT_STICK``
         A joint with dry friction broke away, or turned round; it came to rest. The event's
         `contact` is the index of the joint.
+    ``BRIDGE``
+        Contact events piled up without time moving on, or no forces agreed with the laws: a short
+        time is bridged by impulses at its beginning, which are told of by events of their own. The
+        event's `impulse` is the length of the bridge (s) and how far its end may be wrong (the
+        largest error of a coordinate or velocity), its `contact` zero.
     ``WEDGED``
         It is in the ground, by so little as rounding and turning explain, and neither it nor a
         joint can be pushed out without the other being pressed in: from here on they are left where
@@ -56,6 +72,7 @@ class EventKind(enum.IntEnum):
     JOINT_STOP = 9
     JOINT_SLIP = 10
     JOINT_STICK = 11
+    BRIDGE = 12
     WEDGED = 13
 
 

@@ -35,7 +35,7 @@ from heelstrike.sim.controller.law import CONTROLLER_TYPE
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import center_height, sound
+from heelstrike.sim.record.recording import center_height, note_log, sound
 
 
 class Outcome(enum.IntEnum):
@@ -135,15 +135,9 @@ def frame(kernels: Kernels) -> Callable[..., int]:
     report, move = kernels.report, kernels.move
 
     def advance(
-        controller: Any,
-        model: Model,
-        ground: GroundModel,
-        control: Control,
-        memory: Memory,
-        work: Any,
-        record: Record,
-        clock: Clock,
-    ) -> int:
+        controller: Any, model: Model, ground: GroundModel, control: Control, memory: Memory,
+        work: Any, record: Record, clock: Clock,
+    ) -> int:  # fmt: skip
         """Advance a simulation until its time is up or something stops it; return what."""
         scene = Scene(controller, model, ground)
         while True:
@@ -176,6 +170,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 code = decide(scene, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
                     report(scene, control, memory, work, record, clock)
+                note_log(control.kept, control.logged, record)
                 if code != DONE:
                     return code
                 if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
@@ -184,6 +179,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     return DONE
                 clock.moving = 1
             code = move(scene, control, memory, work, record, clock)
+            note_log(control.kept, control.logged, record)
             if code != DONE:
                 return code
             clock.moving = 0

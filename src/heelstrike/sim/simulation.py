@@ -178,6 +178,7 @@ class Simulation:
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
         self.robot, self.method, self._setting = setting.robot, method, setting
+        self._given_period = setting.control_period
         self._ground, self._pushes = setting.ground, setting.pushes
         method.check(setting)
         self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
@@ -267,6 +268,16 @@ class Simulation:
     @parameters.setter
     def parameters(self, parameters: Bundle) -> None:
         self._numbers.set_parameters(parameters)
+
+    @property
+    def memory(self) -> Bundle:
+        """What a law remembers now; what is written into it, it remembers at its next call."""
+        return self._numbers.memory
+
+    @property
+    def log(self) -> Bundle:
+        """What a controller told of itself when it was last called."""
+        return self._logs.log
 
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
@@ -442,6 +453,9 @@ class Simulation:
             )
         self._memory.command[:] = torque
         self._clock.answered = 1
+        told = self._numbers.log if isinstance(self._python, AskedLaw) else self._python_log
+        if told is not None:
+            self._logs.log.become(told)
         return ""
 
     @property
@@ -477,9 +491,10 @@ class Simulation:
                 "gains"
             )
         if outcome is Outcome.SOLVER_FAILED:
+            reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
@@ -498,7 +513,8 @@ class Simulation:
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
         rows = min(CHUNK, rows + clock.row_margin)
         try:
-            record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin)
+            words = self._control.logged.size
+            record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin, words)
         except MemoryError as error:
             if not self._records:
                 raise SimulationError("there is no memory left to record anything in") from error
@@ -514,50 +530,74 @@ class Simulation:
         """Count the events of a record and forget it."""
         kinds = record.event_kind[: record.events]
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
-        record.rows = record.events = 0
+        record.rows = record.events = record.logged = 0
 
     def _control_with(self, controller: Controller | None) -> None:
         """Begin with a controller, or stay with the one before if this one cannot be used."""
-        robot, setting, memory, clock = self.robot, self._setting, self._memory, self._clock
+        robot, memory, clock = self.robot, self._memory, self._clock
         law = law_of(controller)
+        setting = self._setting
+        if self._given_period is None:
+            setting = replace(setting, control_period=None if law is None else law.period)
+        elif law is not None and law.keeps_period and setting.control_period != law.period:
+            raise ControllerError(
+                f"controller {law.function.name!r} keeps time by its own period of {law.period} s: "
+                f"leave control_period = {setting.control_period} s out, or make it with that one"
+            )
         python: Any = controller if law is None else None
         if law is not None and controller is not None:
             in_python = setting.checked or not law.function.compiles
             python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
         compiled = Law(no_torque) if law is None or python is not None else law
-        ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts)
+        told = getattr(controller, "log", None) if law is None else None
+        told = told if isinstance(told, Bundle) else None
+        begin = python.numbers.log if isinstance(python, AskedLaw) else told
+        ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts, begin)
+        if self._records and self._records[-1].log.shape[1] != ready.control.logged.size:
+            raise SimulationError(
+                "this controller logs other things than the one before, and rows are recorded: "
+                "begin another simulation with it, from state=simulation.state"
+            )
         self._kernel = compiled.function.finish()
+        voltage = commands_voltage(controller, robot)
+        self.method.set_clock(setting, clock)
+        self._setting, self._logs, self._python_log = setting, ready, told
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
-        voltage = commands_voltage(controller, robot)
         self._control.voltage = voltage
         self._name = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
         self._shown = read_only(memory.contacts)
-        memory.stiffness[:] = robot.model.stiffness
-        memory.damping[:] = robot.model.damping
         if law is not None:
             self._name = f"controller {law.function.name!r}"
-            driven = robot.model.actuator_joint
-            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
-            memory.damping[driven] += 0.0 if law.damping is None else law.damping
-        if voltage:
-            driven = robot.model.actuator_joint
-            speed = robot.model.no_load_speed[driven]
-            memory.damping[driven] += robot.model.stall_torque[driven] / speed
-        self.method.set_clock(setting, clock)
+        self._take_gains(law, voltage)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
             self._control.in_python = 1
             if setting.control_period is None and self.method.python_period is not None:
                 clock.control_period = self.method.python_period
+        step, every = self.method.step_length, clock.control_every
+        self._numbers.control.robot.period = clock.control_period if step is None else every * step
         # It is due at once, and then at the whole periods, as if it had been called all the time.
         period = clock.control_period
         clock.calls = int(clock.time / period + 1e-9) if period > 0.0 else 0
         clock.answered = 0
-        self._watch = Watch(robot, ready, memory)
+        known = self._numbers.robot
+        self._watch = Watch((robot,) if known is robot else (robot, known), ready, memory)
+
+    def _take_gains(self, law: Law | None, voltage: bool) -> None:
+        """Note which joint forces an implicit scheme takes at the end of a step."""
+        model, memory = self.robot.model, self._memory
+        driven = model.actuator_joint
+        memory.stiffness[:] = model.stiffness
+        memory.damping[:] = model.damping
+        if law is not None:
+            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
+            memory.damping[driven] += 0.0 if law.damping is None else law.damping
+        if voltage:
+            memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course hangs on.
@@ -606,6 +646,22 @@ class Simulation:
         self._fork = None
         self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
         self.error = None
+
+    def forget(self) -> None:
+        """Forget what was: the record begins anew, and pushes that are over are gone from it.
+
+        How it goes on does not change. For simulations without an end, whose record is looked at
+        piece by piece.
+        """
+        self._recorded_until = self.time
+        self._records.clear()
+        if any(push.end < self.time for push in self._pushes):
+            kept = [i for i, push in enumerate(self._pushes) if push.end >= self.time]
+            share = self._memory.pushes.share[kept].copy()
+            self._pushes = tuple(self._pushes[i] for i in kept)
+            pushes = pushes_on(self.robot, self._pushes)
+            pushes.share[:] = share
+            self._memory = self._memory.replaced(pushes=pushes)
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
@@ -661,10 +717,12 @@ class Simulation:
             self._pushes, self._ground, self.error = own
             del self._records[len(counts) :]
             for record, (rows, events) in zip(self._records, counts, strict=True):
-                record.rows, record.events = rows, events
+                record.rows, record.events, record.logged = rows, events, rows
 
     @property
     def _can_be_kept(self) -> bool:
+        if isinstance(self._python, AskedLaw):
+            return self._python.takes_part
         return self._python is None or isinstance(self._python, Partaking)
 
     def _decide_last(self) -> tuple[RunStatus, str]:
@@ -690,13 +748,15 @@ class Simulation:
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
+        if not self._records:
+            self._new_record()
         return Run(
             robot=self.robot,
             ground=self._ground,
             method=self.method,
             status=status,
             message=message,
-            **joined(self._records, self._recorded_until),
+            **joined(self._records, self._recorded_until, self._logs.log),
             **tallied(self._memory, self.method.solves_with),
             timing=self._timing,
             error=self.error,
@@ -850,7 +910,8 @@ def _place(thing: Any) -> str:
 
 
 def _partaking(controller: Any, name: str) -> Partaking:
-    if not isinstance(controller, Partaking):
+    asked = controller.partner if isinstance(controller, AskedLaw) else None
+    if not isinstance(controller if asked is None else asked, Partaking):
         raise ControllerError(
             f"{name} takes no part in snapshots: give its class methods snapshot(), which returns "
             "an array of numbers, and restore(numbers)"
