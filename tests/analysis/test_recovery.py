@@ -50,6 +50,24 @@ def test_what_is_no_recovery_is_named() -> None:
     assert recovery(early, pushed=PUSHED)
 
 
+def test_a_robot_that_stops_stepping_has_not_recovered() -> None:
+    """However fast it took its last steps."""
+    run = walking.walk()
+    stops = np.searchsorted(run.time, 6.0)
+    held = np.minimum(np.arange(len(run.time)), stops)
+    stands = replace(
+        run,
+        position=run.position[held],
+        velocity=run.velocity[held],
+        contact_force=run.contact_force[held],
+        events=tuple(event for event in run.events if event.time <= run.time[stops]),
+    )
+    assert len(analysis.walking_steps(stands)) >= 7
+    found = recovery(stands, pushed=PUSHED)
+    assert found.speed == pytest.approx(0.0, abs=1e-6)
+    assert "its speed is" in found.reason
+
+
 def test_pushes_of_the_run_are_meant_where_none_is_named() -> None:
     run = walking.walk()
     with pytest.raises(hs.SimulationError, match=r"pushed=\(begin, end\)"):

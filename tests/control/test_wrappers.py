@@ -174,6 +174,43 @@ def test_everything_is_seen_late() -> None:
     np.testing.assert_allclose(run.log["seen"].values, seen[:, 3:], atol=1e-12)
 
 
+class Looks:
+    """What it was shown of contact points, call by call."""
+
+    def __init__(self) -> None:
+        self.seen: list[Any] = []
+
+    def torque(self, t: float, state: hs.State, contacts: Any) -> Any:
+        shown = contacts.position, contacts.normal, contacts.gap[:, None]
+        self.seen.append(np.hstack(shown))
+        return np.zeros(6)
+
+
+def test_contact_points_are_seen_late_as_well() -> None:
+    now, then = Looks(), Looks()
+    ground = hs.Ground(friction=0.7, profile=np.array([[-9.0, -0.5], [0.05, 0.0], [9.0, 0.5]]))
+    run_of(hs.Sensed(now), ground=ground)
+    run_of(hs.Sensed(then, delay=3e-3), ground=ground)
+    assert np.abs(now.seen[9] - now.seen[6])[:, [0, 1, 4]].max(axis=0).min() > 1e-6
+    np.testing.assert_array_equal(then.seen[3:], now.seen[:-3])
+    np.testing.assert_array_equal(then.seen[:3], [now.seen[0]] * 3)
+
+
+def test_gains_behind_a_delay_are_no_gains_of_this_instant() -> None:
+    stiff = {"stiffness": np.full(6, 600.0), "damping": np.full(6, 10.0)}
+    kept = hs.Sensed(law(**stiff), encoders=hs.Encoders(bits=14))
+    np.testing.assert_array_equal(kept.stiffness, stiff["stiffness"])
+    np.testing.assert_array_equal(hs.Actuated(kept).damping, stiff["damping"])
+    for late in (
+        hs.Sensed(law(**stiff), delay=1e-3),
+        hs.Actuated(law(**stiff), delay=1e-3),
+        hs.Actuated(kept, bandwidth=50.0),
+        pickle.loads(pickle.dumps(hs.Actuated(law(**stiff), delay=1e-3))),
+    ):
+        assert late.stiffness is None
+        assert late.damping is None
+
+
 def test_actuators_are_late_and_slow() -> None:
     run = run_of(hs.Actuated(law(), delay=2e-3, bandwidth=30.0))
     asked, given = run.log["asked_torque"].values, run.log["given_torque"].values
@@ -246,6 +283,45 @@ def test_a_shell_is_copied_by_pickle() -> None:
         hs.simulate(walking.bravo7(), each, state=start, duration=0.003) for each in (shell, again)
     ]
     np.testing.assert_array_equal(runs[0].torque, runs[1].torque)
+
+
+class TellsInPython(StandInPython):
+    """The same with a log."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.log = Told.allocate(nu=6)
+
+    def torque(self, t: float, state: hs.State, contacts: Any) -> Any:
+        self.log.seen[:] = state.q[3:]
+        self.log.count += 1
+        return super().torque(t, state, contacts)
+
+
+@pytest.mark.parametrize("checked", [False, True])
+def test_an_object_in_a_shell_keeps_its_log(checked: bool) -> None:
+    run = run_of(hs.Actuated(wrapped(TellsInPython(), delay=1e-3)), checked=checked)
+    np.testing.assert_array_equal(run.log["count"].values, np.arange(1, 22))
+    np.testing.assert_array_equal(
+        run.log["seen"].values, run.log["measured_position"].values[:, 3:]
+    )
+    assert run.log["seen"].unit == "rad"
+
+
+def test_an_object_in_a_shell_is_copied_by_pickle() -> None:
+    shell = wrapped(TellsInPython())
+    before = run_of(shell)
+    again = run_of(pickle.loads(pickle.dumps(shell)))
+    np.testing.assert_array_equal(again.torque, before.torque)
+    assert again.log["count"].values[0] == 22  # an object goes on from what it remembers
+
+
+def test_voltages_are_no_torques() -> None:
+    with pytest.raises(hs.ControllerError, match="predicts by the torques"):
+        hs.Estimated(law(commands_voltage=True))
+    with pytest.raises(hs.ControllerError, match="gears take no share"):
+        hs.Actuated(law(commands_voltage=True), efficiency=0.9)
+    assert hs.Actuated(law(commands_voltage=True), delay=1e-3).commands_voltage
 
 
 def test_what_cannot_be() -> None:

@@ -84,7 +84,7 @@ def recovery(
         zero of a robot that took none.
     after : float
         Seconds after the disturbance at which the speed is judged: the mean over the two steps
-        before.
+        before, or over the last second of a robot that has stopped stepping.
     hip : float
         Least height of the hip, the mean of the legs' first joints, above the ground below it, as
         a part of the mean before the disturbance.
@@ -174,12 +174,17 @@ def _trunk_angle(run: Run, motion: Motion) -> Floats:
 
 
 def _speed(run: Run, motion: Motion, until: float, since: float) -> float:
-    """Return the mean speed over the last whole steps before a time; standing, over a second."""
+    """Return the mean speed over the last whole steps before a time; standing, over a second.
+
+    A robot stands that has taken no step for longer than two of these take.
+    """
     landings = [s.touchdown for s in walking_steps(run) if since <= s.touchdown <= until + 1e-9]
     x = motion.center_of_mass[:, 0]
+    ends = max(until - STANDING, float(run.time[0]), since), until
     if len(landings) >= 2:
-        ends = landings[max(len(landings) - 1 - STEPS, 0)], landings[-1]
-    else:
-        ends = max(until - STANDING, float(run.time[0]), since), until
+        count = min(len(landings) - 1, STEPS)
+        first, last = landings[-1 - count], landings[-1]
+        stands = until - last > STEPS * (last - first) / count
+        ends = ends if stands else (first, last)
     places = np.interp(ends, run.time, x)
     return float((places[1] - places[0]) / (ends[1] - ends[0]))

@@ -177,5 +177,13 @@ class Actuated(Around):
         if not 0.0 < efficiency <= 1.0:
             raise ControllerError(f"the efficiency must be above 0, at most 1, got {efficiency!r}")
         own = Parameters(late=late, share=share, left=left, efficiency=efficiency)
-        super().__init__(ACTUATED, controller, own, period=period, extents={"late": late})
+        slow = late > 0 or bandwidth is not None
+        super().__init__(
+            ACTUATED, controller, own, period=period, extents={"late": late}, late=slow
+        )
+        if self.commands_voltage and efficiency < 1.0:
+            raise ControllerError(
+                f"controller {self.function.name!r} commands voltages, of which gears take no "
+                "share: leave efficiency out, and let the motor's numbers be those at the joint"
+            )
         self.delay, self.bandwidth, self.efficiency = delay, bandwidth, efficiency

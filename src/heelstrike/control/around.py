@@ -31,6 +31,9 @@ from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
 from heelstrike.sim.controller.law import ControllerFunction, Law, law_of
 from heelstrike.sim.controller.robot import ControlState, extents_of
 
+ROBOTS = frozenset(("nq", "nv", "nu", "nc", "nl", "nj", "nf", "axes", "components"))
+"""Extents that are the robot's."""
+
 PERIOD = 1e-3
 """Seconds between two calls of a shell around a controller that names no period."""
 
@@ -99,23 +102,46 @@ def inside(controller: Controller) -> Law:
     if law is not None:
         return law
     asked: Any = controller
+    function = AskedInPython(asked)
+    told = function.told
+    given = {} if told is None else {k: n for k, n in told.extents.items() if k not in ROBOTS}
+    voltage = bool(getattr(asked, "commands_voltage", False))
+    return Law(function, memory=given, commands_voltage=voltage)
 
-    def ask(t: float, state: Any, contacts: Any, torque: Floats) -> None:
-        wanted = np.asarray(asked.torque(float(t), State(state.q, state.v), contacts), np.float64)
-        if wanted.shape != torque.shape:
-            raise ControllerError(
-                f"{type(asked).__name__}.torque returned shape {wanted.shape}; the robot needs "
-                f"{torque.shape}"
-            )
-        torque[:] = wanted
 
-    kind = type(asked)
-    ask.__name__, ask.__qualname__, ask.__module__ = (
-        kind.__name__, kind.__qualname__, kind.__module__,
-    )  # fmt: skip
-    function = ControllerFunction(ask, False, {})
-    function.partner = asked
-    return Law(function, commands_voltage=bool(getattr(asked, "commands_voltage", False)))
+class AskedInPython(ControllerFunction):
+    """A function that asks a controller in Python, and tells its log, if it has one."""
+
+    def __init__(self, asked: Any) -> None:
+        kind = type(asked)
+        told = getattr(asked, "log", None)
+        self.told: Bundle | None = told if isinstance(told, Bundle) else None
+
+        def ask(t: float, state: Any, contacts: Any, torque: Floats) -> None:
+            seen = State(state.q, state.v)
+            wanted = np.asarray(asked.torque(float(t), seen, contacts), np.float64)
+            if wanted.shape != torque.shape:
+                raise ControllerError(
+                    f"{kind.__name__}.torque returned shape {wanted.shape}; the robot needs "
+                    f"{torque.shape}"
+                )
+            torque[:] = wanted
+
+        def ask_and_tell(t: float, state: Any, contacts: Any, log: Any, torque: Floats) -> None:
+            ask(t, state, contacts, torque)
+            log.become(told)
+
+        function = ask if self.told is None else ask_and_tell
+        function.__annotations__["log"] = type(told)
+        function.__name__, function.__qualname__, function.__module__ = (
+            kind.__name__, kind.__qualname__, kind.__module__,
+        )  # fmt: skip
+        super().__init__(function, False, {})
+        self.partner = asked
+
+    def __reduce__(self) -> Any:
+        """Copies ask a copy of the controller."""
+        return type(self), (self.partner,)
 
 
 class Around(Law):
@@ -132,6 +158,9 @@ class Around(Law):
         Seconds between two calls of the shell.
     extents : dict of str to int
         Of the shell's memory.
+    late : bool
+        Whether joints move on before what they did has come back as torque. Then schemes are not
+        told the gains of the controller: at the end of a step they would act without delay.
 
     Raises
     ------
@@ -143,7 +172,7 @@ class Around(Law):
 
     def __init__(
         self, shell: Shell, controller: Controller, own: Bundle, *, period: float | None,
-        extents: dict[str, int],
+        extents: dict[str, int], late: bool = False,
     ) -> None:  # fmt: skip
         law = inside(controller)
         if period is None:
@@ -163,17 +192,17 @@ class Around(Law):
         turn = Turn(every=every, period=period, inside=inner)
         super().__init__(
             function, function.parameters(turn=turn, own=own, inside=numbers), robot=law.robot,
-            period=period, stiffness=law.stiffness, damping=law.damping,
-            commands_voltage=law.commands_voltage,
+            period=period, stiffness=None if late else law.stiffness,
+            damping=None if late else law.damping, commands_voltage=law.commands_voltage,
         )  # fmt: skip
         self.inside = law
-        self._shell, self._extents = shell, dict(extents)
+        self._shell, self._extents, self._late = shell, dict(extents), late
 
     def __reduce__(self) -> Any:
         """Copies are made anew of shell and controller: their bundles have no name."""
         numbers: Any = self.parameters
         more = {name: each for name, each in vars(self).items() if name not in _MADE}
-        made_of = self._shell, self.inside, numbers.own, self.period, self._extents
+        made_of = self._shell, self.inside, numbers.own, self.period, self._extents, self._late
         return _again, (type(self), made_of, more)
 
     def with_parameters(self, parameters: Bundle) -> Law:
@@ -210,15 +239,15 @@ class Around(Law):
 
 _MADE = (
     "function", "parameters", "memory", "robot", "period", "stiffness", "damping",
-    "commands_voltage", "inside", "_asked", "_shell", "_extents",
+    "commands_voltage", "inside", "_asked", "_shell", "_extents", "_late",
 )  # fmt: skip
 
 
 def _again(kind: type[Around], made_of: tuple[Any, ...], more: dict[str, Any]) -> Around:
     """Make a shell of what it is made of."""
-    shell, controller, own, period, extents = made_of
+    shell, controller, own, period, extents, late = made_of
     law = kind.__new__(kind)
-    Around.__init__(law, shell, controller, own, period=period, extents=extents)
+    Around.__init__(law, shell, controller, own, period=period, extents=extents, late=late)
     vars(law).update(more)
     return law
 

@@ -351,6 +351,11 @@ class Estimated(Around):
             threshold=threshold, up=UP,
         )  # fmt: skip
         super().__init__(ESTIMATED, controller, own, period=period, extents={})
+        if self.commands_voltage:
+            raise ControllerError(
+                f"controller {self.function.name!r} commands voltages: the estimator predicts by "
+                "the torques that are asked for, and cannot tell those"
+            )
         self.bandwidth = bandwidth
 
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:

@@ -175,8 +175,8 @@ class Memory(Shown):
         Readings of the encoders and the velocity that follows.
     pitch, pitch_rate : float
     force : (nc, 2) float
-    past_q, past_v, past_force
-        Readings of the last calls, a ring.
+    past_q, past_v, past_force, past_position, past_normal, past_gap
+        Readings of the last calls, and where contact points were then, a ring.
     """
 
     calls: int = cell(int)
@@ -193,6 +193,9 @@ class Memory(Shown):
     past_q: Floats = array("late + 1", "nq")
     past_v: Floats = array("late + 1", "nv")
     past_force: Floats = array("late + 1", "nc", "components")
+    past_position: Floats = array("late + 1", "nc", "axes")
+    past_normal: Floats = array("late + 1", "nc", "axes")
+    past_gap: Floats = array("late + 1", "nc")
 
 
 class Log(Bundle):
@@ -305,8 +308,11 @@ def read_all(
     elif memory.calls % parameters.foot_every == 0:
         read_feet(contacts, parameters, memory)
     for i in range(robot.nc):
+        memory.past_gap[row, i] = contacts.gap[i]
         for k in range(2):
             memory.past_force[row, i, k] = memory.force[i, k]
+            memory.past_position[row, i, k] = contacts.position[i, k]
+            memory.past_normal[row, i, k] = contacts.normal[i, k]
 
 
 @kernel
@@ -326,10 +332,10 @@ def sense(
         log.measured_velocity[j] = seen.v[j]
     robot.update(seen)
     for i in range(robot.nc):
-        told.gap[i] = contacts.gap[i]
+        told.gap[i] = memory.past_gap[row, i]
         for k in range(2):
-            told.position[i, k] = contacts.position[i, k]
-            told.normal[i, k] = contacts.normal[i, k]
+            told.position[i, k] = memory.past_position[row, i, k]
+            told.normal[i, k] = memory.past_normal[row, i, k]
             told.force[i, k] = memory.past_force[row, i, k]
             log.measured_force[i, k] = told.force[i, k]
     memory.calls += 1
@@ -420,7 +426,9 @@ class Sensed(Around):
             force_noise=under.noise, force_bias=under.bias, threshold=under.least,
             switches=int(under.switches), late=late, seeds=np.array(seeded(seed)),
         )  # fmt: skip
-        super().__init__(SENSED, controller, own, period=period, extents={"late": late})
+        super().__init__(
+            SENSED, controller, own, period=period, extents={"late": late}, late=late > 0
+        )
         self.encoders, self.imu, self.feet, self.delay = encoders, imu, feet, delay
 
     def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:

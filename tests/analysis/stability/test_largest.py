@@ -82,6 +82,30 @@ def test_ground_that_is_not_level() -> None:
     assert (rough.recovered, rough.failed) == (0.0, 0.025)
 
 
+def test_other_ground_begins_between_two_footholds(monkeypatch: pytest.MonkeyPatch) -> None:
+    grounds: list[hs.Ground] = []
+    level = trial().run(trial().begins)
+
+    def run(self: hs.Trial, until: float, *, ground: hs.Ground) -> hs.Run:
+        grounds.append(ground)
+        return level
+
+    monkeypatch.setattr(hs.Trial, "run", run)
+    hs.largest_slope(trial(), uphill=True, most=3.0, strides=1, halvings=0)
+    edge = float(np.asarray(grounds[-1].profile)[1, 0])
+    poses = [hs.dynamics.contact_positions(trial().robot, q) for q in level.position]
+    touching = [pose[pose[:, 1] < 1e-5, 0] for pose in poses]
+    places = np.concatenate(touching)
+    behind, beyond = places[places < edge].max(), places[places > edge].min()
+    length = trial().step_length
+    assert beyond - behind == pytest.approx(length, rel=0.02)
+    assert edge - behind == pytest.approx(0.5 * length, rel=0.05)
+    # The foot that comes down beyond it is the first to do so after the undisturbed steps.
+    first = next(t for t, x in zip(level.time, touching, strict=True) if np.any(x > edge))
+    period = trial().step_duration
+    assert trial().begins + 0.9 * period < first < trial().begins + 1.1 * period
+
+
 def test_what_counts_as_recovery() -> None:
     """Another speed is none after a push, but on other ground; the trunk's angle is the trial's."""
     begins = trial().begins

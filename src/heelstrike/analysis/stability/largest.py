@@ -14,11 +14,15 @@ import numpy as np
 
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.contact.ground import Ground
+from heelstrike.dynamics import contact_positions
 from heelstrike.errors import SimulationError
 from heelstrike.sim.push import Push
 
 FAR = 1000.0
 """How far ground that is not level goes, in m."""
+
+ON_IT = 1e-3
+"""A foot that is lifted by less than this (m) stands."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,7 +292,10 @@ def _walks_on(trial: Trial, ground: Ground, *, same_speed: bool) -> bool:
 
 def _edge(trial: Trial) -> float:
     """Where level ground ends: in the middle between two footholds of the undisturbed walk."""
-    first = float(trial.state.q[0])
+    points = contact_positions(trial.robot, trial.state.q)
+    feet = [points[list(foot.contacts)] for foot in trial.robot.feet if foot.contacts]
+    lowest = points[:, 1].min()
+    first = max(float(foot[:, 0].mean()) for foot in feet if foot[:, 1].min() < lowest + ON_IT)
     return first + (trial.undisturbed + 0.5) * trial.step_length
 
 
