@@ -285,11 +285,12 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         "points": len(points), "components": 2,
     }  # fmt: skip
     programs = straight_line_programs(model, points)
+    most = capacity + nc  # in a concave corner a point is there twice
     assembly = Assembly.allocate(
-        extents,
-        problem=ContactProblem.allocate(nc=capacity),
-        answer=ContactAnswer.allocate(nc=capacity),
-        solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
+        {**extents, "capacity": most},
+        problem=ContactProblem.allocate(nc=most),
+        answer=ContactAnswer.allocate(nc=most),
+        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
     )
     problem = assembly.problem
     return Memory.allocate(

@@ -53,6 +53,7 @@ from heelstrike.sim.contacts.geometry import (
     contact_velocity,
     evaluate_equations,
     locate_contacts,
+    row_product,
     solve_mass_matrix,
     weigh,
     write_unit_row,
@@ -68,6 +69,7 @@ from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
+from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
@@ -204,6 +206,8 @@ class TimeStepping(Method):
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one."""
         work.impact.touching[: robot.nc] = NEVER
+        work.impact.touching[robot.nc + 2 * robot.nv :] = NEVER
+        work.impact.corner.near = 0
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
@@ -246,6 +250,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    if ground.concave == 1:
+        locate_corners(model, ground, equations.tree, work.impact.corner)
 
 
 @dissolved_kernel
@@ -397,6 +403,41 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
 
 
 @kernel
+def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
+    """Append the second faces of corners that could act in this step, and write their rows."""
+    assembly, corner, step = memory.assembly, work.impact.corner, work.step
+    problem, gaps = assembly.problem, corner.contacts.gap
+    for contact in range(model.nc):
+        gap = gaps[contact]
+        if gap > FAR_STEPS * CLOSING_SPEED * step:
+            continue
+        tree = memory.equations.tree
+        contact_rows(model, tree, corner.contacts, contact, count, assembly)
+        normal = row_product(assembly.jacobian, 2 * count, memory.next_v)
+        if is_linearised(work.scheme):
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+                continue
+            normal += gap / step
+        elif work.scheme == MOREAU_JEAN:
+            before = row_product(assembly.jacobian, 2 * count, memory.v)
+            if gap + 0.5 * step * before > work.activation:
+                continue
+            normal += corner.restitution[contact] * before
+        elif gap > work.activation:
+            continue
+        problem.free[2 * count] = normal
+        tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
+        problem.free[2 * count + 1] = tangent
+        problem.set[count] = CONE
+        problem.friction[count] = corner.friction[contact]
+        assembly.answer.mode[count] = corner.mode[contact]
+        assembly.candidate[count] = model.nc + 2 * model.nv + contact
+        count += 1
+        corner.count += 1
+    return count
+
+
+@kernel
 def write_rows(
     model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
 ) -> None:
@@ -418,7 +459,7 @@ def joint_row(
 ) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
     stop = candidate[place] - model.nc
-    dry = stop - 2 * model.nv
+    dry = stop - 2 * model.nv - model.nc
     if dry >= 0:
         return 2 * place + 1, dry_joint[dry], 1.0
     return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
@@ -511,7 +552,7 @@ def push_candidates(
         )  # fmt: skip
     for place in range(near, count):
         row = 2 * place
-        if assembly.candidate[place] >= model.nc + 2 * model.nv:
+        if assembly.candidate[place] >= 2 * (model.nc + model.nv):
             row += 1
         for j in range(model.nv):
             v[j] += impulse[row] * assembly.jacobian[row, j]
@@ -536,13 +577,14 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
-    straight = are_usual(assembly.candidate, near, DELASSUS, usual)
+    corners = impact.corner.count
+    straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        joints = count - dry_joint.shape[0]
+        joints = count - dry_joint.shape[0] - corners  # whose rows are there
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, equations, count, assembly)
     problem.count = count
@@ -652,8 +694,11 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
+        impact.corner.count = 0
+        if impact.corner.near > 0:
+            count = select_corners(model, count, work, memory)
         if impact.relaxed == 1:
-            close_gaps(model, work.step, count, memory)
+            close_gaps(model, work.step, count, impact, memory)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
@@ -669,12 +714,16 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
         note_touching(model, work.step, count, memory, impact)
-    note_answer(model, work.step, near, count, memory)
+    note_answer(model, work.step, near, count, memory, impact.corner)
+    if impact.corner.count > 0:
+        join_forces(model, impact.corner, memory.contacts)
     return solved
 
 
 @dissolved_kernel
-def note_answer(model: Model, step: float, near: int, count: int, memory: Memory) -> None:
+def note_answer(
+    model: Model, step: float, near: int, count: int, memory: Memory, corner: Corner
+) -> None:
     """Keep the forces, slips and modes of the candidates; all others have none."""
     answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
     for joint in range(model.nv):
@@ -694,10 +743,15 @@ def note_answer(model: Model, step: float, near: int, count: int, memory: Memory
         reaction.mode[contact] = answer.mode[place]
     for place in range(near, count):
         stop = memory.assembly.candidate[place] - model.nc
-        dry = stop - 2 * model.nv
+        other = stop - 2 * model.nv
+        dry = other - model.nc
         if dry >= 0:
             reaction.friction_torque[memory.dry_joint[dry]] = answer.impulse[2 * place + 1] / step
             reaction.dry_mode[dry] = answer.mode[place]
+        elif other >= 0:
+            corner.contacts.force[other, 0] = answer.impulse[2 * place] / step
+            corner.contacts.force[other, 1] = answer.impulse[2 * place + 1] / step
+            corner.mode[other] = answer.mode[place]
         else:
             normal = answer.impulse[2 * place]
             reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step
