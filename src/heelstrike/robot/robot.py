@@ -150,6 +150,17 @@ class Robot:
         return self.model.nc
 
     @property
+    def loop_names(self) -> tuple[str, ...]:
+        """Names of the closed loops: those of the two links that each joins."""
+        names = [*self.link_names, "world"]  # which is link -1
+        return tuple(f"{names[a]}-{names[b]}" for a, b in self.model.loop_link.tolist())
+
+    @property
+    def coupling_names(self) -> tuple[str, ...]:
+        """Names of the joints that follow others."""
+        return tuple(self.joint_names[joint] for joint in self.model.coupling_joint[:, 0])
+
+    @property
     def total_mass(self) -> float:
         """Mass of the whole robot in kg."""
         return float(np.sum(self.model.mass))

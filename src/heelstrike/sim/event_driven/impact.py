@@ -5,6 +5,7 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
@@ -13,6 +14,11 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     locate_contacts,
     row_product,
+)
+from heelstrike.sim.contacts.loops import (
+    append_loops,
+    free_loop_accelerations,
+    free_loop_velocities,
 )
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
@@ -61,6 +67,7 @@ def collide(
     v = state[model.nq :]
     equations, assembly = memory.equations, memory.assembly
     jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
+    loops = memory.loops.unknown.shape[0]
     count = 0
     for contact in range(phase.first_dry):
         phase.impulse[contact, 0] = 0.0
@@ -77,9 +84,12 @@ def collide(
         count += 1
     if count == 0:
         return True, 0.0
-    assemble_delassus(model, equations, count, assembly)
+    find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
+    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    free_loop_velocities(total, memory.loops, v, assembly)
+    assemble_delassus(model, equations, total, assembly)
     friction, guess = memory.surface.friction, memory.reaction.mode
-    status = solve_candidates(count, False, friction, guess, phase, assembly)
+    status = solve_candidates(count, loops, False, friction, guess, phase, assembly)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
@@ -87,7 +97,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    add_impulse(model, assembly, count, equations, v)
+    add_impulse(model, assembly, total, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -120,22 +130,26 @@ def short_bounces(
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
     locate_contacts(model, ground, equations.tree, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    count = gather_closed(model, contacts, phase, equations, assembly)
+    loops = memory.loops.unknown.shape[0]
+    find_rows(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops.rows)
+    count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
     for place in range(count):
         contact = assembly.candidate[place]
         free_gap_acceleration(model, contacts, equations, contact, place, phase, assembly)
-    if count > 0:
-        solve_candidates(count, True, friction, memory.reaction.mode, phase, assembly)
-        add_impulse(model, assembly, count, equations, equations.rate)
+    total = count + loops
+    free_loop_accelerations(total, memory.loops, equations.rate, assembly)
+    if total > 0:
+        solve_candidates(count, loops, True, friction, memory.reaction.mode, phase, assembly)
+        add_impulse(model, assembly, total, equations, equations.rate)
     found = False
     for contact in range(phase.closed.shape[0]):
         touched = phase.hit[contact] == 1 or was_closed[contact] == 1
         if phase.closed[contact] == 1 or not touched:
             continue
-        gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
-        free_gap_acceleration(model, contacts, equations, contact, count, phase, assembly)
+        gap_rows(model, equations.tree, contacts, phase, contact, total, assembly)
+        free_gap_acceleration(model, contacts, equations, contact, total, phase, assembly)
         normal, _ = gap_velocity(contact, model, contacts, equations.tree, phase, state)
-        pull = -assembly.problem.free[2 * count]
+        pull = -assembly.problem.free[2 * total]
         if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull

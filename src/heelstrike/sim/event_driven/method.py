@@ -32,6 +32,7 @@ from heelstrike.sim.contacts.geometry import (
     locate_contacts,
     observe,
 )
+from heelstrike.sim.contacts.loops import note_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import solve_candidates
@@ -258,11 +259,12 @@ def write_row(
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
-    count = phase.closed_count
-    if count > 0:
+    count, loops = phase.closed_count, memory.loops.unknown.shape[0]
+    if count + loops > 0:
         friction, guess = memory.surface.friction, memory.reaction.mode
-        solve_candidates(count, True, friction, guess, phase, assembly)
+        solve_candidates(count, loops, True, friction, guess, phase, assembly)
         note_residual(residual, memory.tally)
+        note_loops(model, count + loops, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
     note_state(model, row, trial, record)
@@ -369,7 +371,8 @@ def begin_phase(
 ) -> None:
     """Begin a phase with the modes that the acceleration-level problem has found."""
     assembly, friction = memory.assembly, memory.surface.friction
-    leave_if_possible(count, friction, phase, assembly, record)
+    if memory.loops.unknown.shape[0] == 0:  # with loops neither matrix nor free term tell enough
+        leave_if_possible(count, friction, phase, assembly, record)
     if count > 0:
         note_residual(assembly.answer.residual, memory.tally)
     adopt_modes(model, count, assembly, phase, memory.reaction)
@@ -397,6 +400,7 @@ def decide_modes(
     model = scene.model
     forced, jammed = phase.forced == 1, phase.jammed == 1
     friction, guess = memory.surface.friction, memory.reaction.mode
+    loops = memory.loops.unknown.shape[0]
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
         extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
@@ -413,7 +417,7 @@ def decide_modes(
                 continue
         count = phase.closed_count
         if not jammed and count > 0:
-            status = solve_candidates(count, True, friction, guess, phase, memory.assembly)
+            status = solve_candidates(count, loops, True, friction, guess, phase, memory.assembly)
             jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0

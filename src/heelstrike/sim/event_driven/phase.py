@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 from heelstrike.sim.memory import contact_capacity
@@ -60,12 +61,12 @@ class Phase(Bundle):
         Impulses of the impact in this instant (N s).
     last_impact, accumulation : (nc,) float
         When each point hit the ground last; when its accumulating impacts come to rest.
-    row : (2 nc,) int
-    lean : (2 nc,) float
-    system : (2 nc, 2 nc + 1) float
-    unknown : (2 nc,) float
-    column : (2 nc,) int
-        Equations of the contact forces: row of the Jacobian, tangential per normal force, the
+    row : (forces,) int
+    lean : (forces,) float
+    system : (forces, forces + 1) float
+    unknown : (forces,) float
+    column : (forces,) int
+        Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal force, the
         equations themselves, their solution, and its order.
     value, rate, end_value, end_rate : (2 nc,) float
     before, before_rate, sample, sample_rate : (2 nc,) float
@@ -137,11 +138,11 @@ class Phase(Bundle):
     impulse: Floats = array("contacts", "components")
     last_impact: Floats = array("contacts")
     accumulation: Floats = array("contacts")
-    row: Integers = array("2 contacts", of=int)
-    lean: Floats = array("2 contacts")
-    system: Floats = array("2 contacts", "2 contacts + 1")
-    unknown: Floats = array("2 contacts")
-    column: Integers = array("2 contacts", of=int)
+    row: Integers = array("forces", of=int)
+    lean: Floats = array("forces")
+    system: Floats = array("forces", "forces + 1")
+    unknown: Floats = array("forces")
+    column: Integers = array("forces", of=int)
     value: Floats = array("2 contacts")
     rate: Floats = array("2 contacts")
     end_value: Floats = array("2 contacts")
@@ -195,6 +196,7 @@ def allocate_phase(robot: Robot) -> Phase:
     contacts = contact_capacity(robot)
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
+        forces=2 * contacts + count_rows(model),
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),

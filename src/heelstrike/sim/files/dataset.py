@@ -25,6 +25,7 @@ ROBOT_GROUP = "robot"
 DIMENSIONS = {
     "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
     "axes": "axis", "components": "component", "conditions": "condition",
+    "loops": "loop", "couplings": "coupling",
 }  # fmt: skip
 """What datasets call the extents of a row. In the plane links and coordinates share one."""
 
@@ -74,6 +75,8 @@ def labels(robot: Robot) -> dict[str, list[str]]:
         "coordinate": list(robot.joint_names),
         "actuator": list(robot.actuator_names),
         "contact": list(robot.contact_names),
+        "loop": list(robot.loop_names),
+        "coupling": list(robot.coupling_names),
         "axis": ["x", "z"],
         "component": ["normal", "tangent"],
         "condition": ["complementarity", "cone", "non-penetration"],

@@ -28,6 +28,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.geometry import contact_velocity
@@ -82,7 +83,7 @@ class Impact(Bundle):
 
 def allocate_impact(robot: Robot) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    capacity = contact_capacity(robot)
+    capacity = contact_capacity(robot) + count_rows(robot.model)
     places = robot.nc + 2 * robot.nv
     return Impact.allocate(
         nv=robot.nv,
@@ -149,7 +150,7 @@ def find_impact(
     happens = False
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        if candidate >= closable:  # dry friction is always there
+        if candidate >= closable:  # dry friction and loops are always there
             member[members] = place
             members += 1
             continue

@@ -30,6 +30,7 @@ from heelstrike.contact.modes import SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -48,12 +49,20 @@ from heelstrike.sim.contacts.geometry import (
     weigh,
     write_unit_row,
 )
+from heelstrike.sim.contacts.loops import (
+    append_loops,
+    close_loops,
+    free_loop_velocities,
+    note_loop,
+    speed_along,
+    steady_loops,
+)
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
+from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
@@ -210,7 +219,12 @@ def is_linearised(scheme: int) -> bool:
 
 @dissolved_kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
-    """Begin: there is nothing to prepare."""
+    """Begin with closed loops."""
+    if memory.loops.unknown.shape[0] > 0:
+        equations, loops, q = memory.equations, memory.loops, memory.q
+        if not close_loops(model, equations, loops, q):
+            return DIVERGED
+        steady_loops(model, equations, loops, q, memory.v)
     return DONE
 
 
@@ -223,6 +237,7 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
             equations.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
 
 
 @dissolved_kernel
@@ -385,7 +400,7 @@ def joint_row(
 
 @dissolved_kernel
 def gather_delassus(
-    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int,
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int, loops: Loops,
     equations: Equations, usual: UsualPoints, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Delassus matrix of all usual points; that of the candidates too, if these are others."""
@@ -408,8 +423,11 @@ def gather_delassus(
                 for j in range(2):
                     entry = usual.usual_problem.delassus[row + i, column + j]
                     assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
-    for place in range(near, count):
+    joints = count - loops.unknown.shape[0]
+    for place in range(near, joints):
         add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
+    for place in range(joints, count):
+        add_loop(model, contacts, dry_joint, near, joints, place, loops, equations, usual, assembly)
 
 
 @dissolved_kernel
@@ -447,9 +465,43 @@ def add_joint(
         delassus[column, row] = entry
 
 
+@kernel
+def add_loop(
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, joints: int, place: int,
+    loops: Loops, equations: Equations, usual: UsualPoints, assembly: Assembly,
+) -> None:  # fmt: skip
+    """Add the row of a loop at a place to the Delassus matrix, after all points and joints.
+
+    As with joints, A⁻¹ Jᵀ goes to that row of ``assembly.jacobian``.
+    """
+    candidate, delassus, row = assembly.candidate, assembly.problem.delassus, 2 * place
+    change = assembly.jacobian[row]
+    solve_mass_matrix(model, equations, change)
+    for other in range(2 * place + 2):
+        for own in range(row, row + 2):
+            delassus[own, other] = 0.0
+            delassus[other, own] = 0.0
+    if near > 0:
+        find_velocities(model, contacts, change, True, equations.tree, usual)
+    for other in range(near):
+        for i in range(2):
+            entry = usual.point_velocity[candidate[other], i]
+            delassus[row, 2 * other + i] = entry
+            delassus[2 * other + i, row] = entry
+    for other in range(near, place + 1):
+        column = 2 * other
+        if other < joints:
+            column, joint, sign = joint_row(model, dry_joint, candidate, other)
+            entry = sign * change[joint]
+        else:
+            entry = speed_along(other - joints, loops, change)
+        delassus[row, column] = entry
+        delassus[column, row] = entry
+
+
 @dissolved_kernel
 def push_candidates(
-    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int,
+    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int, loops: int,
     equations: Equations, usual: UsualPoints, v: Floats,
 ) -> None:  # fmt: skip
     """Add what the impulses of the candidates do to a velocity, after `gather_delassus`."""
@@ -470,7 +522,7 @@ def push_candidates(
         )  # fmt: skip
     for place in range(near, count):
         row = 2 * place
-        if assembly.candidate[place] >= model.nc + 2 * model.nv:
+        if place < count - loops and assembly.candidate[place] >= model.nc + 2 * model.nv:
             row += 1
         for j in range(model.nv):
             v[j] += impulse[row] * assembly.jacobian[row, j]
@@ -484,7 +536,8 @@ def push_all(
     contacts, assembly = memory.contacts, memory.assembly
     equations, usual = memory.equations, memory.usual
     if straight:
-        push_candidates(model, contacts, assembly, near, count, equations, usual, v)
+        loops = memory.loops.unknown.shape[0]
+        push_candidates(model, contacts, assembly, near, count, loops, equations, usual, v)
     else:
         add_impulse(model, assembly, count, equations, v)
 
@@ -497,11 +550,12 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     impact, step = work.impact, work.step
     straight = are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
-        gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        loops = memory.loops
+        gather_delassus(model, contacts, dry_joint, near, count, loops, equations, usual, assembly)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        joints = count - dry_joint.shape[0]
+        joints = count - dry_joint.shape[0] - memory.loops.unknown.shape[0]
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, equations, count, assembly)
     problem.count = count
@@ -576,6 +630,9 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
+        first_loop = model.nc + 2 * model.nv + memory.dry_joint.shape[0]
+        count = append_loops(first_loop, count, memory.loops, assembly)
+        free_loop_velocities(count, memory.loops, memory.next_v, assembly)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
@@ -611,8 +668,11 @@ def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
         contact = memory.assembly.candidate[place]
         stop = contact - model.nc
         dry = stop - 2 * model.nv
+        loop = dry - memory.dry_joint.shape[0]
         normal, tangent = answer.impulse[2 * place], answer.impulse[2 * place + 1]
-        if dry >= 0:
+        if loop >= 0:
+            note_loop(model, loop, normal / step, memory.loops)
+        elif dry >= 0:
             reaction.friction_torque[memory.dry_joint[dry]] = tangent / step
             reaction.dry_mode[dry] = answer.mode[place]
         elif stop >= 0:
@@ -665,6 +725,9 @@ def move(
         integrate(model, q, along, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
+    if memory.loops.unknown.shape[0] > 0:
+        if not close_loops(model, memory.equations, memory.loops, q):
+            return DIVERGED
     clock.time = clock.start + (clock.index + 1) * work.step
     return DONE
 
