@@ -503,7 +503,9 @@ class Bundle:
         ValueError
             If something is missing, or of another shape or kind; nothing has changed then.
         """
-        storage = {n: mine for n, mine in self.storage(prefix) if mine.flags.writeable and mine.size}
+        storage = {
+            n: mine for n, mine in self.storage(prefix) if mine.flags.writeable and mine.size
+        }
         for name, mine in storage.items():
             its = contents.get(name)
             if its is None or its.shape != mine.shape or its.dtype != mine.dtype:

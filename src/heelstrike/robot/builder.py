@@ -218,9 +218,7 @@ class RobotBuilder:
         self.contact(link, heel, friction=friction)
         self.contact(link, toe, friction=friction)
 
-    def loop(
-        self, link: str, other: str | None, *, at: Pair, other_at: Pair | None = None
-    ) -> None:
+    def loop(self, link: str, other: str | None, *, at: Pair, other_at: Pair | None = None) -> None:
         """Close a loop: join two links, which hang on others already, by one more hinge.
 
         It holds exactly, whatever it takes; what it takes is recorded as ``Run.loop_force``.

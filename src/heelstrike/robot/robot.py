@@ -426,6 +426,44 @@ class Robot:
 
         return standing(self, ground)
 
+    def closed(self, state: State, *, keep: Iterable[str | int] = ()) -> State:
+        """Return the nearest state in which all loops are closed and all couplings hold.
+
+        Positions move the shortest way by the masses, and so do velocities, as an impact would
+        change them.
+
+        Parameters
+        ----------
+        state : State
+            The state, left as it is.
+        keep : iterable of str or int, optional
+            Joints that stay as they are, in position and velocity: the crank of a four-bar.
+
+        Returns
+        -------
+        State
+            The state; the same if the robot has neither loops nor couplings.
+
+        Raises
+        ------
+        RobotError
+            If a joint is unknown, or no such state is found.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> build = hs.RobotBuilder("pair")
+        >>> for name in ("front", "rear"):
+        ...     wheel = build.hinge(name, None, mass=1.0, inertia=0.1)
+        >>> build.couple("rear", "front", [0.0, 2.0])
+        >>> pair = build.build()
+        >>> pair.closed(pair.state({"front": 0.3}), keep=["front"]).q
+        array([0.3, 0.6])
+        """
+        from heelstrike.contact.queries.placing import closed
+
+        return closed(self, state, keep)
+
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.
 

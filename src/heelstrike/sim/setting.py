@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from heelstrike.contact.ground import Ground
+from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import NUMBERS, Model
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
 MOST_EVERY = 2**62
 
 FLAT = Ground()
+
+# Loops that are open by no more than this (m, rad) are closed as a simulation begins.
+OPEN_LOOP = 1e-6
 
 # A walking robot has fallen when its centre of mass is below this fraction of its first height.
 FALL_FRACTION = 0.5
@@ -175,3 +179,12 @@ def _check_state(robot: Robot, state: State) -> None:
         if not np.all(np.isfinite(vector)):
             joint = robot.joint_names[int(np.flatnonzero(~np.isfinite(vector))[0])]
             raise SimulationError(f"state.{name} of joint {joint!r} is not finite")
+    open_by = np.abs(loop_displacement(robot, state.q))
+    if np.any(open_by > OPEN_LOOP):
+        row = int(np.argmax(open_by))
+        names = [f"loop {name}" for name in robot.loop_names for _ in range(2)]
+        names += [f"coupling of {name}" for name in robot.coupling_names]
+        raise SimulationError(
+            f"in this state the {names[row]} of robot {robot.name!r} is open by "
+            f"{open_by[row]:.3g}; robot.closed(state) is the nearest state in which all hold"
+        )

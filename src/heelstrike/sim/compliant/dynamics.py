@@ -547,9 +547,7 @@ def dot(a: Floats, b: Floats) -> float:
 
 
 @kernel
-def solve_stage(
-    model: Model, g: float, stage: int, loops: Loops, work: CompliantWorkspace
-) -> None:
+def solve_stage(model: Model, g: float, stage: int, loops: Loops, work: CompliantWorkspace) -> None:
     """Solve for a stage from its right-hand side."""
     nv = model.parent.shape[0]
     u_q = work.stage_q[stage]

@@ -2,8 +2,9 @@
 
 Their equations (:mod:`heelstrike.dynamics.loops`) are rows of the contact problem like those of
 points and stops, with the whole line as the set of their forces. They come last among the
-candidates, one a row, on the normal; the tangent is empty. Accelerations and velocities that solve
-the problem keep ``J v`` and ``J v̇ + J̇ v`` at zero, to which no error of the positions is added:
+candidates, one a row, on the normal; the tangent is empty. Accelerations that solve the problem
+keep ``J v̇ + J̇ v`` at zero, velocities after an impact ``J v``, and those of a time step h ahead
+``J v⁺ + h J̇ v``, which is J v⁺ of the next pose. No error of the positions is added to these:
 positions are put back on the equations by themselves (:func:`close_loops`), along the way that is
 shortest by the masses. So nothing drifts, and the forces are those of the motion alone.
 """
@@ -40,20 +41,17 @@ def append_loops(first: int, count: int, loops: Loops, assembly: Assembly) -> in
 
 
 @dissolved_kernel
-def free_loop_velocities(count: int, loops: Loops, v: Floats, assembly: Assembly) -> None:
-    """Write the free terms J v of the rows of the loops, which end with the first `count`."""
-    first = count - loops.unknown.shape[0]
-    for place in range(first, count):
-        assembly.problem.free[2 * place] = speed_along(place - first, loops, v)
+def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: Assembly) -> None:
+    """Write the free terms J x + t J̇ v of the rows of the loops, the last of `count` candidates.
 
-
-@dissolved_kernel
-def free_loop_accelerations(count: int, loops: Loops, rate: Floats, assembly: Assembly) -> None:
-    """The same for accelerations, J v̇ + J̇ v."""
+    Of accelerations x the time t is 1; of the velocities of an impact it is 0; of velocities that
+    shall fit the loops a step further on, it is that step.
+    """
     first = count - loops.unknown.shape[0]
     for place in range(first, count):
         row = place - first
-        assembly.problem.free[2 * place] = speed_along(row, loops, rate) + loops.rows.bias[row]
+        ahead = time * loops.rows.bias[row]
+        assembly.problem.free[2 * place] = speed_along(row, loops, rate) + ahead
 
 
 @kernel
@@ -153,9 +151,7 @@ def close_loops(model: Model, equations: Equations, loops: Loops, q: Floats) -> 
 
 
 @kernel
-def steady_loops(
-    model: Model, equations: Equations, loops: Loops, q: Floats, v: Floats
-) -> None:
+def steady_loops(model: Model, equations: Equations, loops: Loops, q: Floats, v: Floats) -> None:
     """Take from velocities what tears at the loops, as an impact would."""
     tree = equations.tree
     forward_kinematics(model, q, tree)

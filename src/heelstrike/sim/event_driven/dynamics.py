@@ -26,7 +26,7 @@ from heelstrike.sim.contacts.geometry import (
     solve_mass_matrix,
     weigh,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loop_accelerations
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -235,7 +235,7 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
             impulse[2 * place] = model.dry_friction[joint]
     loops = memory.loops.unknown.shape[0]
     total = count + loops
-    free_loop_accelerations(total, memory.loops, memory.equations.rate, assembly)
+    free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)
     for row in range(2 * count, 2 * total):
         impulse[row] = 0.0
     size = list_unknowns(count, loops, assembly.candidate, friction, phase)

@@ -15,11 +15,7 @@ from heelstrike.sim.contacts.geometry import (
     locate_contacts,
     row_product,
 )
-from heelstrike.sim.contacts.loops import (
-    append_loops,
-    free_loop_accelerations,
-    free_loop_velocities,
-)
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
@@ -86,7 +82,7 @@ def collide(
         return True, 0.0
     find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
-    free_loop_velocities(total, memory.loops, v, assembly)
+    free_loops(total, memory.loops, v, 0.0, assembly)
     assemble_delassus(model, equations, total, assembly)
     friction, guess = memory.surface.friction, memory.reaction.mode
     status = solve_candidates(count, loops, False, friction, guess, phase, assembly)
@@ -137,7 +133,7 @@ def short_bounces(
         contact = assembly.candidate[place]
         free_gap_acceleration(model, contacts, equations, contact, place, phase, assembly)
     total = count + loops
-    free_loop_accelerations(total, memory.loops, equations.rate, assembly)
+    free_loops(total, memory.loops, equations.rate, 1.0, assembly)
     if total > 0:
         solve_candidates(count, loops, True, friction, memory.reaction.mode, phase, assembly)
         add_impulse(model, assembly, total, equations, equations.rate)

@@ -66,8 +66,8 @@ class Phase(Bundle):
     system : (forces, forces + 1) float
     unknown : (forces,) float
     column : (forces,) int
-        Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal force, the
-        equations themselves, their solution, and its order.
+        Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal
+        force, the equations themselves, their solution, and its order.
     value, rate, end_value, end_rate : (2 nc,) float
     before, before_rate, sample, sample_rate : (2 nc,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of

@@ -52,7 +52,7 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.loops import (
     append_loops,
     close_loops,
-    free_loop_velocities,
+    free_loops,
     note_loop,
     speed_along,
     steady_loops,
@@ -618,6 +618,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
     begin_step(memory.next_v, impact)
+    ahead = 0.5 * work.step if work.scheme == MOREAU_JEAN else work.step  # from the pose now
     again = True
     solved = True
     count = 0
@@ -632,7 +633,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
         )
         first_loop = model.nc + 2 * model.nv + memory.dry_joint.shape[0]
         count = append_loops(first_loop, count, memory.loops, assembly)
-        free_loop_velocities(count, memory.loops, memory.next_v, assembly)
+        free_loops(count, memory.loops, memory.next_v, ahead, assembly)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
@@ -725,9 +726,9 @@ def move(
         integrate(model, q, along, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
-    if memory.loops.unknown.shape[0] > 0:
-        if not close_loops(model, memory.equations, memory.loops, q):
-            return DIVERGED
+    has_loops = memory.loops.unknown.shape[0] > 0
+    if has_loops and not close_loops(model, memory.equations, memory.loops, q):
+        return DIVERGED
     clock.time = clock.start + (clock.index + 1) * work.step
     return DONE
 
