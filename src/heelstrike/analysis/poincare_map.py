@@ -5,8 +5,8 @@ state after touchdown is relabelled - left and right exchanged, a wheel turned b
 moved back along the ground.
 
 On this section the feet obey equations: points on the ground have no gap, those that stand have no
-velocity, and where along the ground they are does not matter. A :class:`Chart` numbers what these
-leave free.
+velocity, and where along the ground they are does not matter; closed loops hold. A :class:`Chart`
+numbers what these leave free.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -128,9 +129,11 @@ class Chart:
 
     def _equations(self, x: Floats) -> Floats:
         """What vanishes on the section."""
-        place, gap, velocity = self._section.contacts(State(x[: self._nq], x[self._nq :]))
+        robot, q, v = self._section.robot, x[: self._nq], x[self._nq :]
+        place, gap, velocity = self._section.contacts(State(q, v))
+        loops = loop_displacement(robot, q), loop_jacobian(robot, q) @ v
         return np.concatenate(
-            (gap[self._touching], velocity[self._at_rest], [place[self._foothold]])
+            (gap[self._touching], velocity[self._at_rest], [place[self._foothold]], *loops)
         )
 
     def state(self, coordinates: Floats) -> State:

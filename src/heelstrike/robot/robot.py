@@ -339,7 +339,8 @@ class Robot:
         Returns
         -------
         State
-            Its positions stay inside the joints' ranges; its feet may be in the ground or above it.
+            Its positions stay inside the joints' ranges; its feet may be in the ground or above it,
+            and its loops open (see :meth:`closed`).
 
         Raises
         ------
@@ -564,6 +565,11 @@ class Robot:
         -------
         str
             The page, to be written to a file.
+
+        Raises
+        ------
+        RobotError
+            If the robot has closed loops or coupled joints, of which the page would know nothing.
 
         Examples
         --------

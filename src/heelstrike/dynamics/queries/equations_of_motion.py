@@ -90,4 +90,5 @@ def forward_dynamics(at: Evaluation, force: ArrayLike) -> Floats:
     total, size = at.vector("force", force), at.model.nv
     matrix, factor = at.zeros(size, size), at.zeros(size, size)
     free = at.filled((size,), kernels.forward_dynamics, at.model, total, at.work, matrix, factor)
-    return held(at, matrix, free)
+    result: Floats = held(at, matrix, free)
+    return result

@@ -6,6 +6,8 @@ Rows go loop by loop (x, then z, in world axes), then coupling by coupling; see
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from heelstrike.dynamics.loops import LoopRows, count_rows, find_rows
@@ -41,7 +43,7 @@ def loop_bias_acceleration(at: Evaluation) -> Floats:
     return rows_of(at).bias
 
 
-def held(at: Evaluation, matrix: Floats, acceleration: Floats) -> Floats:
+def held(at: Evaluation, matrix: Any, acceleration: Any) -> Any:
     """Return an acceleration with what the forces of the loops add to it.
 
     Parameters
@@ -53,7 +55,7 @@ def held(at: Evaluation, matrix: Floats, acceleration: Floats) -> Floats:
     acceleration : (nv,) array
         Acceleration without these forces.
     """
-    rows = rows_of(at)
+    rows: Any = rows_of(at)
     if not rows.displacement.size:
         return acceleration
     if not at.symbolic:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.robot.files.loops import is_modelled
+from heelstrike.robot.files.links import is_modelled
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.warning import warn
 

@@ -62,7 +62,7 @@ from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCIT
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
-from heelstrike.sim.memory import Assembly, Equations, Loops, Memory, UsualPoints
+from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
@@ -400,7 +400,7 @@ def joint_row(
 
 @dissolved_kernel
 def gather_delassus(
-    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int, loops: Loops,
+    model: Model, contacts: Contacts, dry_joint: Integers, near: int, count: int,
     equations: Equations, usual: UsualPoints, assembly: Assembly,
 ) -> None:  # fmt: skip
     """Delassus matrix of all usual points; that of the candidates too, if these are others."""
@@ -423,11 +423,11 @@ def gather_delassus(
                 for j in range(2):
                     entry = usual.usual_problem.delassus[row + i, column + j]
                     assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
-    joints = count - loops.unknown.shape[0]
-    for place in range(near, joints):
+    first_loop = model.nc + 2 * model.nv + dry_joint.shape[0]
+    for place in range(near, count):
+        if candidate[place] >= first_loop:
+            break
         add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
-    for place in range(joints, count):
-        add_loop(model, contacts, dry_joint, near, joints, place, loops, equations, usual, assembly)
 
 
 @dissolved_kernel
@@ -466,23 +466,21 @@ def add_joint(
 
 
 @kernel
-def add_loop(
-    model: Model, contacts: Contacts, dry_joint: Integers, near: int, joints: int, place: int,
-    loops: Loops, equations: Equations, usual: UsualPoints, assembly: Assembly,
-) -> None:  # fmt: skip
+def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -> None:
     """Add the row of a loop at a place to the Delassus matrix, after all points and joints.
 
     As with joints, A⁻¹ Jᵀ goes to that row of ``assembly.jacobian``.
     """
-    candidate, delassus, row = assembly.candidate, assembly.problem.delassus, 2 * place
+    assembly, usual, row = memory.assembly, memory.usual, 2 * place
+    candidate, delassus = assembly.candidate, assembly.problem.delassus
     change = assembly.jacobian[row]
-    solve_mass_matrix(model, equations, change)
+    solve_mass_matrix(model, memory.equations, change)
     for other in range(2 * place + 2):
         for own in range(row, row + 2):
             delassus[own, other] = 0.0
             delassus[other, own] = 0.0
     if near > 0:
-        find_velocities(model, contacts, change, True, equations.tree, usual)
+        find_velocities(model, memory.contacts, change, True, memory.equations.tree, usual)
     for other in range(near):
         for i in range(2):
             entry = usual.point_velocity[candidate[other], i]
@@ -491,17 +489,17 @@ def add_loop(
     for other in range(near, place + 1):
         column = 2 * other
         if other < joints:
-            column, joint, sign = joint_row(model, dry_joint, candidate, other)
+            column, joint, sign = joint_row(model, memory.dry_joint, candidate, other)
             entry = sign * change[joint]
         else:
-            entry = speed_along(other - joints, loops, change)
+            entry = speed_along(other - joints, memory.loops, change)
         delassus[row, column] = entry
         delassus[column, row] = entry
 
 
 @dissolved_kernel
 def push_candidates(
-    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int, loops: int,
+    model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int,
     equations: Equations, usual: UsualPoints, v: Floats,
 ) -> None:  # fmt: skip
     """Add what the impulses of the candidates do to a velocity, after `gather_delassus`."""
@@ -522,7 +520,7 @@ def push_candidates(
         )  # fmt: skip
     for place in range(near, count):
         row = 2 * place
-        if place < count - loops and assembly.candidate[place] >= model.nc + 2 * model.nv:
+        if assembly.candidate[place] >= model.nc + 2 * model.nv:
             row += 1
         for j in range(model.nv):
             v[j] += impulse[row] * assembly.jacobian[row, j]
@@ -536,8 +534,11 @@ def push_all(
     contacts, assembly = memory.contacts, memory.assembly
     equations, usual = memory.equations, memory.usual
     if straight:
-        loops = memory.loops.unknown.shape[0]
-        push_candidates(model, contacts, assembly, near, count, loops, equations, usual, v)
+        joints = count - memory.loops.unknown.shape[0]
+        push_candidates(model, contacts, assembly, near, joints, equations, usual, v)
+        for place in range(joints, count):
+            for j in range(model.nv):
+                v[j] += assembly.answer.impulse[2 * place] * assembly.jacobian[2 * place, j]
     else:
         add_impulse(model, assembly, count, equations, v)
 
@@ -550,8 +551,10 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     impact, step = work.impact, work.step
     straight = are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
-        loops = memory.loops
-        gather_delassus(model, contacts, dry_joint, near, count, loops, equations, usual, assembly)
+        gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        joints = count - memory.loops.unknown.shape[0]
+        for place in range(joints, count):
+            add_loop(model, near, joints, place, memory)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:

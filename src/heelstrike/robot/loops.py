@@ -1,0 +1,46 @@
+"""What of a robot is no tree: closed loops and coupled joints, in words."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike.errors import RobotError
+from heelstrike.robot.robot import Robot
+
+
+def refuse_loops(robot: Robot, what: str, kind: type[Exception] = RobotError) -> None:
+    """Refuse a robot with closed loops or coupled joints where only trees will do.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    what : str
+        What does not know of loops.
+    kind : type
+        Error to raise.
+
+    Raises
+    ------
+    Exception
+        Of this kind, that names the loops.
+    """
+    found = [f"loop {name}" for name in robot.loop_names]
+    found += [f"coupling of {name}" for name in robot.coupling_names]
+    if found:
+        raise kind(
+            f"{what} knows robots whose joints move by themselves only, and robot {robot.name!r} "
+            f"has {', '.join(found)}"
+        )
+
+
+def coupling_words(robot: Robot, coupling: int) -> str:
+    """Say what a coupling is: ``rear = 0.1 + 2 front``, each joint from where it stands."""
+    joint, leader = robot.model.coupling_joint[coupling]
+    factors = robot.model.coupling_polynomial[coupling]
+    letters = f" {robot.joint_names[leader]}" if leader >= 0 else ""
+    powers = ["", letters, *(f"{letters}^{k}" for k in range(2, len(factors)))]
+    terms = [
+        f"{factors[k]:.6g}{powers[k]}" for k in np.flatnonzero(factors) if k == 0 or leader >= 0
+    ]
+    return f"{robot.joint_names[joint]} = {' + '.join(terms) or '0'}"
