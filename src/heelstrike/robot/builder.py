@@ -243,11 +243,15 @@ class RobotBuilder:
         second = -1 if other is None else self._index(other, "a loop joins")
         if first == second:
             raise self._error(f"a loop joins link {link!r} to itself, which says nothing.")
-        x, z = _pair("at", at)
-        if other_at is None:
-            (x1, z1), (x2, z2) = self._origin(first), self._origin(second)
-            other_at = x + x1 - x2, z + z1 - z2
-        self._loops.append(((first, second), ((x, z), _pair("other_at", other_at))))
+        try:
+            x, z = _pair("at", at)
+            if other_at is None:
+                (x1, z1), (x2, z2) = self._origin(first), self._origin(second)
+                other_at = x + x1 - x2, z + z1 - z2
+            places = (x, z), _pair("other_at", other_at)
+        except RobotError as error:
+            raise self._error(f"loop of {link!r} and {other!r}: {error}") from None
+        self._loops.append(((first, second), places))
 
     def couple(
         self, joint: str, leader: str | None, polynomial: Sequence[float] = (0.0, 1.0)
@@ -279,7 +283,10 @@ class RobotBuilder:
                 f"joint {joint!r} follows by a polynomial of one to {POWERS} coefficients, got "
                 f"{polynomial!r}."
             )
-        factors = [_number("a coefficient of a polynomial", each) for each in polynomial]
+        try:
+            factors = [_number("a coefficient of its polynomial", each) for each in polynomial]
+        except RobotError as error:
+            raise self._error(f"joint {joint!r} follows: {error}") from None
         self._couplings.append((places, (*factors, *[0.0] * (POWERS - len(factors)))))
 
     def build(self) -> Robot:

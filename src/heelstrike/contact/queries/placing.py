@@ -78,8 +78,8 @@ def closed(robot: Robot, state: State, keep: Iterable[str | int] = ()) -> State:
     for _ in range(MOST_ITERATIONS):
         open_by = dynamics.loop_displacement(robot, q)
         worst = float(np.abs(open_by).max(initial=0.0))
-        if worst == 0.0 or (worst < CLOSE and not worst < 0.5 * before):
-            break
+        if worst < CLOSE and (before == np.inf or not worst < 0.5 * before):
+            break  # closed as it came, or as well as can be
         before = worst
         change = _least(robot, q, free, -open_by)
         q[free] += np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)

@@ -279,7 +279,7 @@ def sample(
             equations, loops, q = memory.equations, memory.loops, memory.q
             if not close_loops(model, equations, loops, q):
                 return DIVERGED
-            steady_loops(model, equations, loops, q, memory.v)
+            steady_loops(model, q, equations, loops, memory.v)
         observe(model, ground, memory.q, memory.v, memory)
         met = landing(model, work.atol, memory.contacts.gap, work)
         if met < 1.0 and not shortest:
@@ -404,7 +404,7 @@ def begin(
         equations, loops, q = memory.equations, memory.loops, memory.q
         if not close_loops(model, equations, loops, q):
             return DIVERGED
-        steady_loops(model, equations, loops, q, memory.v)
+        steady_loops(model, q, equations, loops, memory.v)
     observe(model, ground, memory.q, memory.v, memory)
     for contact in range(model.contact_link.shape[0]):
         memory.reported.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP

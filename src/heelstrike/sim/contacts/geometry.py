@@ -168,7 +168,7 @@ def halve_all_by_bodies(model: Model, row: int, equations: Equations, assembly: 
 
 
 @kernel
-def assemble_delassus(model: Model, equations: Equations, count: int, assembly: Assembly) -> None:
+def assemble_delassus(model: Model, count: int, equations: Equations, assembly: Assembly) -> None:
     """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates.
 
     With A = Lᵀ D L it is the square of ``assembly.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are

@@ -3,10 +3,15 @@
 Their equations (:mod:`heelstrike.dynamics.loops`) are rows of the contact problem like those of
 points and stops, with the whole line as the set of their forces. They come last among the
 candidates, one a row, on the normal; the tangent is empty. Accelerations that solve the problem
-keep ``J v̇ + J̇ v`` at zero, velocities after an impact ``J v``, and those of a time step h ahead
-``J v⁺ + h J̇ v``, which is J v⁺ of the next pose. No error of the positions is added to these:
-positions are put back on the equations by themselves (:func:`close_loops`), along the way that is
-shortest by the masses. So nothing drifts, and the forces are those of the motion alone.
+keep ``J v̇ + J̇ v`` at zero, velocities after an impact ``J v``. Those of a time step h keep
+``J v⁺ + h/2 J̇ v`` at zero: to second order that is the chord between two poses that fit the loops,
+as in the method SHAKE. With the tangent of either pose in its place, loops would brake or drive
+what turns in them, by h times the cube of its speed. (The first step of a motion that begins
+along the tangent has therefore half of the centripetal force.)
+
+No error of the positions is added to these: positions are put back on the equations by themselves
+(:func:`close_loops`), along the way that is shortest by the masses. So nothing drifts, and the
+forces are those of the motion alone.
 """
 
 from __future__ import annotations
@@ -44,8 +49,8 @@ def append_loops(first: int, count: int, loops: Loops, assembly: Assembly) -> in
 def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: Assembly) -> None:
     """Write the free terms J x + t J̇ v of the rows of the loops, the last of `count` candidates.
 
-    Of accelerations x the time t is 1; of the velocities of an impact it is 0; of velocities that
-    shall fit the loops a step further on, it is that step.
+    Of accelerations x the time t is 1, of the velocities of an impact 0, of those of a time step
+    half of it.
     """
     first = count - loops.unknown.shape[0]
     for place in range(first, count):
@@ -151,7 +156,7 @@ def close_loops(model: Model, equations: Equations, loops: Loops, q: Floats) -> 
 
 
 @kernel
-def steady_loops(model: Model, equations: Equations, loops: Loops, q: Floats, v: Floats) -> None:
+def steady_loops(model: Model, q: Floats, equations: Equations, loops: Loops, v: Floats) -> None:
     """Take from velocities what tears at the loops, as an impact would."""
     tree = equations.tree
     forward_kinematics(model, q, tree)

@@ -215,7 +215,7 @@ def gather_closed(
             count += 1
     total = append_loops(phase.closed.shape[0], count, loops, assembly)
     if total > 0:
-        assemble_delassus(model, equations, total, assembly)
+        assemble_delassus(model, total, equations, assembly)
     return count
 
 

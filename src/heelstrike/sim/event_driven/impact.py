@@ -83,7 +83,7 @@ def collide(
     find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
-    assemble_delassus(model, equations, total, assembly)
+    assemble_delassus(model, total, equations, assembly)
     friction, guess = memory.surface.friction, memory.reaction.mode
     status = solve_candidates(count, loops, False, friction, guess, phase, assembly)
     note_residual(assembly.answer.residual, memory.tally)

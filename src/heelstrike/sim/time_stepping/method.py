@@ -224,7 +224,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, rec
         equations, loops, q = memory.equations, memory.loops, memory.q
         if not close_loops(model, equations, loops, q):
             return DIVERGED
-        steady_loops(model, equations, loops, q, memory.v)
+        steady_loops(model, q, equations, loops, memory.v)
     return DONE
 
 
@@ -560,7 +560,7 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     else:
         joints = count - dry_joint.shape[0] - memory.loops.unknown.shape[0]
         write_rows(model, equations.tree, contacts, joints, assembly)
-        assemble_delassus(model, equations, count, assembly)
+        assemble_delassus(model, count, equations, assembly)
     problem.count = count
     solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
     if solved and work.scheme == IMPACT_RESOLVED:
@@ -621,7 +621,6 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
     begin_step(memory.next_v, impact)
-    ahead = 0.5 * work.step if work.scheme == MOREAU_JEAN else work.step  # from the pose now
     again = True
     solved = True
     count = 0
@@ -636,7 +635,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
         )
         first_loop = model.nc + 2 * model.nv + memory.dry_joint.shape[0]
         count = append_loops(first_loop, count, memory.loops, assembly)
-        free_loops(count, memory.loops, memory.next_v, ahead, assembly)
+        free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
