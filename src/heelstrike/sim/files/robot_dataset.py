@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.model import NUMBERS, Model
+from heelstrike.robot.model import NUMBERS, SELDOM, Model
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
@@ -70,7 +70,11 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     for index, foot in enumerate(robot.feet):
         foot_of[list(foot.contacts)] = index
     values: dict[str, Any] = {
-        **{name: getattr(robot.model, name) for name in _NUMBERS},
+        **{
+            name: each
+            for name in _NUMBERS
+            if (each := getattr(robot.model, name)).size or NUMBERS[name].shape[0] not in SELDOM
+        },
         **{name: getattr(robot, name) for name in _NAMES},
         "foot_link": [foot.link for foot in robot.feet],
         "foot_name": [foot.name for foot in robot.feet],
