@@ -70,6 +70,7 @@ class RobotBuilder:
         self._points: list[ContactPoint] = []
         self._loops: list[tuple[tuple[int, int], tuple[Pair, Pair]]] = []
         self._couplings: list[tuple[tuple[int, int], tuple[float, ...]]] = []
+        self._latches: list[tuple[int, int, int]] = []
 
     def floating_base(
         self, link: str, at: Pair = (0.0, 0.0), **properties: Unpack[JointProperties]
@@ -289,6 +290,38 @@ class RobotBuilder:
             raise self._error(f"joint {joint!r} follows: {error}") from None
         self._couplings.append((places, (*factors, *[0.0] * (POWERS - len(factors)))))
 
+    def latch(self, joint: str, end: str, *, release: str | None = None) -> None:
+        """Let an end of a joint's range hold the joint once it is there, as locks of knees do.
+
+        Parameters
+        ----------
+        joint : str
+            The joint, which has a limit at that end.
+        end : {"lower", "upper"}
+            The end that holds it.
+        release : str, optional
+            Link that makes it let go when it touches down, by any of its contact points. Else the
+            latch holds until :attr:`Simulation.latched` says otherwise.
+
+        Raises
+        ------
+        RobotError
+            If joint or link are unknown, or the joint has no limit there or a latch already.
+        """
+        place = self._joint(joint, "latch")
+        if end not in ("lower", "upper"):
+            raise self._error(
+                f"the latch of joint {joint!r} is at an end, 'lower' or 'upper', not {end!r}."
+            )
+        if not math.isfinite(self._links[place].numbers[end]):
+            raise self._error(
+                f"the latch of joint {joint!r} holds it at its {end} limit, and it has none."
+            )
+        if any(place == known for known, _, _ in self._latches):
+            raise self._error(f"joint {joint!r} has a latch already.")
+        by = -1 if release is None else self._index(release, f"the latch of {joint!r} lets go by")
+        self._latches.append((place, 1 if end == "upper" else -1, by))
+
     def build(self) -> Robot:
         """Return the robot. The builder may go on and build others.
 
@@ -320,6 +353,9 @@ class RobotBuilder:
             loop_position=[places for _, places in self._loops],
             coupling_joint=[joints for joints, _ in self._couplings],
             coupling_polynomial=[factors for _, factors in self._couplings],
+            latch_joint=[joint for joint, _, _ in self._latches],
+            latch_side=[side for _, side, _ in self._latches],
+            latch_release=[link for _, _, link in self._latches],
             pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(
@@ -361,11 +397,11 @@ class RobotBuilder:
         self._links.append(_Link(joint, name, numbers, torque))
         return name
 
-    def _joint(self, joint: str) -> int:
+    def _joint(self, joint: str, what: str = "couple") -> int:
         names = [link.joint for link in self._links]
         if joint not in names:
             known = ", ".join(names) or "none yet"
-            raise self._error(f"there is no joint {joint!r} to couple. Joints are: {known}.")
+            raise self._error(f"there is no joint {joint!r} to {what}. Joints are: {known}.")
         return names.index(joint)
 
     def _origin(self, link: int) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
-from heelstrike.robot.loops import coupling_words
+from heelstrike.robot.loops import coupling_words, latch_words
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import (
     Finding,
@@ -295,6 +295,7 @@ def _description(robot: Robot) -> str:
             )
     lines += [f"closed loop: {name}" for name in robot.loop_names]
     lines += [f"coupled: {coupling_words(robot, k)}" for k in range(robot.model.couplings)]
+    lines += [f"latch: {latch_words(robot, k)}" for k in range(robot.model.latches)]
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
@@ -447,5 +448,6 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "locked": [asdict(one) for one in robot.locked],
         "loops": list(robot.loop_names),
         "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
+        "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
         **of_joints,
     }

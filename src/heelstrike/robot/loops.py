@@ -1,4 +1,4 @@
-"""What of a robot is no tree: closed loops and coupled joints, in words."""
+"""What a robot has beside its joints, in words: closed loops, coupled joints, latches."""
 
 from __future__ import annotations
 
@@ -44,3 +44,12 @@ def coupling_words(robot: Robot, coupling: int) -> str:
         f"{factors[k]:.6g}{powers[k]}" for k in np.flatnonzero(factors) if k == 0 or leader >= 0
     ]
     return f"{robot.joint_names[joint]} = {' + '.join(terms) or '0'}"
+
+
+def latch_words(robot: Robot, latch: int) -> str:
+    """Say what a latch does: ``left_knee at its lower end, until right_shank touches down``."""
+    model = robot.model
+    end = "upper" if model.latch_side[latch] > 0 else "lower"
+    release = model.latch_release[latch]
+    until = f", until {robot.link_names[release]} touches down" if release >= 0 else ""
+    return f"{robot.latch_names[latch]} at its {end} end{until}"

@@ -29,7 +29,7 @@ AXES = 2
 POWERS = 5
 """Coefficients of the polynomial by which a joint follows another."""
 
-SELDOM = ("loops", "couplings")
+SELDOM = ("loops", "couplings", "latches")
 """Extents of what most robots have nothing of."""
 
 
@@ -98,8 +98,8 @@ class Model(Bundle):
         are equal; each counts what it says.
     nc, nu : int
         Number of contact points and of actuators.
-    loops, couplings : int
-        Number of closed loops and of coupled joints.
+    loops, couplings, latches : int
+        Number of closed loops, of coupled joints and of latches.
     axes : int
         Dimension of space.
     parent : (nl,) int
@@ -156,6 +156,12 @@ class Model(Bundle):
     coupling_polynomial : (couplings, 5) float
         How far from its `reference` the follower is (rad, m): coefficients c₀ … c₄ of the powers of
         how far the leader is from its own.
+    latch_joint : (latches,) int
+        Joint that each latch holds once it has reached an end of its range.
+    latch_side : (latches,) int
+        That end: 1 for the upper, -1 for the lower.
+    latch_release : (latches,) int
+        Link whose touchdown makes it let go; -1 if none does.
     pivot : int
         Link whose origin serves as the reference point of spatial vectors, so that a robot far
         from the world origin loses no digits.
@@ -169,6 +175,7 @@ class Model(Bundle):
     nu: int = extent()
     loops: int = extent()
     couplings: int = extent()
+    latches: int = extent()
     axes: int = extent()
 
     parent: Integers = of("nl", kind=int, points="nl", least=-1)
@@ -206,6 +213,9 @@ class Model(Bundle):
     loop_position: Floats = of("loops", 2, "axes", unit="m", **_LATER)
     coupling_joint: Integers = of("couplings", 2, kind=int, points="nv", least=-1, **_LATER)
     coupling_polynomial: Floats = of("couplings", POWERS, unit="rad, m", **_LATER)
+    latch_joint: Integers = of("latches", kind=int, points="nv", least=0, **_LATER)
+    latch_side: Integers = of("latches", kind=int, least=-1, **_LATER)
+    latch_release: Integers = of("latches", kind=int, points="nl", least=-1, **_LATER)
     pivot: int = of(kind=int, points="nl", least=0)
 
     @classmethod
@@ -215,7 +225,7 @@ class Model(Bundle):
         Parameters
         ----------
         **members : array
-            Every member by its name; loops and couplings only where there are any.
+            Every member by its name; loops, couplings and latches only where there are any.
 
         Returns
         -------

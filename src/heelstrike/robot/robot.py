@@ -161,6 +161,11 @@ class Robot:
         return tuple(self.joint_names[joint] for joint in self.model.coupling_joint[:, 0])
 
     @property
+    def latch_names(self) -> tuple[str, ...]:
+        """Names of the joints that latches hold."""
+        return tuple(self.joint_names[joint] for joint in self.model.latch_joint)
+
+    @property
     def total_mass(self) -> float:
         """Mass of the whole robot in kg."""
         return float(np.sum(self.model.mass))

@@ -38,6 +38,8 @@ class EventKind(enum.IntEnum):
     ``JOINT_SLIP``, ``JOINT_STICK``
         A joint with dry friction broke away, or turned round; it came to rest. The event's
         `contact` is the index of the joint.
+    ``JOINT_RELEASE``
+        A latch let go of a joint, whose index the event's `contact` is.
     """
 
     TOUCHDOWN = 0
@@ -52,6 +54,7 @@ class EventKind(enum.IntEnum):
     JOINT_STOP = 9
     JOINT_SLIP = 10
     JOINT_STICK = 11
+    JOINT_RELEASE = 12
 
 
 class Scheme(enum.IntEnum):

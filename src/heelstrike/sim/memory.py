@@ -191,7 +191,7 @@ class Reaction(Bundle):
 
 
 class Loops(Bundle):
-    """Closed loops and coupled joints, their forces, and how these are found.
+    """What holds besides the joints: closed loops, coupled joints and latches.
 
     Attributes
     ----------
@@ -206,6 +206,10 @@ class Loops(Bundle):
     loop_force : (loops, axes) float
     coupling_force : (couplings,) float
         Forces of the last solve.
+    held : (latches,) int
+        Whether each latch is engaged.
+    latch_stop : (latches,) int
+        The joint stop that each is, as candidates of time stepping are numbered.
     """
 
     rows: LoopRows = part(LoopRows)
@@ -215,6 +219,8 @@ class Loops(Bundle):
     order: Integers = array("loop_rows", of=int)
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
+    held: Integers = array("latches", of=int)
+    latch_stop: Integers = array("latches", of=int)
 
 
 class Reported(Bundle):
@@ -346,6 +352,9 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             programs=programs,
             usual_place=place,
             every_point=np.arange(nc),
+        ),
+        loops=Loops.allocate(
+            extents, latch_stop=nc + 2 * model.latch_joint + (model.latch_side > 0)
         ),
         reported=Reported.allocate(extents, resting=np.full(len(dry), -1, dtype=np.int64)),
         pushes=pushes_on(robot, pushes),

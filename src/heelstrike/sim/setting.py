@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Required, TypedDict
 from weakref import WeakKeyDictionary
@@ -17,6 +17,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import NUMBERS, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.push import Push
 from heelstrike.sim.snapshot import Snapshot
 
@@ -45,6 +46,7 @@ class Setup(TypedDict, total=False):
     record_every: int
     stop_when_fallen: bool | None
     pushes: Sequence[Push] | Push
+    latched: Iterable[str | int] | None
     checked: bool
 
 
@@ -65,6 +67,8 @@ class Setting:
     fallen_height : float
         Height of the centre of mass above the ground (m) below which the robot has fallen.
     pushes : tuple of Push
+    held : tuple of bool
+        Which latches of the robot are engaged as it begins.
     checked : bool
         Whether compiled controllers run in Python, every index looked at.
     """
@@ -76,6 +80,7 @@ class Setting:
     record_every: int
     fallen_height: float
     pushes: tuple[Push, ...]
+    held: tuple[bool, ...]
     checked: bool
 
 
@@ -88,6 +93,7 @@ def checked_setting(
     record_every: int = 1,
     stop_when_fallen: bool | None = None,
     pushes: Sequence[Push] | Push = (),
+    latched: Iterable[str | int] | None = None,
     checked: bool = False,
 ) -> Setting:
     """Check what is to be simulated.
@@ -123,6 +129,7 @@ def checked_setting(
         record_every=int(record_every),
         fallen_height=fallen_height,
         pushes=checked_pushes(robot, pushes),
+        held=latches_at(robot, state, ground, latched),
         checked=checked,
     )
 

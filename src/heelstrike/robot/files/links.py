@@ -19,6 +19,8 @@ from heelstrike.robot.files.posture import followers
 from heelstrike.robot.model import POWERS, Floats, Integers
 
 MOST_JOINTS = 1000
+LATCH = "latch"
+"""What custom data of latches are called."""
 SAME_PLACE = 1e-9
 """Metres up to which two hinges are one: in space an axis takes two points."""
 
@@ -130,17 +132,21 @@ def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> dict[str, F
 
 
 def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
-    """Return loops and couplings, as numbers of :class:`~heelstrike.robot.model.Model`."""
+    """Return loops, couplings and latches, as numbers of :class:`~heelstrike.robot.model.Model`."""
     loops: dict[tuple[Any, ...], tuple[Any, Any]] = {}
     for ends, places in _connections(file, links):
         rounded = np.round(np.ravel(places) / SAME_PLACE).astype(np.int64)
         loops.setdefault((*ends, *rounded.tolist()), (ends, places))
     couplings = list(_couplings(file))
+    latches = list(_latches(file, links))
     return {
         "loop_link": [ends for ends, _ in loops.values()],
         "loop_position": [places for _, places in loops.values()],
         "coupling_joint": [joints for joints, _ in couplings],
         "coupling_polynomial": [factors for _, factors in couplings],
+        "latch_joint": [joint for joint, _, _ in latches],
+        "latch_side": [side for _, side, _ in latches],
+        "latch_release": [link for _, _, link in latches],
     }
 
 
@@ -210,3 +216,28 @@ def _couplings(file: MujocoFile) -> Iterator[tuple[tuple[int, int], Floats]]:
         found[: len(polynomial.coef)] = own.sense * polynomial.coef
         found[0] -= own.sense * moved
         yield (place[joint], place.get(leader, -1)), found
+
+
+def _latches(file: MujocoFile, links: Links) -> Iterator[tuple[int, int, int]]:
+    """Joint, end and releasing link of latches, custom data called ``latch:JOINT:LINK``.
+
+    Raises
+    ------
+    RobotError
+        If there is no such joint or link, or no limit at that end.
+    """
+    place = {one.name: i for i, one in enumerate(file.coordinates)}
+    for numeric in range(file.model.nnumeric):
+        held, _, told = file.given_name("numeric", numeric).partition(":")
+        if held != LATCH:
+            continue
+        joint, _, release = told.partition(":")
+        side = float(file.model.numeric_data[file.model.numeric_adr[numeric]])
+        bodies = [b for b in range(file.model.nbody) if release and file.name("body", b) == release]
+        if joint not in place or side not in (1.0, -1.0) or (release and not bodies):
+            raise file.error(
+                f"the latch {told!r} in <custom> is called latch:JOINT:LINK after a joint and the "
+                "link whose touchdown lets it go, and is 1 or -1 for the end of the range: "
+                f"there is no such joint or link, or its data are {side:g}."
+            )
+        yield place[joint], int(side), int(links.of_body[bodies[0]]) if bodies else -1

@@ -99,6 +99,7 @@ def differences(
         *_differing_contacts(model, mirror, link_names),
         *_differing_loops(model, mirror, link_names),
         *_differing_couplings(model, mirror, joint_names),
+        *_differing_latches(model, mirror, joint_names),
     ]
     return list(dict.fromkeys(findings))  # two points of a foot may say the same
 
@@ -301,6 +302,21 @@ def _differing_couplings(model: Model, mirror: Mirror, names: Sequence[str]) -> 
         mirrored = mirror.sign[joint] * factors * sense ** np.arange(len(factors))
         if its is None or not same(mirrored, its):
             yield f"how {names[joint]} follows has no mirror image"
+
+
+def _differing_latches(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    image = np.append(mirror.joint, -1)
+    ends = zip(
+        model.latch_joint.tolist(),
+        model.latch_side.tolist(),
+        model.latch_release.tolist(),
+        strict=True,
+    )
+    known = list(ends)
+    for joint, side, release in known:
+        its = int(image[joint]), int(side * mirror.sign[joint]), int(image[release])
+        if its not in known:
+            yield f"the latch of {names[joint]} has no mirror image"
 
 
 def _unequal(compared: Iterable[tuple[Any, ...]], pair: str) -> Iterator[str]:

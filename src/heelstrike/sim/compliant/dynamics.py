@@ -405,9 +405,28 @@ def push_stops(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
         above = model.upper[j] - memory.q[j]
         stop.gap[j] = below if below < 0.0 else above
         stop.speed[j] = memory.v[j] if below < 0.0 else -memory.v[j]
+    held = memory.loops.held
+    for latch in range(held.shape[0]):
+        if held[latch] == 1:
+            pull_back(model, latch, memory, stop)
     call_at(laws.stop_code, (address_of(laws.stop), stop))
     for j in range(model.parent.shape[0]):
         now.stop_force[j] = stop.force[j] if memory.q[j] < model.lower[j] else -stop.force[j]
+    for latch in range(held.shape[0]):
+        j = model.latch_joint[latch]
+        if held[latch] == 1 and model.lower[j] <= memory.q[j] <= model.upper[j]:
+            now.stop_force[j] = model.latch_side[latch] * stop.force[j]
+
+
+@kernel
+def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> None:
+    """Ask the law of a stop that holds for its pull: what it would press with, mirrored."""
+    j = model.latch_joint[latch]
+    if model.lower[j] <= memory.q[j] <= model.upper[j]:
+        side = model.latch_side[latch]
+        end = model.upper[j] if side > 0 else model.lower[j]
+        stop.gap[j] = -abs(end - memory.q[j])
+        stop.speed[j] = side * memory.v[j]
 
 
 @kernel

@@ -40,6 +40,7 @@ from heelstrike.sim.compliant.dynamics import (
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
+from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, note_loop, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.motors import limit_torque
@@ -167,7 +168,7 @@ class Compliant(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a sample may add to the record."""
-        return 1, 4 * robot.nc + robot.nv
+        return 1, 4 * robot.nc + robot.nv + robot.model.latches
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with a restitution of its own."""
@@ -458,7 +459,9 @@ def move(
     if code != DONE:
         return code
     step = work.step
+    first = record.events
     note_events(model, clock.time + step, work, memory, record)
+    react(model, first, memory.q, record, memory.loops)
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
         reaction = memory.reaction

@@ -7,13 +7,14 @@ from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SO
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Assembly
+from heelstrike.sim.memory import Assembly, Loops
 
 
 @kernel
 def solve_candidates(
-    count: int, loops: int, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
     assembly: Assembly,
 ) -> int:  # fmt: skip
     """Solve the contact problem of the candidates at the level of accelerations or velocities.
@@ -36,15 +37,16 @@ def solve_candidates(
                 mode[place] = SLIDING_BACKWARD
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
-    for place in range(count, count + loops):
+    hold(count, phase.latch_stop, loops.held, assembly)
+    problem.count = count + loops.unknown.shape[0]
+    for place in range(count, problem.count):
         mode[place] = STICK
-    problem.count = count + loops
     return int(solve_contact_kernel(phase.order, problem, assembly.solver, assembly.answer))
 
 
 @kernel
 def share_redundant(
-    count: int, loops: int, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly
+    count: int, loops: Loops, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly
 ) -> None:
     """Find forces within their limits where the equations leave open who carries what.
 

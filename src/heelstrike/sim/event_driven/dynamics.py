@@ -177,6 +177,15 @@ def watch_forces(
 
 
 @dissolved_kernel
+def trust_latches(held: Integers, phase: Phase) -> None:
+    """Stops that hold their joint never open, whatever the sign of their force."""
+    for latch in range(held.shape[0]):
+        stop = phase.latch_stop[latch]
+        if held[latch] == 1 and phase.closed[stop] == 1:
+            phase.value[2 * stop] = 1.0
+
+
+@dissolved_kernel
 def free_acceleration(
     model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
 ) -> None:
@@ -287,8 +296,9 @@ def evaluate(
         hold_closed(model, count, friction, phase, memory)
     share_forces(count, assembly, friction, phase)
     watch_forces(count, loops, assembly, friction, phase)
+    trust_latches(memory.loops.held, phase)
     if count > 0 and phase.deficient == 1:
-        share_redundant(count, loops, friction, memory.reaction.mode, phase, assembly)
+        share_redundant(count, memory.loops, friction, memory.reaction.mode, phase, assembly)
     for i in range(model.nv):
         slope[i] = v[i]
         slope[model.nq + i] = rate[i]

@@ -63,7 +63,6 @@ def collide(
     v = state[model.nq :]
     equations, assembly = memory.equations, memory.assembly
     jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
-    loops = memory.loops.unknown.shape[0]
     count = 0
     for contact in range(phase.first_dry):
         phase.impulse[contact, 0] = 0.0
@@ -85,7 +84,7 @@ def collide(
     free_loops(total, memory.loops, v, 0.0, assembly)
     assemble_delassus(model, total, equations, assembly)
     friction, guess = memory.surface.friction, memory.reaction.mode
-    status = solve_candidates(count, loops, False, friction, guess, phase, assembly)
+    status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
@@ -135,7 +134,7 @@ def short_bounces(
     total = count + loops
     free_loops(total, memory.loops, equations.rate, 1.0, assembly)
     if total > 0:
-        solve_candidates(count, loops, True, friction, memory.reaction.mode, phase, assembly)
+        solve_candidates(count, memory.loops, True, friction, memory.reaction.mode, phase, assembly)
         add_impulse(model, assembly, total, equations, equations.rate)
     found = False
     for contact in range(phase.closed.shape[0]):

@@ -18,6 +18,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.kernels import forward_kinematics, momentum
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
@@ -32,6 +33,7 @@ from heelstrike.sim.contacts.geometry import (
     locate_contacts,
     observe,
 )
+from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import note_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -175,7 +177,8 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_capacity(robot) + 8
+        latches = robot.model.latches
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_capacity(robot) + 2 * latches + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
@@ -222,6 +225,10 @@ class EventDriven(Method):
         work.fired[:] = 0
         clock.begun = 0
 
+    def reconsider(self, work: Phase) -> None:
+        """Decide contact modes anew: what they hang on has been changed."""
+        work.undecided = 1
+
     def rows_in(self, duration: float, record_every: int) -> int:
         """Return about how many rows the record of a time has."""
         return 1024 if self.output_period is None else super().rows_in(duration, record_every) + 64
@@ -262,7 +269,7 @@ def write_row(
     count, loops = phase.closed_count, memory.loops.unknown.shape[0]
     if count + loops > 0:
         friction, guess = memory.surface.friction, memory.reaction.mode
-        solve_candidates(count, loops, True, friction, guess, phase, assembly)
+        solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
         note_residual(residual, memory.tally)
         note_loops(model, count + loops, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
@@ -361,7 +368,7 @@ def leave_if_possible(
             log_event(phase.time, PAINLEVE, contact, 0.0, 0.0, record)
     if several and apart:
         for place in range(count):
-            if assembly.candidate[place] < phase.first_dry:
+            if assembly.candidate[place] < phase.first_dry and assembly.problem.set[place] != LINE:
                 assembly.answer.mode[place] = OPEN
 
 
@@ -381,7 +388,9 @@ def begin_phase(
     locate_contacts(model, ground, tree, contacts, memory.surface)
     form_groups(model, tree, contacts, friction, phase)
     project(model, ground, memory, phase, phase.begin)
+    first = record.events
     report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
+    react(model, first, phase.begin[: model.nq], record, memory.loops)
 
 
 @kernel
@@ -400,7 +409,6 @@ def decide_modes(
     model = scene.model
     forced, jammed = phase.forced == 1, phase.jammed == 1
     friction, guess = memory.surface.friction, memory.reaction.mode
-    loops = memory.loops.unknown.shape[0]
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
         extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
@@ -417,7 +425,9 @@ def decide_modes(
                 continue
         count = phase.closed_count
         if not jammed and count > 0:
-            status = solve_candidates(count, loops, True, friction, guess, phase, memory.assembly)
+            status = solve_candidates(
+                count, memory.loops, True, friction, guess, phase, memory.assembly
+            )
             jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
@@ -594,6 +604,7 @@ def meet_event(
     """
     contacts, tree, direction = memory.contacts, memory.equations.tree, phase.scratch[0]
     momentum(model, tree, direction)
+    first = record.events
     impact, forced = find_what_happened(starting, direction[0], model, tree, contacts, phase)
     if impact:
         if not strike(model, ground, memory, phase, record):
@@ -604,6 +615,7 @@ def meet_event(
             if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
                 contacts.force[contact, 0] = phase.impulse[contact, 0]
                 contacts.force[contact, 1] = phase.impulse[contact, 1]
+        react(model, first, phase.begin[: model.nq], record, memory.loops)
     phase.started = BEGUN if starting else WALKING
     phase.undecided = 1
     phase.forced = 1 if forced else 0

@@ -36,6 +36,8 @@ class Phase(Bundle):
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     dry_joint : (nd,) int
         Joints with dry friction.
+    latch_stop : (latches,) int
+        The stop that each latch is, as contacts are numbered here.
     order : (3,) int
         Contact solvers in the order in which they are tried.
     closed : (nc,) int
@@ -122,6 +124,7 @@ class Phase(Bundle):
     stop_side: Floats = array("ns")
     stop_limit: Floats = array("ns")
     dry_joint: Integers = array("nd", of=int)
+    latch_stop: Integers = array("latches", of=int)
     order: Integers = array(3, of=int)
     closed: Integers = array("contacts", of=int)
     slide: Integers = array("contacts", of=int)
@@ -203,6 +206,18 @@ def allocate_phase(robot: Robot) -> Phase:
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
+        latch_stop=np.array(
+            [
+                robot.nc
+                + (
+                    len(lower) + int(np.searchsorted(upper, joint))
+                    if side > 0
+                    else int(np.searchsorted(lower, joint))
+                )
+                for joint, side in zip(model.latch_joint, model.latch_side, strict=True)
+            ],
+            dtype=np.int64,
+        ),
         closed=(np.arange(contacts) >= contacts - len(dry)).astype(np.int64),
         last_impact=np.full(contacts, -np.inf),
         accumulation=np.full(contacts, np.inf),

@@ -49,6 +49,7 @@ from heelstrike.sim.contacts.geometry import (
     weigh,
     write_unit_row,
 )
+from heelstrike.sim.contacts.latches import hold, react
 from heelstrike.sim.contacts.loops import (
     append_loops,
     close_loops,
@@ -195,7 +196,7 @@ class TimeStepping(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
-        return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names)
+        return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names) + robot.model.latches
 
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one."""
@@ -630,6 +631,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
         count = select_stops(model, work, near, memory)
+        hold(count, memory.loops.latch_stop, memory.loops.held, assembly)
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
@@ -697,7 +699,9 @@ def decide(
     free_velocity(model, work, clock.time, memory)
     solved = solve_contacts(model, work, memory)
     note_extremes(model, memory)
+    first = record.events
     note_events(model, clock.time, work.step, memory, record)
+    react(model, first, memory.q, record, memory.loops)
     return DONE if solved else SOLVER_FAILED
 
 

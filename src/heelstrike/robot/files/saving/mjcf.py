@@ -8,6 +8,7 @@ import numpy as np
 
 from heelstrike.robot.assembly import link_origins
 from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
+from heelstrike.robot.files.links import LATCH
 from heelstrike.robot.files.saving.text import (
     POINT_RADIUS,
     SMALLEST_INERTIA,
@@ -36,6 +37,13 @@ def mjcf(robot: Robot) -> Element:
     for name, joint in custom:
         data = number(getattr(model, name)[joint])
         SubElement(holder, "numeric", name=f"{name}:{robot.joint_names[joint]}", data=data)
+    body_name = names_of_bodies(robot)
+    for joint, side, release in zip(
+        model.latch_joint, model.latch_side, model.latch_release, strict=True
+    ):
+        name = f"{LATCH}:{robot.joint_names[joint]}"
+        name += f":{body_name[release]}" if release >= 0 else ""
+        SubElement(holder, "numeric", name=name, data=str(side))
     SubElement(holder, "numeric", name=COUNT, data=str(len(robot.outlines)))
     for count, outline in enumerate(robot.outlines):
         name = f"{PREFIX}:{count}:{robot.joint_names[outline.link]}"
@@ -64,11 +72,9 @@ def _write_bodies(robot: Robot, world: Element) -> None:
     """Write the tree. A massless link with one child is a joint more on the body of that child."""
     model = robot.model
     origin = link_origins(model)
-    last = body_links(robot)
+    label = names_of_bodies(robot)
     body_of: dict[int, Element] = {}
-    names = unique(robot.link_names[link] for link in last)
-    label = dict(zip(last, names, strict=True))
-    for link in last:
+    for link in label:
         joints = [link]
         while (above := int(model.parent[joints[0]])) >= 0 and above not in label:
             joints.insert(0, above)
@@ -114,6 +120,12 @@ def _write_sites(robot: Robot, link: int, body: Element) -> None:
         SubElement(body, "site", name=loop_site(loop, end), pos=place)
 
 
+def names_of_bodies(robot: Robot) -> dict[int, str]:
+    """Names of the bodies that links become."""
+    last = body_links(robot)
+    return dict(zip(last, unique(robot.link_names[link] for link in last), strict=True))
+
+
 def body_links(robot: Robot) -> list[int]:
     """Links that are bodies of their own, in order; the others only carry a joint more."""
     model = robot.model
@@ -121,6 +133,7 @@ def body_links(robot: Robot) -> list[int]:
     merged = (model.mass == 0.0) & (model.inertia == 0.0) & (children == 1)
     merged[model.contact_link] = False
     merged[model.loop_link[model.loop_link >= 0]] = False
+    merged[model.latch_release[model.latch_release >= 0]] = False
     return np.flatnonzero(~merged).tolist()
 
 
