@@ -71,17 +71,23 @@ def let_go(model: Model, first: int, record: Record, loops: Loops) -> None:
 
 
 @dissolved_kernel
-def hold(count: int, stop: Integers, held: Integers, assembly: Assembly) -> None:
+def hold(count: int, stop: Integers, held: Integers, assembly: Assembly) -> int:
     """Let the stops of engaged latches hold, where they are among the first `count` candidates.
 
-    `stop` tells the candidate that each latch is, `held` whether it is engaged.
+    `stop` tells the candidate that each latch is, `held` whether it is engaged. Returns an engaged
+    latch whose stop is not among them, or -1.
     """
-    candidate = assembly.candidate
+    missing = -1
     for latch in range(held.shape[0]):
         if held[latch] == 1:
+            found = False
             for place in range(count):
-                if candidate[place] == stop[latch]:
+                if assembly.candidate[place] == stop[latch]:
                     assembly.problem.set[place] = LINE
+                    found = True
+            if not found:
+                missing = latch
+    return missing
 
 
 def latches_at(

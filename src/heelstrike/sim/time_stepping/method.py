@@ -26,7 +26,7 @@ from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
-from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
@@ -371,6 +371,26 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
     return count
 
 
+@dissolved_kernel
+def hold_latched(model: Model, count: int, memory: Memory) -> int:
+    """Let the stops of engaged latches hold; return how many candidates there are with them.
+
+    Where the gap decides, and a scheme has left a joint before its stop, it is held there.
+    """
+    loops, assembly = memory.loops, memory.assembly
+    missing = hold(count, loops.latch_stop, loops.held, assembly)
+    while missing >= 0:
+        joint = model.latch_joint[missing]
+        assembly.problem.free[2 * count] = -model.latch_side[missing] * memory.next_v[joint]
+        assembly.problem.free[2 * count + 1] = 0.0
+        assembly.problem.friction[count] = 0.0
+        assembly.answer.mode[count] = STICK
+        assembly.candidate[count] = loops.latch_stop[missing]
+        count += 1
+        missing = hold(count, loops.latch_stop, loops.held, assembly)
+    return count
+
+
 @kernel
 def write_rows(
     model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
@@ -631,7 +651,7 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
         count = select_stops(model, work, near, memory)
-        hold(count, memory.loops.latch_stop, memory.loops.held, assembly)
+        count = hold_latched(model, count, memory)
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
