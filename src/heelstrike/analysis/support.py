@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.errors import SimulationError
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Event, Run
 
@@ -16,7 +17,8 @@ NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""
 
 CHATTER = 0.02
-"""A foot that lands again within this time (s) has not stepped: it chatters, or scuffs."""
+"""A foot that lands again within this time (s) has not stepped, nor one that leaves again within
+it: they chatter, or scuff."""
 
 
 def pushing(run: Run) -> NDArray[np.bool_]:
@@ -204,7 +206,8 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
 
     The contact the robot starts with is no step, nor is the first landing of a robot dropped from
     the air, nor a foot that lands again without the other one having landed in between, nor one
-    that was in the air for less than `CHATTER`.
+    that was in the air for less than `CHATTER`, nor one that stayed for less, however often it
+    bounced.
 
     Parameters
     ----------
@@ -218,14 +221,62 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     """
     taken: list[Stance] = []
     last: set[int] = set()
-    left: dict[int, float] = {}
-    for stance in stances(run):
-        chatters = stance.touchdown - left.get(stance.foot, -np.inf) < CHATTER
-        left[stance.foot] = stance.liftoff
+    for stance in _without_chatter(stances(run)):
         if stance.touchdown == run.time[0]:
             last.add(stance.foot)
-        elif not chatters:
+        elif stance.liftoff - stance.touchdown >= CHATTER:
             if last and last != {stance.foot}:
                 taken.append(stance)
             last = {stance.foot}
     return tuple(taken)
+
+
+def _without_chatter(found: tuple[Stance, ...]) -> list[Stance]:
+    """Join stances of a foot between which it was in the air for less than `CHATTER`."""
+    joined: list[Stance] = []
+    current: dict[int, int] = {}
+    for stance in found:
+        place = current.get(stance.foot, -1)
+        if place >= 0 and stance.touchdown - joined[place].liftoff < CHATTER:
+            joined[place] = replace(joined[place], liftoff=stance.liftoff)
+        else:
+            current[stance.foot] = len(joined)
+            joined.append(stance)
+    return joined
+
+
+def phase_time(run: Run, step: int, phase: float) -> float:
+    """Return when a walk is at a phase of one of its steps: when to push it.
+
+    A simulation that begins in the same way walks in the same way until it is pushed, so that a run
+    without pushes tells when a push shall begin.
+
+    Parameters
+    ----------
+    run : Run
+        A walk.
+    step : int
+        Which step: 0 is the one that begins with the run, 1 begins with the first landing.
+    phase : float
+        Part of the step that has passed, from 0 at one landing to 1 at the next.
+
+    Returns
+    -------
+    float
+        Time in s.
+
+    Raises
+    ------
+    SimulationError
+        If the run has no such step, or the phase is none.
+    """
+    landings = [float(run.time[0]), *(stance.touchdown for stance in walking_steps(run))]
+    if not 0.0 <= phase <= 1.0:
+        raise SimulationError(f"the phase of a step is a number from 0 to 1, got {phase!r}")
+    if not 0 <= step < len(landings) - 1:
+        raise SimulationError(
+            f"there is no step {step!r} in this run: it has {len(landings) - 1} whole steps, the "
+            "first of which is step 0"
+        )
+    begin, end = landings[step : step + 2]
+    return begin + phase * (end - begin)

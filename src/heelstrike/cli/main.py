@@ -10,6 +10,7 @@ from heelstrike import __version__
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
+from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.walk import walk
 
@@ -21,7 +22,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-for command in (walk, paper, compare, robots, inspect):
+for command in (walk, report, paper, compare, robots, inspect):
     app.command()(command)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
 
 Floats = NDArray[np.float64]
@@ -186,6 +186,11 @@ class Ground:
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import ground_card
+
+        return ground_card(self)
+
     def numbers(self) -> dict[str, Floats]:
         """Return the ground as arrays that :meth:`of_numbers` makes it of."""
         return {
@@ -321,7 +326,7 @@ def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: 
     ) * normal[1]
 
 
-@kernel
+@dissolved_kernel
 def ground_contact(
     ground: GroundModel, x: float, z: float, radius: float, normal: Floats
 ) -> tuple[float, float, float]:
@@ -336,12 +341,20 @@ def ground_contact(
     normal : (2,) float
         Receives the ground's outward normal; the tangent is (normal z, −normal x).
     """
+    if ground.friction.shape[0] == 1:
+        distance = line_contact(ground, 0, x, z, normal)
+        return distance - radius, ground.friction[0], ground.restitution[0]
+    return profile_contact(ground, x, z, radius, normal)
+
+
+@kernel
+def profile_contact(
+    ground: GroundModel, x: float, z: float, radius: float, normal: Floats
+) -> tuple[float, float, float]:
+    """Like :func:`ground_contact`, of ground with corners."""
     below = segment_below(ground, x)
     distance = line_contact(ground, below, x, z, normal)
     segments = ground.friction.shape[0]
-    if segments == 1:
-        return distance - radius, ground.friction[0], ground.restitution[0]
-
     # Nothing nearer than the ground straight below or above can lie further away in x.
     inside = distance < 0.0
     reach = min(abs(distance) / max(normal[1], 1e-3), REACH + radius)

@@ -417,6 +417,11 @@ class Gait:
 
         save_gait(self, path)
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import gait_card
+
+        return gait_card(self)
+
     def __repr__(self) -> str:
         return (
             f"Gait({self.robot!r}: {self.step_length:g} m in {self.step_duration:g} s, "

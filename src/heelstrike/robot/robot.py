@@ -586,6 +586,11 @@ class Robot:
 
         return c_code(self.model, name or self.name, self.joint_names)
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import robot_card
+
+        return robot_card(self)
+
     def __repr__(self) -> str:
         return (
             f"Robot({self.name!r}: {self.nv} coordinates, {self.nu} actuators, "

@@ -10,7 +10,7 @@ the dataset, the files and the figures follow.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -31,8 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.summary import Summary
+    from heelstrike.gait.gait import Gait
     from heelstrike.sim.method import Method, UnknownMethod
     from heelstrike.sim.record.record import Record
+    from heelstrike.view.notebook.cards import Film
 
 Floats = NDArray[np.float64]
 
@@ -64,6 +67,26 @@ class Quantity:
 def recorded(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
     """Declare a recorded quantity; see :class:`Quantity`."""
     return field(metadata={"quantity": Quantity(shape, of, unit, label, later)})
+
+
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """What a controller told of itself, a value a row.
+
+    Attributes
+    ----------
+    values : (nt, ...) array
+        Values: at every row what it wrote at its last call for good.
+    unit, label : str
+        As its log declares them.
+    extents : tuple of str
+        How the array of a row is declared: ``("nu",)``, ``("2",)``; nothing of a number.
+    """
+
+    values: NDArray[Any]
+    unit: str = ""
+    label: str = ""
+    extents: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -216,6 +239,8 @@ class Run:
         What the controller raised, if that ended the run.
     pushes : tuple of Push
         What pushed the robot.
+    log : mapping of str to Logged
+        What the controller told of itself, by name.
     final : Snapshot or None
         What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
         run from a file, or under a controller in Python that takes no part in snapshots.
@@ -280,6 +305,7 @@ class Run:
     timing: Timing
     error: BaseException | None = field(default=None, repr=False)
     pushes: tuple[Push, ...] = ()
+    log: Mapping[str, Logged] = field(default_factory=dict, repr=False)
     final: Snapshot | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
@@ -288,6 +314,11 @@ class Run:
             f"Run({self.robot.name}, {self.method.name}, {last:.6g} s, "
             f"{self.status.value}, {self.steps} steps)"
         )
+
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import run_card
+
+        return run_card(self)
 
     @property
     def completed(self) -> bool:
@@ -361,6 +392,70 @@ class Run:
 
         return animate(self, path, **options)
 
+    def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the run as one HTML file; see :func:`heelstrike.view.page.page.save_html`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.page.page import save_html
+
+        return save_html(self, path, **options)
+
+    def show(self, *, gait: Gait | None = None, height: int = 820) -> Film:
+        """Show the run in a notebook: the page of :meth:`save_html`, in place.
+
+        Parameters
+        ----------
+        gait : Gait, optional
+            The gait that it followed.
+        height : int
+            Of the frame, in pixels.
+
+        Returns
+        -------
+        object
+            What a notebook shows, if it is the last value of a cell.
+
+        Raises
+        ------
+        ViewError
+            If the run has no rows.
+        GaitError
+            If the gait does not fit the robot of the run.
+        """
+        from heelstrike.view.notebook.cards import film
+
+        return film(self, gait, height)
+
+    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a report of the run; see :func:`heelstrike.report`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.report.writing import report
+
+        return report(self, path, **options)
+
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""
         from heelstrike.sim.files.dataset import to_dataset
@@ -391,8 +486,11 @@ QUANTITIES: dict[str, Quantity] = {
 """What is recorded, by its name, in the order of rows."""
 
 
-def joined(records: Sequence[Record], since: float) -> dict[str, Any]:
-    """Return the rows and events of consecutive records, from a time on, as fields of a run."""
+def joined(records: Sequence[Record], since: float, log: Bundle) -> dict[str, Any]:
+    """Return the rows and events of consecutive records, from a time on, as fields of a run.
+
+    `log` is the bundle whose numbers the words of the records are.
+    """
 
     def join(member: str, used: str) -> Any:
         return np.concatenate([getattr(part, member)[: getattr(part, used)] for part in records])
@@ -402,7 +500,21 @@ def joined(records: Sequence[Record], since: float) -> dict[str, Any]:
     arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
     order = np.argsort(arrays["time"], kind="stable")
     order = order[arrays["time"][order] >= since]
-    return rows | {"events": events_of(*(values[order] for values in arrays.values()))}
+    events = events_of(*(values[order] for values in arrays.values()))
+    return rows | {"events": events, "log": _logged(join("log", "rows")[first:], log)}
+
+
+def _logged(words: NDArray[np.int64], log: Bundle) -> dict[str, Logged]:
+    """Return the words of rows as what the members of a log held."""
+    found, begin = {}, 0
+    for name, member, values in log.views():
+        end = begin + values.size
+        rows = np.ascontiguousarray(words[:, begin:end]).view(member.dtype)
+        rows = rows.reshape(len(words), *values.shape)
+        extents = tuple(map(str, member.shape))
+        found[name] = Logged(rows, member.unit, member.label, extents)
+        begin = end
+    return found
 
 
 EVENT_MEMBERS = ("time", "kind", "contact", "impulse")

@@ -148,7 +148,7 @@ def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, .
 def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, str]:
     """Say what a snapshot is one of: a simulation that is the same in this can take it up."""
     return {
-        "robot": f"{setting.robot.name} {_digest(setting.robot.model)}",
+        "robot": f"{setting.robot.name} {model_digest(setting.robot.model)}",
         "method": repr(method),
         "controller": controller + (", checked" if setting.checked else ""),
         "control_period": str(setting.control_period),
@@ -159,7 +159,7 @@ def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, 
 _DIGESTS: WeakKeyDictionary[Model, str] = WeakKeyDictionary()
 
 
-def _digest(model: Model) -> str:
+def model_digest(model: Model) -> str:
     """Return what tells the numbers of a robot from those of others."""
     if model not in _DIGESTS:
         digest = hashlib.sha256()

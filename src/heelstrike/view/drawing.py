@@ -220,7 +220,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
     thickness = width
     if bones:
         lines = [(home, p) for p in points if all(_apart(p, end) for end in (home, *joints))]
-    elif _are_around(points):
+    elif are_around(points):
         lines, thickness = [(home, p) for p in points], THINNEST
     else:
         lines = _outline(points)
@@ -254,7 +254,7 @@ def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
     )
 
 
-def _are_around(points: Floats) -> bool:
+def are_around(points: Floats) -> bool:
     """Whether points lie on all sides of the joint, as those of a wheel: no half-plane is free."""
     if len(points) < 3:
         return False
@@ -356,7 +356,7 @@ def robot_picture(
     q = legs_apart(robot) if ground is None else robot.standing(ground).q
     poses = link_poses(robot, q)
     if ground is None and robot.floating and robot.nc:  # stand on z = 0
-        q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
+        q[1] -= standing_height(robot, q)
         poses = link_poses(robot, q)
     shape = body(robot)
     segments = shape.segments(poses.origin, poses.angle)
@@ -447,6 +447,12 @@ def legs_apart(robot: Robot) -> Floats:
             turn = -(moved - q[joint]) * sense  # what the hip turned, the ankle turns back
             q[joint] = moved
     return q
+
+
+def standing_height(robot: Robot, q: Floats) -> float:
+    """Height of the lowest contact point of a robot in a configuration (nq,), in m."""
+    poses = link_poses(robot, q)
+    return float(_contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min())
 
 
 def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:

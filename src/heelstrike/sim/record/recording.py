@@ -8,7 +8,7 @@ from typing import Any
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
@@ -35,8 +35,10 @@ STANDING_SPEED = 1e-6
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
     tally = memory.tally
+    deepest = tally.penetration
     for contact in range(model.contact_link.shape[0]):
-        tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
+        deepest = max(deepest, -memory.contacts.gap[contact])
+    tally.penetration = deepest
     note_residual(memory.assembly.answer.residual, tally)
 
 
@@ -164,6 +166,15 @@ def _row_writer() -> Callable[[float, Memory, Record], None]:
 note_row = _row_writer()
 
 
+@dissolved_kernel
+def note_log(kept: Integers, logged: Integers, record: Record) -> None:
+    """Write to the rows that have none as yet what the controller logged last."""
+    for row in range(record.logged, record.rows):
+        for i in range(logged.shape[0]):
+            record.log[row, i] = kept[logged[i]]
+    record.logged = record.rows
+
+
 @kernel
 def note_row_when_due(memory: Memory, clock: Clock, record: Record) -> int:
     """Append a row if one is due, every so many steps and at the end; return which, or -1."""
@@ -190,7 +201,7 @@ def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
 @dissolved_kernel
 def sound(memory: Memory) -> bool:
     """Whether the state is finite and not absurd."""
+    good = 0
     for i in range(memory.v.shape[0]):
-        if not (abs(memory.q[i]) < 1e9 and abs(memory.v[i]) < 1e6):
-            return False
-    return True
+        good += (abs(memory.q[i]) < 1e9) & (abs(memory.v[i]) < 1e6)
+    return good == memory.v.shape[0]

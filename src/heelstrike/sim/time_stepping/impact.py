@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 # A contact touches when its gap is no more than this (m): far above what rounding leaves of a gap
 # that is closed (1e-16), far below what turning makes of one in a step (h² ω² l / 2, 1e-7 at 1 ms).
 TOUCHING = 1e-9
-NEVER = -1
+NEVER = -2
 
 
 class Impact(Bundle):
@@ -49,17 +49,11 @@ class Impact(Bundle):
     ----------
     happens : int
         Whether an impact falls into this step.
-    step : int
-        Number of this step.
     touching : (places,) int
         The last step at whose end each contact point, and then each end of each joint, touched.
-    touches : (capacity,) int
-        Whether each candidate touches at the end of this step.
     called : (places,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
-    free : (nv,) float
-        The free velocity.
     arriving : (nv,) float
         Where there is an impact, the velocity that positions move with.
     member : (capacity,) int
@@ -69,12 +63,9 @@ class Impact(Bundle):
     """
 
     happens: int = cell(int)
-    step: int = cell(int)
     touching: Integers = array("places", of=int)
-    touches: Integers = array("capacity", of=int)
     called: Integers = array("places", of=int)
     calls: int = cell(int)
-    free: Floats = array("nv")
     arriving: Floats = array("nv")
     member: Integers = array("capacity", of=int)
     problem: ContactProblem = part(ContactProblem)
@@ -106,16 +97,12 @@ def gap_of(model: Model, q: Floats, gap: Floats, candidate: int) -> float:
     return q[stop // 2] - model.lower[stop // 2]
 
 
-@dissolved_kernel
-def begin_step(velocity: Floats, impact: Impact) -> None:
-    """Keep the free velocity; nothing is called yet."""
-    for j in range(velocity.shape[0]):
-        impact.free[j] = velocity[j]
-    impact.step += 1
-    if impact.calls > 0:
-        impact.calls = 0
-        for place in range(impact.called.shape[0]):
-            impact.called[place] = 0
+@kernel
+def dismiss(impact: Impact) -> None:
+    """Let nothing be called any more."""
+    impact.calls = 0
+    for place in range(impact.called.shape[0]):
+        impact.called[place] = 0
 
 
 @dissolved_kernel
@@ -126,47 +113,61 @@ def call(place: int, impact: Impact) -> None:
 
 
 @dissolved_kernel
-def note_touching(model: Model, candidate: Integers, count: int, impact: Impact) -> None:
-    """Keep which of the candidates touch at the end of this step."""
-    closable = model.nc + 2 * model.nv
-    touches, touching = impact.touches, impact.touching
-    for place in range(count):
-        if touches[place] == 1 and candidate[place] < closable:
-            touching[candidate[place]] = impact.step
+def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
+    """Whether a candidate touches at the end of the step.
+
+    With the linearised gap in the free term, velocities are gaps at the end divided by the step.
+    """
+    return step * answer.velocity[2 * place] <= TOUCHING
 
 
 @dissolved_kernel
-def find_impact(
-    model: Model, step: float, q: Floats, gap: Floats, problem: ContactProblem,
-    assembly: Assembly, impact: Impact,
-) -> int:  # fmt: skip
-    """Find what touches at the end of the step; return how many take part in an impact.
+def note_touching(model: Model, step: float, count: int, memory: Memory, impact: Impact) -> None:
+    """Keep which of the candidates touch at the end of this step."""
+    assembly = memory.assembly
+    for place in range(count):
+        candidate = assembly.candidate[place]
+        if candidate < model.nc + 2 * model.nv and arrives(step, place, assembly.answer):
+            impact.touching[candidate] = memory.tally.steps
 
-    Zero if there is none. `problem` is that of the positions, solved. Writes `impact`.
-    """
-    closable = model.nc + 2 * model.nv
-    touches, member = impact.touches, impact.member
-    members = 0
-    happens = False
+
+@dissolved_kernel
+def falls_into(
+    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
+) -> bool:
+    """Whether an impact falls into the step; `problem` is that of the positions, solved."""
+    assembly, before = memory.assembly, memory.tally.steps - 1
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        if candidate >= closable:  # dry friction and loops are always there
-            member[members] = place
+        if candidate >= model.nc + 2 * model.nv:
+            break
+        if arrives(step, place, assembly.answer):
+            now = gap_of(model, memory.q, memory.contacts.gap, candidate)
+            new = impact.touching[candidate] != before and problem.free[2 * place] < 0.0
+            if now < -TOUCHING or (new and now > TOUCHING):
+                return True
+    return False
+
+
+@kernel
+def find_members(
+    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
+) -> int:
+    """List what takes part in the impact of a step; return how many that are."""
+    assembly, before = memory.assembly, memory.tally.steps - 1
+    members = 0
+    for place in range(problem.count):
+        candidate = assembly.candidate[place]
+        takes_part = candidate >= model.nc + 2 * model.nv  # dry friction and loops are always there
+        if not takes_part:
+            now = gap_of(model, memory.q, memory.contacts.gap, candidate)
+            touched = impact.touching[candidate] == before
+            stays = touched or problem.free[2 * place] < 0.0
+            takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
+        if takes_part:
+            impact.member[members] = place
             members += 1
-            continue
-        # With the linearised gap in the free term these are gaps at the end, divided by the step.
-        arrives = step * assembly.answer.velocity[2 * place] <= TOUCHING
-        closes = problem.free[2 * place] < 0.0
-        now = gap_of(model, q, gap, candidate)
-        there = now <= TOUCHING
-        touched = impact.touching[candidate] == impact.step - 1
-        new = closes and not touched and not there
-        happens = happens or (arrives and (new or now < -TOUCHING))
-        touches[place] = arrives
-        if there or (arrives and (touched or closes)):
-            member[members] = place
-            members += 1
-    return members if happens else 0
+    return members
 
 
 @kernel

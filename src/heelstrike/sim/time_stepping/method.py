@@ -74,9 +74,10 @@ from heelstrike.sim.time_stepping.impact import (
     TOUCHING,
     Impact,
     allocate_impact,
-    begin_step,
     call,
-    find_impact,
+    dismiss,
+    falls_into,
+    find_members,
     note_touching,
     pose_impact,
     solve_impact,
@@ -288,8 +289,9 @@ def find_velocities(
 def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) -> bool:
     """Whether there is a program for the contact points among the candidates, the first `near`."""
     straight = usual.programs[program] != 0
-    for place in range(near):
-        straight = straight and usual.usual_place[candidate[place]] >= 0
+    if usual.usual_points.shape[0] < usual.usual_place.shape[0]:
+        for place in range(near):
+            straight = straight and usual.usual_place[candidate[place]] >= 0
     return straight
 
 
@@ -339,10 +341,22 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
 
 
 @dissolved_kernel
+def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
+    """Whether any joint stop could act in a step that bounds the gap at its end."""
+    near = 0
+    for joint in range(model.nv):
+        reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
+        near += (q[joint] - model.lower[joint] < reach) | (model.upper[joint] - q[joint] < reach)
+    return near > 0
+
+
+@dissolved_kernel
 def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
     linearised, calls = is_linearised(work.scheme), work.impact.calls
+    if linearised and calls == 0 and not stops_are_near(model, step, memory.q, memory.next_v):
+        return count
     for joint in range(model.nv):
         for end in range(2):
             sign = 1.0 - 2.0 * end
@@ -584,33 +598,67 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
     solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
-    if solved and work.scheme == IMPACT_RESOLVED:
-        members = find_impact(model, step, memory.q, contacts.gap, problem, assembly, impact)
-        if members > 0:
-            impact.happens = 1
-            arriving = impact.arriving
-            for j in range(model.nv):
-                arriving[j] = impact.free[j]
-            push_all(model, near, count, straight, memory, arriving)
-            pose_impact(model, step, members, problem, memory, impact)
-            solved = solve_impact(work.order, members, problem, impact, assembly)
+    resolves = solved and work.scheme == IMPACT_RESOLVED
+    if resolves and falls_into(model, step, problem, memory, impact):
+        impact.happens = 1
+        arriving = impact.arriving
+        for j in range(model.nv):
+            arriving[j] = memory.next_v[j]
+        push_all(model, near, count, straight, memory, arriving)
+        members = find_members(model, step, problem, memory, impact)
+        pose_impact(model, step, members, problem, memory, impact)
+        solved = solve_impact(work.order, members, problem, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
     return solved
 
 
 @dissolved_kernel
-def may_go_through(model: Model, step: float, near: int, v: Floats, memory: Memory) -> bool:
-    """Whether the velocity that was found could take something through a stop or the ground."""
-    q, gap = memory.q, memory.contacts.gap
-    beyond = 0
+def may_go_through(
+    model: Model, work: Stepping, near: int, count: int, v: Floats, memory: Memory
+) -> bool:
+    """Whether the velocity that was found could take something through a stop or the ground.
+
+    What is no candidate is too far away to get there at its free velocity: it has to be thrown. A
+    stop has to be reached faster than any that is out of reach can be.
+    """
+    if count == 0:
+        return False
+    thrown = 0
     for joint in range(model.nv):
-        after = q[joint] + step * v[joint]
-        low, high = model.lower[joint] - TOUCHING, model.upper[joint] + TOUCHING
-        beyond += (after < low) | (after > high)
-    within = 0
+        thrown += abs(v[joint]) > CLOSING_RATE
+    if thrown > 0:
+        return True
+    known = near == count and work.impact.happens == 0
     for contact in range(model.nc):
-        within += gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
-    return beyond > 0 or within > near
+        gap = memory.contacts.gap[contact]
+        if work.step * CLOSING_SPEED < gap <= work.step * CLOSING_SPEED * FAR_STEPS and not (
+            known and stays_above(work.step, contact, gap, near, memory.assembly, memory.usual)
+        ):
+            return True
+    return False
+
+
+@kernel
+def stays_above(
+    step: float, contact: int, gap: float, near: int, assembly: Assembly, usual: UsualPoints
+) -> bool:
+    """Whether it is known that the impulses of the candidates leave a contact point above ground.
+
+    All of them are contact points. Of a usual one the Delassus matrix is there, and the free
+    velocity.
+    """
+    row = 2 * usual.usual_place[contact]
+    if usual.programs[DELASSUS] == 0 or row < 0:
+        return False
+    delassus, impulse = usual.usual_problem.delassus, assembly.answer.impulse
+    normal = usual.point_velocity[contact, 0]
+    for place in range(near):
+        column = 2 * usual.usual_place[assembly.candidate[place]]
+        if column < 0:
+            return False
+        normal += delassus[row, column] * impulse[2 * place]
+        normal += delassus[row, column + 1] * impulse[2 * place + 1]
+    return gap + step * normal >= -0.5 * TOUCHING
 
 
 @kernel
@@ -618,9 +666,8 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
     """Call what would go through at the velocity that was found; return if any is new."""
     calls = impact.calls
     usual, contacts = memory.usual, memory.contacts
-    point_velocities(
-        model, usual.every_point, contacts, v, memory.equations.tree, usual.point_velocity
-    )
+    straight = are_usual(usual.every_point, model.nc, VELOCITIES, usual)
+    find_velocities(model, contacts, v, straight, memory.equations.tree, usual)
     for contact in range(model.nc):
         if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -TOUCHING:
             call(contact, impact)
@@ -634,18 +681,18 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
 
 
 @dissolved_kernel
-def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
-    """Turn the free velocity into the velocity at the end of the step; return success.
+def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> bool:
+    """Find the velocity at the end of the step; return success.
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
     a candidate, is called and the step solved again.
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
-    begin_step(memory.next_v, impact)
     again = True
     solved = True
-    count = 0
+    near = count = 0
     while again:
+        free_velocity(model, work, time, memory)
         impact.happens = 0
         for i in range(3):
             assembly.answer.residual[i] = 0.0
@@ -664,20 +711,19 @@ def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
         again = (
             is_linearised(work.scheme)
             and solved
-            and may_go_through(model, work.step, near, v, memory)
+            and may_go_through(model, work, near, count, v, memory)
             and call_missed(model, work.step, v, memory, impact)
         )
-        if again:
-            for j in range(model.nv):
-                memory.next_v[j] = impact.free[j]
+    if impact.calls > 0:
+        dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
-        note_touching(model, assembly.candidate, count, impact)
-    note_answer(model, work.step, count, memory)
+        note_touching(model, work.step, count, memory, impact)
+    note_answer(model, work.step, near, count, memory)
     return solved
 
 
 @dissolved_kernel
-def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
+def note_answer(model: Model, step: float, near: int, count: int, memory: Memory) -> None:
     """Keep the forces, slips and modes of the candidates; all others have none."""
     answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
     for joint in range(model.nv):
@@ -689,25 +735,25 @@ def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
         force[contact, 1] = 0.0
         reaction.slip[contact] = 0.0
         reaction.mode[contact] = 0
-    for place in range(count):
+    for place in range(near):
         contact = memory.assembly.candidate[place]
-        stop = contact - model.nc
+        force[contact, 0] = answer.impulse[2 * place] / step
+        force[contact, 1] = answer.impulse[2 * place + 1] / step
+        reaction.slip[contact] = answer.velocity[2 * place + 1]
+        reaction.mode[contact] = answer.mode[place]
+    for place in range(near, count):
+        stop = memory.assembly.candidate[place] - model.nc
         dry = stop - 2 * model.nv
         loop = dry - memory.dry_joint.shape[0]
-        normal, tangent = answer.impulse[2 * place], answer.impulse[2 * place + 1]
         if loop >= 0:
-            note_loop(model, loop, normal / step, memory.loops)
+            note_loop(model, loop, answer.impulse[2 * place] / step, memory.loops)
         elif dry >= 0:
-            reaction.friction_torque[memory.dry_joint[dry]] = tangent / step
+            reaction.friction_torque[memory.dry_joint[dry]] = answer.impulse[2 * place + 1] / step
             reaction.dry_mode[dry] = answer.mode[place]
-        elif stop >= 0:
+        else:
+            normal = answer.impulse[2 * place]
             reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step
             reaction.stop_mode[stop // 2, stop % 2] = answer.mode[place] != 0
-        else:
-            force[contact, 0] = normal / step
-            force[contact, 1] = tangent / step
-            reaction.slip[contact] = answer.velocity[2 * place + 1]
-            reaction.mode[contact] = answer.mode[place]
 
 
 @dissolved_kernel
@@ -716,8 +762,7 @@ def decide(
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
     model = scene.model
-    free_velocity(model, work, clock.time, memory)
-    solved = solve_contacts(model, work, memory)
+    solved = solve_step(model, clock.time, work, memory)
     note_extremes(model, memory)
     first = record.events
     note_events(model, clock.time, work.step, memory, record)
@@ -745,11 +790,12 @@ def move(
         for i in range(model.nv):
             v[i] += next_v[i]
         integrate(model, q, v, 0.5 * work.step, q)
+    elif work.impact.happens == 1:
+        integrate(model, q, work.impact.arriving, work.step, q)
+    elif work.scheme == PAPER_EXPLICIT:
+        integrate(model, q, v, work.step, q)
     else:
-        along = v if work.scheme == PAPER_EXPLICIT else next_v
-        if work.impact.happens == 1:
-            along = work.impact.arriving
-        integrate(model, q, along, work.step, q)
+        integrate(model, q, next_v, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
     has_loops = memory.loops.unknown.shape[0] > 0
