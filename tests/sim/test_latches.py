@@ -200,9 +200,11 @@ def test_latches_go_through_files_and_mirrors(tmp_path: Path) -> None:
     )
     found = inspect_robot(Robot(**{**vars(robot), "model": lame})).findings
     assert any("latch of right_knee has no mirror image" in str(each) for each in found)
-    run = hs.simulate(robot, state=start(robot), ground=hs.Ground(slope=-0.0504), duration=0.01)
+    run = hs.simulate(robot, state=start(robot), ground=hs.Ground(slope=-0.0504), duration=0.6)
+    assert EventKind.JOINT_RELEASE in {event.kind for event in run.events}
     again = hs.load_run(run.save(tmp_path / "run.nc"))
     np.testing.assert_array_equal(again.robot.model.latch_release, robot.model.latch_release)
+    assert again.events == run.events
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,10 @@ from heelstrike.errors import RobotError
 from heelstrike.robot.robot import Robot
 
 
-def refuse_loops(robot: Robot, what: str, kind: type[Exception] = RobotError) -> None:
-    """Refuse a robot with closed loops or coupled joints where only trees will do.
+def refuse_loops(
+    robot: Robot, what: str, kind: type[Exception] = RobotError, *, latches: bool = True
+) -> None:
+    """Refuse a robot with closed loops, coupled joints or latches where only trees will do.
 
     Parameters
     ----------
@@ -19,6 +21,8 @@ def refuse_loops(robot: Robot, what: str, kind: type[Exception] = RobotError) ->
         What does not know of loops.
     kind : type
         Error to raise.
+    latches : bool
+        Whether latches matter to it, too.
 
     Raises
     ------
@@ -27,6 +31,7 @@ def refuse_loops(robot: Robot, what: str, kind: type[Exception] = RobotError) ->
     """
     found = [f"loop {name}" for name in robot.loop_names]
     found += [f"coupling of {name}" for name in robot.coupling_names]
+    found += [f"latch of {name}" for name in robot.latch_names if latches]
     if found:
         raise kind(
             f"{what} knows robots whose joints move by themselves only, and robot {robot.name!r} "

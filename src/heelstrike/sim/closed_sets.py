@@ -34,7 +34,8 @@ class EventKind(enum.IntEnum):
         Newton's restitution with friction made energy in an impact (Kane's paradox).
     ``JOINT_STOP``
         A joint reached the end of its range, with the impulse that took, or was pressed against it
-        by an impact elsewhere; the event's `contact` is the index of the joint.
+        by an impact elsewhere (or, held by a latch, pulled off it: the impulse is negative then);
+        the event's `contact` is the index of the joint.
     ``JOINT_SLIP``, ``JOINT_STICK``
         A joint with dry friction broke away, or turned round; it came to rest. The event's
         `contact` is the index of the joint.
@@ -55,6 +56,11 @@ class EventKind(enum.IntEnum):
     JOINT_SLIP = 10
     JOINT_STICK = 11
     JOINT_RELEASE = 12
+
+    @property
+    def of_joint(self) -> bool:
+        """Whether it happens to a joint, and not to a contact point."""
+        return self.name.startswith("JOINT_")
 
 
 class Scheme(enum.IntEnum):

@@ -123,7 +123,7 @@ def contact_inverse_dynamics(
     (True, True)
     """
     choice = _choice(distribution)
-    refuse_loops(robot, "contact_inverse_dynamics")
+    refuse_loops(robot, "contact_inverse_dynamics", latches=False)
     kinematics = contact_kinematics(robot, q, v, ground)
     touching = np.flatnonzero(kinematics.gap < TOUCHING)
     carrying = list(contact_indices(robot, touching if contacts is None else contacts))

@@ -191,7 +191,8 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
             phase.last_impact[contact] = time
         if contact < model.nc and normal > impulse[largest, 0]:
             largest = contact
-        if not normal > 0.0:
+        pulls = contact >= model.nc and normal < 0.0  # as a latch may
+        if not (normal > 0.0 or pulls):
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1
