@@ -92,6 +92,15 @@ def test_closing_is_the_shortest_way_by_the_masses() -> None:
     assert np.abs(change).max() > 0.1
 
 
+def test_closing_keeps_to_the_ranges_of_joints() -> None:
+    """The shortest way alone would bend the left knee backwards by 0.026 rad."""
+    robot = parallel_ankles()
+    wished = robot.perturbed(robot.reference_state(), seed=0, position=0.2)
+    state = robot.closed(wished)
+    assert state.q[robot.joint_index("left_knee")] == 0.0
+    assert np.abs(dynamics.loop_displacement(robot, state.q)).max() < 1e-12
+
+
 def test_what_cannot_be_closed_is_said() -> None:
     robot = four_bar()
     with pytest.raises(hs.RobotError, match="while crank, coupler stay: coupler-rocker along"):

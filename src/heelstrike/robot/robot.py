@@ -435,8 +435,8 @@ class Robot:
     def closed(self, state: State, *, keep: Iterable[str | int] = ()) -> State:
         """Return the nearest state in which all loops are closed and all couplings hold.
 
-        Positions move the shortest way by the masses, and so do velocities, as an impact would
-        change them.
+        Positions move the shortest way by the masses, but not out of the joints' ranges, and so do
+        velocities, as an impact would change them.
 
         Parameters
         ----------

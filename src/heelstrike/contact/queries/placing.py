@@ -74,15 +74,18 @@ def closed(robot: Robot, state: State, keep: Iterable[str | int] = ()) -> State:
     kept = [index_of(robot, "joint", robot.joint_names, joint) for joint in keep]
     free = np.setdiff1d(np.arange(robot.nq), kept)
     q, v = state.q.copy(), state.v.copy()
-    before = np.inf
+    low, high = np.minimum(robot.model.lower, q), np.maximum(robot.model.upper, q)
+    moves, before = free, np.inf
     for _ in range(MOST_ITERATIONS):
         open_by = dynamics.loop_displacement(robot, q)
         worst = float(np.abs(open_by).max(initial=0.0))
         if worst < CLOSE and (before == np.inf or not worst < 0.5 * before):
             break  # closed as it came, or as well as can be
         before = worst
-        change = _least(robot, q, free, -open_by)
-        q[free] += np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
+        change = _least(robot, q, moves, -open_by)
+        wanted = q[moves] + np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
+        q[moves] = np.clip(wanted, low[moves], high[moves])
+        moves = moves[q[moves] == wanted]  # a joint that comes to its stop stays there
     rates = dynamics.loop_jacobian(robot, q) @ v
     v[free] += _least(robot, q, free, -rates)
     left = np.abs(dynamics.loop_jacobian(robot, q) @ v).max(initial=0.0)
