@@ -49,6 +49,7 @@ HEAVY = {
     "pandas",
     "scipy",
     "viser",
+    "websockets",
     "xarray",
 }
 

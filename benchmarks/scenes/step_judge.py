@@ -85,13 +85,14 @@ class _Steps:
         known = rows.smooth[:-1] + self.pushed
         matrix = rows.matrix[:-1]
         self.before, self.after = rows.v[:-1], rows.v[1:]
-        if self.scheme is Scheme.LINEARLY_IMPLICIT:
+        if self.scheme in (Scheme.LINEARLY_IMPLICIT, Scheme.MOREAU_JEAN):
             stiffness, damping = model.stiffness.copy(), model.damping.copy()
-            if controller is not None:
+            ahead = self.h if self.scheme is Scheme.LINEARLY_IMPLICIT else 0.5 * self.h
+            if controller is not None and self.scheme is Scheme.LINEARLY_IMPLICIT:
                 stiffness[model.actuator_joint] += controller.parameters.kp
                 damping[model.actuator_joint] += controller.parameters.kd
-            matrix = matrix + np.diag(self.h * damping + self.h**2 * stiffness)
-            known = known - self.h * stiffness * self.before
+            matrix = matrix + np.diag(ahead * damping + ahead**2 * stiffness)
+            known = known - ahead * stiffness * self.before
         self.metric = Metric(matrix)
         self.matrix = matrix
         self.free = self.before + self.h * self.metric.accelerated(known)

@@ -40,7 +40,7 @@ class Again:
 
 def seen_again(run: hs.Run, steps: int, **sensors: Any) -> tuple[np.ndarray, np.ndarray]:
     """What sensors and estimator would have made of a run: joint positions, joint velocities."""
-    shell = hs.Sensed(run.robot, hs.Estimated(run.robot, Again(run)), **sensors)
+    shell = hs.Sensed(hs.Estimated(Again(run)), **sensors)
     shell.robot = run.robot
     measured, estimated = [], []
     for k in range(steps):
@@ -63,7 +63,7 @@ def test_half_the_error_of_the_best_difference(bits: int, noise: float) -> None:
     run, steps = walking.walk(), 2800
     measured, estimated = seen_again(
         run, steps, encoders=hs.Encoders(bits=bits, noise=noise), seed=1,
-        inertial=hs.InertialUnit(noise=1e-4), feet=hs.FootSensors(noise=5.0),
+        imu=hs.InertialUnit(noise=1e-4), feet=hs.FootSensors(noise=5.0),
     )  # fmt: skip
     true = run.velocity[:steps, 3:]
     error = estimated - true
@@ -81,9 +81,9 @@ def test_half_the_error_of_the_best_difference(bits: int, noise: float) -> None:
 def test_a_robot_walks_on_its_estimate() -> None:
     robot, gait = walking.bravo7(), walking.gait()
     controller = hs.Sensed(
-        robot, hs.Estimated(robot, hs.ComputedTorque(robot, gait)), seed=1,
+        hs.Estimated(hs.ComputedTorque(robot, gait)), seed=1,
         encoders=hs.Encoders(bits=14, noise=1e-4),
-        inertial=hs.InertialUnit(noise=1e-4), feet=hs.FootSensors(noise=5.0),
+        imu=hs.InertialUnit(noise=1e-4), feet=hs.FootSensors(noise=5.0),
     )  # fmt: skip
     run = hs.simulate(robot, controller, state=gait.initial_state, duration=2.8)
     assert run.completed, run.message
@@ -96,7 +96,7 @@ def test_a_push_that_the_model_does_not_know_is_followed() -> None:
     robot = walking.bravo7()
     start = walking.gait().initial_state
     push = hs.Push("trunk", force=(100.0, 0.0), start=0.02, duration=0.02)
-    shell = hs.Estimated(robot, hs.ComputedTorque(robot, walking.gait()))
+    shell = hs.Estimated(hs.ComputedTorque(robot, walking.gait()))
     run = hs.simulate(robot, shell, state=start, duration=0.25, pushes=push)
     assert run.completed, run.message
     error = np.abs(run.log["estimated_velocity"].values - run.velocity).max(axis=1)
@@ -106,7 +106,7 @@ def test_a_push_that_the_model_does_not_know_is_followed() -> None:
 
 def test_without_noise_the_estimate_is_the_state() -> None:
     robot, gait = walking.bravo7(), walking.gait()
-    controller = hs.Estimated(robot, hs.ComputedTorque(robot, gait))
+    controller = hs.Estimated(hs.ComputedTorque(robot, gait))
     run = hs.simulate(robot, controller, state=gait.initial_state, duration=0.65)
     position, velocity = (run.log[f"estimated_{name}"].values for name in ("position", "velocity"))
     assert np.abs(position - run.position).max() < 2e-5
@@ -118,4 +118,4 @@ def test_what_an_estimator_needs() -> None:
     robot = walking.bravo7()
     law = hs.ComputedTorque(robot, walking.gait())
     with pytest.raises(hs.ControllerError, match="bandwidth"):
-        hs.Estimated(robot, law, bandwidth=-1.0)
+        hs.Estimated(law, bandwidth=-1.0)

@@ -13,6 +13,7 @@ from heelstrike.cli.paper import paper
 from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.walk import walk
+from heelstrike.cli.watch import watch
 
 app = typer.Typer(
     name="heelstrike",
@@ -22,7 +23,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-for command in (walk, report, paper, compare, robots, inspect):
+for command in (walk, watch, report, paper, compare, robots, inspect):
     app.command()(command)
 
 

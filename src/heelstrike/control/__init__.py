@@ -3,7 +3,9 @@
 from heelstrike.control.actuation import Actuated
 from heelstrike.control.computed_torque import ComputedTorque, Encoder
 from heelstrike.control.estimation import Estimated
+from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
+from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
@@ -19,6 +21,9 @@ __all__ = [
     "FootSensors",
     "InertialUnit",
     "Law",
+    "PreviewControl",
     "Sensed",
+    "VirtualConstraints",
     "controller",
+    "preview_control",
 ]

@@ -102,7 +102,8 @@ class Event:
     contact : int
         Index of the contact point, or of the joint of a ``JOINT_`` event.
     impulse : tuple of float
-        Impulse (normal, tangent) on the robot over the step in which it happened, in N s.
+        Impulse (normal, tangent) on the robot over the step in which it happened, in N s. Of a
+        ``BRIDGE`` its length (s) and how far it may be wrong.
     """
 
     time: float

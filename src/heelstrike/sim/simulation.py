@@ -289,6 +289,16 @@ class Simulation:
     def parameters(self, parameters: Bundle) -> None:
         self._numbers.set_parameters(parameters)
 
+    @property
+    def memory(self) -> Bundle:
+        """What a law remembers now; what is written into it, it remembers at its next call."""
+        return self._numbers.memory
+
+    @property
+    def log(self) -> Bundle:
+        """What a controller told of itself when it was last called."""
+        return self._logs.log
+
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
 
@@ -501,9 +511,10 @@ class Simulation:
                 "gains"
             )
         if outcome is Outcome.SOLVER_FAILED:
+            reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
@@ -578,17 +589,9 @@ class Simulation:
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
         self._shown = read_only(memory.contacts)
-        memory.stiffness[:] = robot.model.stiffness
-        memory.damping[:] = robot.model.damping
         if law is not None:
             self._name = f"controller {law.function.name!r}"
-            driven = robot.model.actuator_joint
-            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
-            memory.damping[driven] += 0.0 if law.damping is None else law.damping
-        if voltage:
-            driven = robot.model.actuator_joint
-            speed = robot.model.no_load_speed[driven]
-            memory.damping[driven] += robot.model.stall_torque[driven] / speed
+        self._take_gains(law, voltage)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
@@ -603,6 +606,18 @@ class Simulation:
         clock.answered = 0
         known = self._numbers.robot
         self._watch = Watch((robot,) if known is robot else (robot, known), ready, memory)
+
+    def _take_gains(self, law: Law | None, voltage: bool) -> None:
+        """Note which joint forces an implicit scheme takes at the end of a step."""
+        model, memory = self.robot.model, self._memory
+        driven = model.actuator_joint
+        memory.stiffness[:] = model.stiffness
+        memory.damping[:] = model.damping
+        if law is not None:
+            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
+            memory.damping[driven] += 0.0 if law.damping is None else law.damping
+        if voltage:
+            memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course hangs on.
@@ -651,6 +666,22 @@ class Simulation:
         self._fork = None
         self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
         self.error = None
+
+    def forget(self) -> None:
+        """Forget what was: the record begins anew, and pushes that are over are gone from it.
+
+        How it goes on does not change. For simulations without an end, whose record is looked at
+        piece by piece.
+        """
+        self._recorded_until = self.time
+        self._records.clear()
+        if any(push.end < self.time for push in self._pushes):
+            kept = [i for i, push in enumerate(self._pushes) if push.end >= self.time]
+            share = self._memory.pushes.share[kept].copy()
+            self._pushes = tuple(self._pushes[i] for i in kept)
+            pushes = pushes_on(self.robot, self._pushes)
+            pushes.share[:] = share
+            self._memory = self._memory.replaced(pushes=pushes)
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
@@ -737,6 +768,8 @@ class Simulation:
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
+        if not self._records:
+            self._new_record()
         return Run(
             robot=self.robot,
             ground=self._ground,

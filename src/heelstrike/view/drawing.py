@@ -151,11 +151,16 @@ class Skeleton:
 
 
 def body(robot: Robot) -> Skeleton:
-    """Make what a robot is drawn by: outlines, and bones of the links that have none."""
+    """Make what a robot is drawn by: outlines, and bones of the links that have none.
+
+    A foot whose outlines do not reach up to its ankle has both, so that it does not hang in the
+    air.
+    """
     bones = skeleton(robot)
     if not robot.outlines:
         return bones
     shaped = {outline.link for outline in robot.outlines}
+    shaped -= {foot.link for foot in robot.feet if not _reaches_joint(robot, foot.link)}
     side = _sides(robot)
     parts = [
         (bones.link[i : i + 1], bones.local[i : i + 1], float(bones.width[i]))
@@ -177,6 +182,12 @@ def body(robot: Robot) -> Skeleton:
         foot=legs(robot)[links[:, 0]],
         pieces=tuple(slice(start, end) for start, end in pairwise((0, *ends))),
     )
+
+
+def _reaches_joint(robot: Robot, link: int) -> bool:
+    """Whether the outlines of a link go round its joint, the origin of its axes."""
+    rims = [outline.rim() for outline in robot.outlines if outline.link == link]
+    return any(np.all((rim.min(axis=0) <= 0.0) & (rim.max(axis=0) >= 0.0)) for rim in rims)
 
 
 def skeleton(robot: Robot) -> Skeleton:

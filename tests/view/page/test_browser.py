@@ -136,6 +136,10 @@ def test_on_a_phone(chromium: Any, files: dict[str, Path], name: str) -> None:
     opened = Opened(chromium, files[name], **PHONE).ready()
     assert opened.page.evaluate("document.documentElement.scrollWidth") <= 390
     assert opened.share("canvas", LIGHT["right leg"]) > 5e-4
+    heights = opened.page.eval_on_selector_all(
+        ".limits tr", "all => all.map(row => row.getBoundingClientRect().height)"
+    )
+    assert all(height < 120.0 for height in heights)  # no column is a letter wide
     opened.check()
 
 

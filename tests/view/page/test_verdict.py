@@ -43,7 +43,7 @@ def test_torque_is_measured_against_the_limit_of_its_sign() -> None:
     assert limit.used == pytest.approx(3.5 / 4.0)
     assert limit.time == 0.1
     assert limit.reached == math.inf
-    assert limit.detail == "-3.5 of -4 N m at 0.1 s"
+    assert limit.detail == "−3.5 of −4 N m at 0.1 s"
     run = make_run(robot, [0.0, 0.1, 0.2], torque=[[6.0], [-4.0], [8.0]])
     assert limits_of(run)["torque of motor"].reached == 0.1
 

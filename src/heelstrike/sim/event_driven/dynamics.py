@@ -7,10 +7,12 @@ this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of th
 
 from __future__ import annotations
 
+import math
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
-from heelstrike.dynamics.kernels import passive_force
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
 from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -20,8 +22,6 @@ from heelstrike.sim.contacts.geometry import (
     assemble_delassus,
     contact_velocity,
     evaluate_equations,
-    locate_contacts,
-    observe,
     row_product,
     solve_mass_matrix,
     weigh,
@@ -32,18 +32,28 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import try_torque
 from heelstrike.sim.event_driven.candidates import share_redundant
+from heelstrike.sim.event_driven.faces import has_corners, locate, watch_corners
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 
+# How far a projection may move a state, as a multiple of the error that a step may make: beyond
+# that, the motion has not kept its constraints.
+EXPLAINED = 100.0
+
 
 @kernel
-def tangential_place(model: Model, tree: Workspace, contacts: Contacts, contact: int) -> float:
+def tangential_place(
+    model: Model, tree: Workspace, contacts: Contacts, contact: int, phase: Phase
+) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled."""
     position, normal = contacts.position[contact], contacts.normal[contact]
     rolled = model.contact_radius[contact] * tree.angle[model.contact_link[contact]]
+    if phase.face[contact] >= 0 and phase.face[contact] % 2 == 1:
+        # The way of the contact point round the disc that pivots on a corner.
+        return model.contact_radius[contact] * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
 
 
@@ -74,15 +84,27 @@ def list_unknowns(
 
 
 @kernel
-def constraint_matrix(size: int, friction: float, delassus: Floats, phase: Phase) -> None:
-    """Write the matrix of the equations of the contact forces, with friction (1) or without (0)."""
-    row, lean = phase.row, phase.lean
+def solve_constraints(size: int, friction: float, delassus: Floats, phase: Phase) -> int:
+    """Solve the equations of the contact forces, with friction (1) or without (0); return the rank.
+
+    Their right-hand side is there. A contact may be a million times heavier than another: only in
+    units in which all weigh the same does the size of a pivot tell whether it is one.
+    """
+    row, lean, scale, system = phase.row, phase.lean, phase.scale, phase.system
+    for i in range(size):
+        weight = delassus[row[i], row[i]]
+        scale[i] = 1.0 / math.sqrt(weight) if weight > 0.0 else 1.0
     for i in range(size):
         for j in range(size):
             entry = delassus[row[i], row[j]]
             if lean[j] != 0.0:
                 entry += friction * lean[j] * delassus[row[i], row[j] + 1]
-            phase.system[i, j] = entry
+            system[i, j] = scale[i] * scale[j] * entry
+        system[i, size] *= scale[i]
+    rank = solve_to_rank(size, system, phase.column, phase.unknown)
+    for i in range(size):
+        phase.unknown[i] *= scale[i]
+    return rank
 
 
 @dissolved_kernel
@@ -123,13 +145,16 @@ def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
 
 @kernel
 def watch_geometry(
-    model: Model, tree: Workspace, contacts: Contacts, state: Floats, phase: Phase
-) -> None:
-    """Event functions that need no forces: gaps of open points, speeds of what slides.
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
+    phase: Phase,
+) -> None:  # fmt: skip
+    """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
     That of a point that is let pass below the ground is its depth.
     """
     value, rate = phase.value, phase.rate
+    if has_corners(ground):
+        watch_corners(model, ground, contacts, phase, value)
     for dry in range(phase.dry_joint.shape[0]):
         contact = phase.first_dry + dry
         slide = phase.slide[contact]
@@ -248,10 +273,9 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
     for row in range(2 * count, 2 * total):
         impulse[row] = 0.0
     size = list_unknowns(count, loops, assembly.candidate, friction, phase)
-    constraint_matrix(size, 1.0, assembly.problem.delassus, phase)
     for i in range(size):
         phase.system[i, size] = -assembly.problem.free[phase.row[i]]
-    rank = solve_to_rank(size, phase.system, phase.column, phase.unknown)
+    rank = solve_constraints(size, 1.0, assembly.problem.delassus, phase)
     phase.deficient = 1 if rank < size else 0
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
@@ -261,10 +285,21 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
 
 
 @kernel
+def observe_faces(
+    model: Model, ground: GroundModel, state: Floats, phase: Phase, memory: Memory
+) -> None:
+    """Kinematics, velocities and contact points of a state (q, v)."""
+    tree = memory.equations.tree
+    forward_kinematics(model, state[: model.nq], tree)
+    link_velocities(model, state[model.nq :], tree)
+    locate(model, ground, tree, phase, memory.contacts, memory.surface)
+
+
+@kernel
 def look(model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase) -> None:
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe(model, ground, state[: model.nq], state[model.nq :], memory)
-    watch_geometry(model, memory.equations.tree, memory.contacts, state, phase)
+    observe_faces(model, ground, state, phase, memory)
+    watch_geometry(model, ground, memory.equations.tree, memory.contacts, state, phase)
 
 
 @kernel
@@ -282,8 +317,8 @@ def evaluate(
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
     rate = equations.rate
     evaluate_equations(model, q, v, equations)
-    locate_contacts(model, scene.ground, equations.tree, memory.contacts, memory.surface)
-    watch_geometry(model, equations.tree, memory.contacts, state, phase)
+    locate(model, scene.ground, equations.tree, phase, memory.contacts, memory.surface)
+    watch_geometry(model, scene.ground, equations.tree, memory.contacts, state, phase)
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
@@ -321,28 +356,31 @@ def displacement(
     if contact >= phase.first_dry:
         return state[phase.dry_joint[contact - phase.first_dry]] - phase.anchor[contact]
     if phase.stuck[contact] == 1:
-        return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact)
+        return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact, phase)
     return 0.0
 
 
 @kernel
-def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> None:
+def project(
+    model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
+) -> float:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
     Closed points return to the ground, sticking ones (and joints) to where they began to stick,
-    ends of loops to each other, and their velocities along these directions vanish.
+    ends of loops to each other, and their velocities along these directions vanish. Returns how far
+    (m) the worst is left from its place: constraints that say the same twice need not agree.
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     system, row, loops = phase.system, phase.row, memory.loops.unknown.shape[0]
     for attempt in range(5):
-        observe(model, ground, q, v, memory)
+        observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
         find_rows(model, q, v, equations.tree, memory.loops.rows)
         count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
         total = count + loops
         if total == 0:
-            return
+            return 0.0
         size = list_unknowns(count, loops, assembly.candidate, memory.surface.friction, phase)
         worst = 0.0
         for i in range(size):
@@ -353,12 +391,23 @@ def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, sta
         if not positions:
             for i in range(size):
                 system[i, size] = -row_product(assembly.jacobian, row[i], v)
-        constraint_matrix(size, 0.0, assembly.problem.delassus, phase)
-        solve_to_rank(size, system, phase.column, phase.unknown)
+        solve_constraints(size, 0.0, assembly.problem.delassus, phase)
         for i in range(2 * total):
             assembly.answer.impulse[i] = 0.0
         for i in range(size):
             assembly.answer.impulse[row[i]] = phase.unknown[i]
         add_impulse(model, assembly, total, equations, q if positions else v)
         if not positions:
-            return
+            return worst
+    return math.inf
+
+
+@kernel
+def explained(before: Floats, after: Floats, phase: Phase) -> bool:
+    """Whether the error that a step may make explains how far a state was moved."""
+    size = before.shape[0]
+    total = 0.0
+    for i in range(size):
+        scale = phase.absolute + phase.relative * max(abs(before[i]), abs(after[i]))
+        total += ((after[i] - before[i]) / scale) ** 2
+    return bool(total <= size * EXPLAINED**2)

@@ -55,6 +55,9 @@ class Phase(Bundle):
         Points that reach the ground in this instant; those whose rebound is too short to follow.
     passing : (nc,) int
         Points of a swing leg below the ground that are let pass.
+    face : (points,) int
+        Face of the ground that each closed contact point is on, -1 for none
+        (:mod:`heelstrike.sim.event_driven.faces`).
     force : (nc, 2) float
         Contact forces of the last evaluation (N), normal and tangent, on the robot.
     end_force : (nc, 2) float
@@ -64,18 +67,18 @@ class Phase(Bundle):
     last_impact, accumulation : (nc,) float
         When each point hit the ground last; when its accumulating impacts come to rest.
     row : (forces,) int
-    lean : (forces,) float
+    lean, scale : (forces,) float
     system : (forces, forces + 1) float
     unknown : (forces,) float
     column : (forces,) int
         Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal
-        force, the equations themselves, their solution, and its order.
-    value, rate, end_value, end_rate : (2 nc,) float
-    before, before_rate, sample, sample_rate : (2 nc,) float
+        force, unit of each, the equations themselves, their solution, and its order.
+    value, rate, end_value, end_rate : (2 nc + points,) float
+    before, before_rate, sample, sample_rate : (2 nc + points,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
         the step, at the sample before, at this one. Of a joint stop the second is always 1, of a
-        dry joint the first.
-    fired : (2 nc,) int
+        dry joint the first. On ground with corners each contact point has a third, after these.
+    fired : (2 nc + points,) int
         Event functions that ended the step.
     scratch : (2, 3) float
         A place and its acceleration.
@@ -112,6 +115,14 @@ class Phase(Bundle):
         Whether contact forces at their limits made it so; whether those that grow without bound.
     closed_count, deficient : int
         Closed contact points at the last evaluation; whether it found their forces ambiguous.
+    left : float
+        How far from its constraints the phase began, because they cannot all be met (m).
+    bridging, bridges : int
+        Whether this instant is left by a bridge; how many there were in the series.
+    series, bridge_end : float
+        When the series of bridges began, and when the last of them ended, s.
+    allowance : float
+        Events that are allowed for until time has moved on.
     reason : int
         Why the simulation could not go on.
     let_pass : int
@@ -136,6 +147,7 @@ class Phase(Bundle):
     hit: Integers = array("contacts", of=int)
     plastic: Integers = array("contacts", of=int)
     passing: Integers = array("contacts", of=int)
+    face: Integers = array("nc", of=int)
     force: Floats = array("contacts", "components")
     end_force: Floats = array("contacts", "components")
     impulse: Floats = array("contacts", "components")
@@ -143,18 +155,19 @@ class Phase(Bundle):
     accumulation: Floats = array("contacts")
     row: Integers = array("forces", of=int)
     lean: Floats = array("forces")
+    scale: Floats = array("forces")
     system: Floats = array("forces", "forces + 1")
     unknown: Floats = array("forces")
     column: Integers = array("forces", of=int)
-    value: Floats = array("2 contacts")
-    rate: Floats = array("2 contacts")
-    end_value: Floats = array("2 contacts")
-    end_rate: Floats = array("2 contacts")
-    before: Floats = array("2 contacts")
-    before_rate: Floats = array("2 contacts")
-    sample: Floats = array("2 contacts")
-    sample_rate: Floats = array("2 contacts")
-    fired: Integers = array("2 contacts", of=int)
+    value: Floats = array("functions")
+    rate: Floats = array("functions")
+    end_value: Floats = array("functions")
+    end_rate: Floats = array("functions")
+    before: Floats = array("functions")
+    before_rate: Floats = array("functions")
+    sample: Floats = array("functions")
+    sample_rate: Floats = array("functions")
+    fired: Integers = array("functions", of=int)
     scratch: Floats = array("axes", 3)
     begin: Floats = array("2 nv")
     end: Floats = array("2 nv")
@@ -185,6 +198,12 @@ class Phase(Bundle):
     jammed: int = cell(int)
     closed_count: int = cell(int)
     deficient: int = cell(int)
+    left: float = cell(float)
+    bridging: int = cell(int)
+    bridges: int = cell(int)
+    series: float = cell(float)
+    bridge_end: float = cell(float)
+    allowance: float = cell(float)
     reason: int = cell(int)
     let_pass: int = cell(int)
 
@@ -199,7 +218,7 @@ def allocate_phase(robot: Robot) -> Phase:
     contacts = contact_capacity(robot)
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        forces=2 * contacts + count_rows(model),
+        forces=2 * contacts + count_rows(model), functions=2 * contacts + robot.nc,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
@@ -221,5 +240,5 @@ def allocate_phase(robot: Robot) -> Phase:
         closed=(np.arange(contacts) >= contacts - len(dry)).astype(np.int64),
         last_impact=np.full(contacts, -np.inf),
         accumulation=np.full(contacts, np.inf),
-        value=np.ones(2 * contacts),
+        value=np.ones(2 * contacts + robot.nc), face=np.full(robot.nc, -1),
     )  # fmt: skip

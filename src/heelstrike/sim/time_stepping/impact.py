@@ -16,6 +16,10 @@ free. It is for the contact that is *new* to say that there is an impact at all:
 the end of this step, did not at the end of the last one, and is not there already. A contact that
 is in the ground makes two problems of it, too: positions are pushed out, velocities are not, so
 that no solve makes kinetic energy. Elsewhere the two velocities are the same.
+
+Between a stop and the ground, or two walls, there may be no way out of a penetration. If it is no
+more than rounding and turning explain, the problem is asked again with negative gaps counted as
+zero, and an event tells of it.
 """
 
 from __future__ import annotations
@@ -31,8 +35,11 @@ from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.memory import Assembly, Memory, contact_capacity
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import log_event
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +47,11 @@ Floats = NDArray[np.float64]
 # that is closed (1e-16), far below what turning makes of one in a step (h² ω² l / 2, 1e-7 at 1 ms).
 TOUCHING = 1e-9
 NEVER = -2
+
+# What is no deeper in the ground or beyond a stop than this (m, rad) may be left there, if there is
+# no way out: a few times what turning makes of a gap that is closed.
+WEDGED_BY = 1e-6
+WEDGED = int(EventKind.WEDGED)
 
 
 class Impact(Bundle):
@@ -54,6 +66,8 @@ class Impact(Bundle):
     called : (places,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
+    relaxed, wedged : int
+        Whether what is in the ground is left there in this step; the last step where it was.
     arriving : (nv,) float
         Where there is an impact, the velocity that positions move with.
     member : (capacity,) int
@@ -66,6 +80,8 @@ class Impact(Bundle):
     touching: Integers = array("places", of=int)
     called: Integers = array("places", of=int)
     calls: int = cell(int)
+    relaxed: int = cell(int)
+    wedged: int = cell(int)
     arriving: Floats = array("nv")
     member: Integers = array("capacity", of=int)
     problem: ContactProblem = part(ContactProblem)
@@ -81,6 +97,7 @@ def allocate_impact(robot: Robot) -> Impact:
         capacity=capacity,
         places=places,
         touching=np.full(places, NEVER),
+        wedged=NEVER,
         problem=ContactProblem.allocate(nc=capacity),
         answer=ContactAnswer.allocate(nc=capacity),
     )
@@ -110,6 +127,45 @@ def call(place: int, impact: Impact) -> None:
     """Call a contact point or stop to take part."""
     impact.calls += 1 - impact.called[place]
     impact.called[place] = 1
+
+
+@kernel
+def relax(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
+    """Leave the candidates where they are that are beyond stops or in the ground; return if any is.
+
+    Not if one is deeper than rounding and turning explain.
+    """
+    deepest = 0.0
+    for place in range(count):
+        candidate = memory.assembly.candidate[place]
+        if candidate < model.nc + 2 * model.nv:
+            deepest = min(deepest, gap_of(model, memory.q, memory.contacts.gap, candidate))
+    leaves = impact.relaxed == 0 and -WEDGED_BY <= deepest < 0.0
+    if leaves:
+        impact.relaxed = 1
+    return leaves
+
+
+@kernel
+def close_gaps(model: Model, step: float, count: int, memory: Memory) -> None:
+    """Count negative gaps of the candidates as zero."""
+    for place in range(count):
+        candidate = memory.assembly.candidate[place]
+        if candidate < model.nc + 2 * model.nv:
+            gap = gap_of(model, memory.q, memory.contacts.gap, candidate)
+            memory.assembly.problem.free[2 * place] -= min(gap, 0.0) / step
+
+
+@kernel
+def note_wedge(model: Model, time: float, memory: Memory, impact: Impact, record: Record) -> None:
+    """Tell of a wedge that begins, by the contact point that is deepest in the ground."""
+    steps, gap = memory.tally.steps, memory.contacts.gap
+    if impact.wedged != steps - 1:
+        deepest = 0
+        for contact in range(model.nc):
+            deepest = contact if gap[contact] < gap[deepest] else deepest
+        log_event(time, WEDGED, deepest, 0.0, 0.0, record)
+    impact.wedged = steps
 
 
 @dissolved_kernel
@@ -187,7 +243,8 @@ def pose_impact(
         candidate = assembly.candidate[source]
         normal = problem.free[2 * source]
         if candidate < model.nc + 2 * model.nv:
-            normal -= gap_of(model, memory.q, contacts.gap, candidate) / step
+            gap = gap_of(model, memory.q, contacts.gap, candidate)
+            normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
         if candidate < model.nc:
             before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
             normal += memory.surface.restitution[candidate] * before

@@ -12,6 +12,15 @@ paper's own ordering (eq. 23-26) asks ``J_n v⁺ ≥ 0`` of the points whose gap
 printed it moves the positions with the old velocity. Its text has the old velocity move the
 positions first and the new velocity computed there, which is the same sequence of states as moving
 them with the new velocity at the end of each step.
+
+Where positions move with v + θ Δv, joint springs K and dampers D pull with −K (q + θ Δq) and
+−D (v + θ Δv) at that part θ of the step. With Δq = h (v + θ Δv) and all other forces f as at its
+beginning, springs and dampers among them::
+
+    (A + θ h D + θ² h² K) Δv = h (f − θ h K v)
+
+Moreau and Jean have θ = 1/2: with constant A a spring keeps its energy exactly, for the spring does
+the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 """
 
 # ruff: noqa: ARG001 - the kernels of all methods have the same arguments
@@ -75,11 +84,14 @@ from heelstrike.sim.time_stepping.impact import (
     Impact,
     allocate_impact,
     call,
+    close_gaps,
     dismiss,
     falls_into,
     find_members,
     note_touching,
+    note_wedge,
     pose_impact,
+    relax,
     solve_impact,
 )
 
@@ -197,7 +209,8 @@ class TimeStepping(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
-        return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names) + robot.model.latches
+        events = 2 * (robot.nc + robot.nv) + len(robot.joint_names) + robot.model.latches + 1
+        return 1, events
 
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one."""
@@ -230,13 +243,23 @@ def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, rec
     return DONE
 
 
+@kernel
+def add_springs(
+    model: Model, ahead: float, stiffness: Floats, damping: Floats, added: Floats
+) -> None:
+    """Write what springs and dampers that act a time ahead add to the mass matrix."""
+    for i in range(model.nv):
+        added[i] = ahead * (damping[i] + ahead * stiffness[i])
+
+
 @dissolved_kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
     equations = memory.equations
-    if work.scheme == LINEARLY_IMPLICIT:
-        for i in range(model.nv):
-            equations.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
+    if work.scheme == LINEARLY_IMPLICIT:  # with the gains of the controller
+        add_springs(model, work.step, memory.stiffness, memory.damping, equations.added)
+    elif work.scheme == MOREAU_JEAN:
+        add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
     find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
@@ -246,18 +269,23 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
 def free_velocity(model: Model, work: Stepping, time: float, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
-    The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
-    order that adds h D + h² K to the mass matrix, as if it were armature, and −h K v to the force.
+    Springs and dampers that a scheme takes later in the step are added to the mass matrix, as if
+    they were armature.
     """
     step, equations, v, next_v = work.step, memory.equations, memory.v, memory.next_v
     force, rate = equations.force, equations.rate
     passive_force(model, memory.q, v, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += memory.torque[i]
-    if work.scheme == LINEARLY_IMPLICIT:
+    if work.scheme in (LINEARLY_IMPLICIT, MOREAU_JEAN):
+        halved = work.scheme == MOREAU_JEAN
+        ahead = 0.5 * step if halved else step
+        stiffness = model.stiffness if halved else memory.stiffness
+        added = 0.0
         for i in range(model.nv):
-            force[i] -= step * memory.stiffness[i] * v[i]
-        if equations.programs[SOLVE] != 0:
+            force[i] -= ahead * stiffness[i] * v[i]
+            added += equations.added[i]
+        if (added > 0.0 or not halved) and equations.programs[SOLVE] != 0:
             weigh(model, equations)  # the program has not heard of it
     for i in range(model.nv):
         rate[i] = step * (force[i] - equations.bias[i])
@@ -685,12 +713,14 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
     """Find the velocity at the end of the step; return success.
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
-    a candidate, is called and the step solved again.
+    a candidate, is called and the step solved again. So it is where nothing pushes all candidates
+    out of where they are already; they are left there, then.
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
     again = True
     solved = True
     near = count = 0
+    impact.relaxed = 0
     while again:
         free_velocity(model, work, time, memory)
         impact.happens = 0
@@ -705,15 +735,19 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         first_loop = model.nc + 2 * model.nv + memory.dry_joint.shape[0]
         count = append_loops(first_loop, count, memory.loops, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
+        if impact.relaxed == 1:
+            close_gaps(model, work.step, count, memory)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
-        again = (
-            is_linearised(work.scheme)
-            and solved
-            and may_go_through(model, work, near, count, v, memory)
-            and call_missed(model, work.step, v, memory, impact)
-        )
+        if not is_linearised(work.scheme):
+            again = False
+        elif solved:
+            again = may_go_through(model, work, near, count, v, memory) and call_missed(
+                model, work.step, v, memory, impact
+            )
+        else:
+            again = relax(model, count, memory, impact)
     if impact.calls > 0:
         dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
@@ -764,6 +798,8 @@ def decide(
     model = scene.model
     solved = solve_step(model, clock.time, work, memory)
     note_extremes(model, memory)
+    if work.impact.relaxed == 1:
+        note_wedge(model, clock.time, memory, work.impact, record)
     first = record.events
     note_events(model, clock.time, work.step, memory, record)
     react(model, first, memory.q, record, memory.loops)

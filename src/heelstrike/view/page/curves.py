@@ -155,8 +155,8 @@ def _torques(run: Run, rows: Rows) -> list[Plot]:
             }
         )
         traces = [
-            Trace(run.torque[rows, i], in_words(robot.actuator_names[i]), int(leg[i]))
-            for i in several
+            Trace(run.torque[rows, i], in_words(robot.actuator_names[i]), int(leg[i]), place)
+            for place, i in enumerate(several)
         ]
         found.append(
             Plot(

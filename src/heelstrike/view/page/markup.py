@@ -49,7 +49,9 @@ def shipped(name: str) -> str:
     return files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
-def document(title: str, body: str, *, style: str, script: str = "") -> str:
+def document(
+    title: str, body: str, *, style: str, script: str = "", connect: str = "'none'"
+) -> str:
     """One HTML file that asks for nothing: only its own script and style sheet are allowed.
 
     The policy names both by their digests, so that neither markup that slipped into a name nor
@@ -63,9 +65,11 @@ def document(title: str, body: str, *, style: str, script: str = "") -> str:
         Markup.
     style, script : str
         Style sheet and script.
+    connect : str
+        What the script may talk to, as a content security policy has it.
     """
     policy = (
-        "default-src 'none'; img-src data:; "
+        f"default-src 'none'; img-src data:; connect-src {connect}; "
         f"style-src '{_digest(style)}'; script-src {_digest_or_none(script)}; "
         "base-uri 'none'; form-action 'none'"
     )
@@ -75,6 +79,7 @@ def document(title: str, body: str, *, style: str, script: str = "") -> str:
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         '<meta name="color-scheme" content="light dark">\n'
+        '<link rel="icon" href="data:,">\n'
         f"<title>{escaped(title)}</title>\n<style>{style}</style>\n</head>\n"
         f"<body>\n{body}\n{ending}</body>\n</html>\n"
     )

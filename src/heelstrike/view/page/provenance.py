@@ -38,11 +38,12 @@ def provenance(run: Run, gait: Gait | None = None, *, command: str = "") -> dict
         The command that made it, if one did.
     """
     found = {"command": command} if command else {}
+    packages = ", ".join(f"{name} {_version(name)}" for name in COMPUTING)
     found |= {
-        "heelstrike": heelstrike.__version__,
-        "computed with": ", ".join(f"{name} {_version(name)}" for name in COMPUTING),
-        "on": f"Python {platform.python_version()}, {platform.system()} {platform.machine()}",
+        # A run from a file may have been computed with others, which it does not tell.
         "page written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        "by": f"heelstrike {heelstrike.__version__} with {packages}, Python "
+        f"{platform.python_version()}, {platform.system()} {platform.machine()}",
         "robot": _robot(run.robot),
         "ground": ground_in_words(run.ground),
         "method": _method(run),

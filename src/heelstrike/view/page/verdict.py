@@ -170,7 +170,7 @@ def _of_motors(run: Run) -> Iterator[Limit]:
             k, used, reached = found
             unit = "N m" if model.axis[model.actuator_joint[i], 0] != 0.0 else "N"
             time = float(run.time[k])
-            detail = f"{torque[k]:.3g} of {ends[k]:.3g} {unit} at {time:.3g} s"
+            detail = f"{torque[k]:.3g} of {ends[k]:.3g} {unit} at {time:.3g} s".replace("-", "−")
             yield Limit(f"torque of {in_words(name)}", "torque", used, time, reached, detail)
 
 

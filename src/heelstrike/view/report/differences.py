@@ -14,26 +14,26 @@ from heelstrike.sim.run import Run
 INSTANTS = 1000
 """At how many times runs are held against each other."""
 
-HEADING = (
-    "",
+QUANTITIES = (
     "steps",
-    "last common time s",
-    "largest distance of the centre of mass mm",
-    "largest difference of a coordinate rad, m",
-    "largest difference in time of a step ms",
+    "last common time (s)",
+    "centre of mass, largest distance (mm)",
+    "coordinates, largest difference (rad, m)",
+    "touchdowns of steps, largest difference in time (ms)",
 )
 
 
 def differences(named: Mapping[str, Run]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """Return heading and rows of a table: every run held against the first.
+    """Return heading and rows of a table, a column a run: how far each is from the first.
 
     Coordinates are compared between robots of the same joints only.
     """
     reference = next(iter(named.values()))
-    return HEADING, [(name, *_row(run, reference)) for name, run in named.items()]
+    columns = [_apart(run, reference) for run in named.values()]
+    return ("", *named), list(zip(QUANTITIES, *columns, strict=True))
 
 
-def _row(run: Run, reference: Run) -> tuple[str, ...]:
+def _apart(run: Run, reference: Run) -> tuple[str, ...]:
     start = max(float(run.time[0]), float(reference.time[0]))
     end = min(float(run.time[-1]), float(reference.time[-1]))
     steps = str(len(walking_steps(run)))

@@ -163,7 +163,7 @@ def _films(named: Mapping[str, Run]) -> str:
         '<input id="time" type="range" min="0" max="1000" value="0" step="1" aria-label="time">'
         '<label>speed <select id="speed" aria-label="speed"><option value="1">1 ×</option>'
         '<option value="0.25">1/4</option><option value="0.05">1/20</option></select></label>'
-        '<output id="clock" for="time">0 s</output></div></section>'
+        '<output id="clock" for="time" aria-live="off">0 s</output></div></section>'
     )
 
 
