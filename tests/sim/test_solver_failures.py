@@ -95,7 +95,7 @@ def test_wedge_without_a_way_out_is_left_where_it_is(scheme: Scheme) -> None:
 
 def test_wedge_deeper_than_turning_explains_is_no_wedge() -> None:
     run = hs.simulate(
-        read_mjcf(PRESSED.replace("LIMIT", "-2e-6"), name="deep"),
+        read_mjcf(PRESSED.replace("LIMIT", "-2e-4"), name="deep"),
         state=hs.State(np.zeros(1), np.zeros(1)),
         duration=0.01,
         method=hs.TimeStepping(step=1e-3),

@@ -324,12 +324,12 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         "points": len(points), "components": 2, "loop_rows": count_rows(model),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
-    room = capacity + count_rows(model)
+    most = capacity + nc + count_rows(model)  # in a concave corner a point is there twice
     assembly = Assembly.allocate(
-        {**extents, "capacity": room},
-        problem=ContactProblem.allocate(nc=room),
-        answer=ContactAnswer.allocate(nc=room),
-        solver=contact_workspace(max(room, 1), ready=False),  # loops make it ready
+        {**extents, "capacity": most},
+        problem=ContactProblem.allocate(nc=most),
+        answer=ContactAnswer.allocate(nc=most),
+        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
     )
     problem = assembly.problem
     return Memory.allocate(

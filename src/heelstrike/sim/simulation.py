@@ -76,7 +76,8 @@ class Simulation:
         The ground; flat with μ = 0.75 and no restitution by default.
     control_period : float, optional
         Time between two calls of the controller, in which its torques are held; a whole number of
-        steps where the method has steps. By default time stepping calls it every step, and under
+        steps where the method has steps. By default that of the law, if it has a period; without
+        one time stepping calls it every step, and under
         ``EventDriven`` and ``Compliant`` a compiled controller acts continuously; one in Python is
         called every millisecond by the former and at every sample by the latter.
     record_every : int

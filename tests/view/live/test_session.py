@@ -154,6 +154,7 @@ def test_events_are_jumped_to() -> None:
     assert kinds.count(EventKind.TOUCHDOWN) == 4  # heel and toe, twice
     ask(session, "event", direction=-1, kinds=["touchdown"])
     assert session.cursor == pytest.approx(1.4)
+    assert shown.told["note"] == "at 1.4 s: touchdown (right foot heel, right foot toe)"
     # The force of the step in which the foot landed is seen.
     pressing = shown.field("pressing")
     assert pressing.max() > 3.0 * walking.bravo7().weight

@@ -134,8 +134,9 @@ class EventDriven(Method):
 
     Notes
     -----
-    Without a `control_period` a compiled controller acts continuously. Its memory changes only at
-    the ends of steps, and the contact forces it sees are those at the last of these; right after an
+    Without a `control_period` a compiled controller acts continuously. Its memory and log change
+    only at the ends of steps - ``robot.trial`` tells a controller which calls are others - and the
+    contact forces it sees are those at the last of these; right after an
     impact, a point that was hit but carries no force shows its impulse (N s) instead. A Python
     controller is called every `control_period`, by default 1 ms, and its torques are held.
     """

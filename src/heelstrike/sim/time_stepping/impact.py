@@ -40,6 +40,7 @@ from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.memory import Assembly, Memory, contact_capacity
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event
+from heelstrike.sim.time_stepping.corners import Corner, allocate_corner
 
 Floats = NDArray[np.float64]
 
@@ -49,8 +50,8 @@ TOUCHING = 1e-9
 NEVER = -2
 
 # What is no deeper in the ground or beyond a stop than this (m, rad) may be left there, if there is
-# no way out: a few times what turning makes of a gap that is closed.
-WEDGED_BY = 1e-6
+# no way out: what turning makes of a gap that is closed, h² ω² l / 2, at 20 rad/s and 1 ms.
+WEDGED_BY = 1e-4
 WEDGED = int(EventKind.WEDGED)
 
 
@@ -62,7 +63,8 @@ class Impact(Bundle):
     happens : int
         Whether an impact falls into this step.
     touching : (places,) int
-        The last step at whose end each contact point, and then each end of each joint, touched.
+        The last step at whose end each contact point, each end of each joint, and each second face
+        of a corner touched.
     called : (places,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
@@ -74,6 +76,8 @@ class Impact(Bundle):
         The candidates that take part.
     problem, answer : ContactProblem, ContactAnswer
         The impact.
+    corner : Corner
+        Second faces of concave corners.
     """
 
     happens: int = cell(int)
@@ -86,12 +90,13 @@ class Impact(Bundle):
     member: Integers = array("capacity", of=int)
     problem: ContactProblem = part(ContactProblem)
     answer: ContactAnswer = part(ContactAnswer)
+    corner: Corner = part(Corner)
 
 
 def allocate_impact(robot: Robot) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    capacity = contact_capacity(robot) + count_rows(robot.model)
-    places = robot.nc + 2 * robot.nv
+    capacity = contact_capacity(robot) + robot.nc + count_rows(robot.model)
+    places = 2 * (robot.nc + robot.nv)
     return Impact.allocate(
         nv=robot.nv,
         capacity=capacity,
@@ -100,15 +105,18 @@ def allocate_impact(robot: Robot) -> Impact:
         wedged=NEVER,
         problem=ContactProblem.allocate(nc=capacity),
         answer=ContactAnswer.allocate(nc=capacity),
+        corner=allocate_corner(robot),
     )
 
 
 @kernel
-def gap_of(model: Model, q: Floats, gap: Floats, candidate: int) -> float:
-    """Gap of a contact point or a joint stop."""
-    stop = candidate - model.nc
+def gap_of(model: Model, memory: Memory, corner: Corner, candidate: int) -> float:
+    """Gap of a contact point, a joint stop or the second face of a corner."""
+    stop, q = candidate - model.nc, memory.q
     if stop < 0:
-        return gap[candidate]
+        return memory.contacts.gap[candidate]
+    if stop >= 2 * model.nv:
+        return corner.contacts.gap[stop - 2 * model.nv]
     if stop % 2 == 1:
         return model.upper[stop // 2] - q[stop // 2]
     return q[stop // 2] - model.lower[stop // 2]
@@ -138,8 +146,8 @@ def relax(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
     deepest = 0.0
     for place in range(count):
         candidate = memory.assembly.candidate[place]
-        if candidate < model.nc + 2 * model.nv:
-            deepest = min(deepest, gap_of(model, memory.q, memory.contacts.gap, candidate))
+        if candidate < 2 * (model.nc + model.nv):
+            deepest = min(deepest, gap_of(model, memory, impact.corner, candidate))
     leaves = impact.relaxed == 0 and -WEDGED_BY <= deepest < 0.0
     if leaves:
         impact.relaxed = 1
@@ -147,12 +155,12 @@ def relax(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
 
 
 @kernel
-def close_gaps(model: Model, step: float, count: int, memory: Memory) -> None:
+def close_gaps(model: Model, step: float, count: int, impact: Impact, memory: Memory) -> None:
     """Count negative gaps of the candidates as zero."""
     for place in range(count):
         candidate = memory.assembly.candidate[place]
-        if candidate < model.nc + 2 * model.nv:
-            gap = gap_of(model, memory.q, memory.contacts.gap, candidate)
+        if candidate < 2 * (model.nc + model.nv):
+            gap = gap_of(model, memory, impact.corner, candidate)
             memory.assembly.problem.free[2 * place] -= min(gap, 0.0) / step
 
 
@@ -183,7 +191,7 @@ def note_touching(model: Model, step: float, count: int, memory: Memory, impact:
     assembly = memory.assembly
     for place in range(count):
         candidate = assembly.candidate[place]
-        if candidate < model.nc + 2 * model.nv and arrives(step, place, assembly.answer):
+        if candidate < 2 * (model.nc + model.nv) and arrives(step, place, assembly.answer):
             impact.touching[candidate] = memory.tally.steps
 
 
@@ -195,10 +203,10 @@ def falls_into(
     assembly, before = memory.assembly, memory.tally.steps - 1
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        if candidate >= model.nc + 2 * model.nv:
-            break
+        if candidate >= 2 * (model.nc + model.nv):
+            continue
         if arrives(step, place, assembly.answer):
-            now = gap_of(model, memory.q, memory.contacts.gap, candidate)
+            now = gap_of(model, memory, impact.corner, candidate)
             new = impact.touching[candidate] != before and problem.free[2 * place] < 0.0
             if now < -TOUCHING or (new and now > TOUCHING):
                 return True
@@ -214,9 +222,10 @@ def find_members(
     members = 0
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        takes_part = candidate >= model.nc + 2 * model.nv  # dry friction and loops are always there
+        # Dry friction and loops are always there.
+        takes_part = candidate >= 2 * (model.nc + model.nv)
         if not takes_part:
-            now = gap_of(model, memory.q, memory.contacts.gap, candidate)
+            now = gap_of(model, memory, impact.corner, candidate)
             touched = impact.touching[candidate] == before
             stays = touched or problem.free[2 * place] < 0.0
             takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
@@ -242,12 +251,16 @@ def pose_impact(
                     its.delassus[2 * place + i, 2 * other + j] = entry
         candidate = assembly.candidate[source]
         normal = problem.free[2 * source]
-        if candidate < model.nc + 2 * model.nv:
-            gap = gap_of(model, memory.q, contacts.gap, candidate)
+        if candidate < 2 * (model.nc + model.nv):
+            gap = gap_of(model, memory, impact.corner, candidate)
             normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
         if candidate < model.nc:
             before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
             normal += memory.surface.restitution[candidate] * before
+        elif model.nc + 2 * model.nv <= candidate < 2 * (model.nc + model.nv):
+            contact, corner = candidate - model.nc - 2 * model.nv, impact.corner
+            before, _ = contact_velocity(model, memory.equations.tree, corner.contacts, contact)
+            normal += corner.restitution[contact] * before
         its.free[2 * place] = normal
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]

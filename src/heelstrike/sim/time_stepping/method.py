@@ -54,6 +54,7 @@ from heelstrike.sim.contacts.geometry import (
     contact_velocity,
     evaluate_equations,
     locate_contacts,
+    row_product,
     solve_mass_matrix,
     weigh,
     write_unit_row,
@@ -78,6 +79,7 @@ from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
+from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
@@ -215,6 +217,8 @@ class TimeStepping(Method):
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one."""
         work.impact.touching[: robot.nc] = NEVER
+        work.impact.touching[robot.nc + 2 * robot.nv :] = NEVER
+        work.impact.corner.near = 0
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
@@ -263,6 +267,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
     find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
+    if ground.concave == 1:
+        locate_corners(model, ground, equations.tree, work.impact.corner)
 
 
 @dissolved_kernel
@@ -434,6 +440,41 @@ def hold_latched(model: Model, count: int, memory: Memory) -> int:
 
 
 @kernel
+def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
+    """Append the second faces of corners that could act in this step, and write their rows."""
+    assembly, corner, step = memory.assembly, work.impact.corner, work.step
+    problem, gaps = assembly.problem, corner.contacts.gap
+    for contact in range(model.nc):
+        gap = gaps[contact]
+        if gap > FAR_STEPS * CLOSING_SPEED * step:
+            continue
+        tree = memory.equations.tree
+        contact_rows(model, tree, corner.contacts, contact, count, assembly)
+        normal = row_product(assembly.jacobian, 2 * count, memory.next_v)
+        if is_linearised(work.scheme):
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+                continue
+            normal += gap / step
+        elif work.scheme == MOREAU_JEAN:
+            before = row_product(assembly.jacobian, 2 * count, memory.v)
+            if gap + 0.5 * step * before > work.activation:
+                continue
+            normal += corner.restitution[contact] * before
+        elif gap > work.activation:
+            continue
+        problem.free[2 * count] = normal
+        tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
+        problem.free[2 * count + 1] = tangent
+        problem.set[count] = CONE
+        problem.friction[count] = corner.friction[contact]
+        assembly.answer.mode[count] = corner.mode[contact]
+        assembly.candidate[count] = model.nc + 2 * model.nv + contact
+        count += 1
+        corner.count += 1
+    return count
+
+
+@kernel
 def write_rows(
     model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
 ) -> None:
@@ -455,7 +496,7 @@ def joint_row(
 ) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
     stop = candidate[place] - model.nc
-    dry = stop - 2 * model.nv
+    dry = stop - 2 * model.nv - model.nc
     if dry >= 0:
         return 2 * place + 1, dry_joint[dry], 1.0
     return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
@@ -486,7 +527,7 @@ def gather_delassus(
                 for j in range(2):
                     entry = usual.usual_problem.delassus[row + i, column + j]
                     assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
-    first_loop = model.nc + 2 * model.nv + dry_joint.shape[0]
+    first_loop = 2 * (model.nc + model.nv) + dry_joint.shape[0]
     for place in range(near, count):
         if candidate[place] >= first_loop:
             break
@@ -583,7 +624,7 @@ def push_candidates(
         )  # fmt: skip
     for place in range(near, count):
         row = 2 * place
-        if assembly.candidate[place] >= model.nc + 2 * model.nv:
+        if assembly.candidate[place] >= 2 * (model.nc + model.nv):
             row += 1
         for j in range(model.nv):
             v[j] += impulse[row] * assembly.jacobian[row, j]
@@ -612,7 +653,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
-    straight = are_usual(assembly.candidate, near, DELASSUS, usual)
+    corners = impact.corner.count
+    straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
         joints = count - memory.loops.unknown.shape[0]
@@ -621,7 +663,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        joints = count - dry_joint.shape[0] - memory.loops.unknown.shape[0]
+        rows_there = dry_joint.shape[0] + corners + memory.loops.unknown.shape[0]
+        joints = count - rows_there
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
@@ -732,11 +775,14 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
-        first_loop = model.nc + 2 * model.nv + memory.dry_joint.shape[0]
+        impact.corner.count = 0
+        if impact.corner.near > 0:
+            count = select_corners(model, count, work, memory)
+        first_loop = 2 * (model.nc + model.nv) + memory.dry_joint.shape[0]
         count = append_loops(first_loop, count, memory.loops, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
         if impact.relaxed == 1:
-            close_gaps(model, work.step, count, memory)
+            close_gaps(model, work.step, count, impact, memory)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
@@ -752,12 +798,16 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
         note_touching(model, work.step, count, memory, impact)
-    note_answer(model, work.step, near, count, memory)
+    note_answer(model, work.step, near, count, memory, impact.corner)
+    if impact.corner.count > 0:
+        join_forces(model, impact.corner, memory.contacts)
     return solved
 
 
 @dissolved_kernel
-def note_answer(model: Model, step: float, near: int, count: int, memory: Memory) -> None:
+def note_answer(
+    model: Model, step: float, near: int, count: int, memory: Memory, corner: Corner
+) -> None:
     """Keep the forces, slips and modes of the candidates; all others have none."""
     answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
     for joint in range(model.nv):
@@ -777,13 +827,18 @@ def note_answer(model: Model, step: float, near: int, count: int, memory: Memory
         reaction.mode[contact] = answer.mode[place]
     for place in range(near, count):
         stop = memory.assembly.candidate[place] - model.nc
-        dry = stop - 2 * model.nv
+        other = stop - 2 * model.nv
+        dry = other - model.nc
         loop = dry - memory.dry_joint.shape[0]
         if loop >= 0:
             note_loop(model, loop, answer.impulse[2 * place] / step, memory.loops)
         elif dry >= 0:
             reaction.friction_torque[memory.dry_joint[dry]] = answer.impulse[2 * place + 1] / step
             reaction.dry_mode[dry] = answer.mode[place]
+        elif other >= 0:
+            corner.contacts.force[other, 0] = answer.impulse[2 * place] / step
+            corner.contacts.force[other, 1] = answer.impulse[2 * place + 1] / step
+            corner.mode[other] = answer.mode[place]
         else:
             normal = answer.impulse[2 * place]
             reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step

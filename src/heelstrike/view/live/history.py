@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import QUANTITIES, Event, Run
 
 Floats = NDArray[np.float64]
@@ -17,7 +16,6 @@ Floats = NDArray[np.float64]
 MOST_ROWS = 100_000
 """Rows that are kept; some 60 MB of bravo7."""
 MOST_EVENTS = 5000
-OF_JOINTS = (EventKind.JOINT_STOP, EventKind.JOINT_SLIP, EventKind.JOINT_STICK)
 SAME = 1e-9
 """Seconds by which two times may differ and be the same."""
 

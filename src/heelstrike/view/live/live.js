@@ -13,7 +13,7 @@
     pressure: "◆ zero moment point", support: "▬ support interval", center: "● centre of mass",
     capture: "✕ capture point", traces: "⌇ foot traces" };
   const LAMPS = { good: "✓", warn: "!", bad: "✗", none: "–" };
-  const KIND_ROWS = ["touchdown", "impact", "slip"];
+  const KIND_ROWS = ["touchdown", "impact", "slip", "bridge"];
 
   const state = {}; // what the server told last
   let scene = null, layout = null, kindNames = [], live = false;
@@ -260,7 +260,7 @@
     const lasts = FLASH * Math.min(1, Math.max(state.rate || 1, 0.02));
     const found = new Map(), named = new Set();
     for (let k = events.length - 1; k >= 0 && k > events.length - 200; k--) {
-      const [time, kind, , contact] = events[k];
+      const [time, kind, contact] = events[k];
       if (time > frame.time + 1e-9 || time < frame.time - lasts) continue;
       if (contact < 0 || 2 * contact + 1 >= frame.point.length || found.has(contact)) continue;
       const label = named.size ? "" : kindNames[kind].replaceAll("_", " ");

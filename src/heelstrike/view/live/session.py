@@ -21,10 +21,11 @@ from heelstrike.sim.push import Push
 from heelstrike.sim.run import Event, Run
 from heelstrike.view.live.board import Board
 from heelstrike.view.live.frames import Layout
-from heelstrike.view.live.history import OF_JOINTS, SAME, History
+from heelstrike.view.live.history import SAME, History
 from heelstrike.view.live.light import light_of
 from heelstrike.view.live.live_simulation import LiveSimulation
 from heelstrike.view.live.stage import Stage
+from heelstrike.view.page.page import OF_JOINTS
 from heelstrike.view.page.scene import scene
 from heelstrike.view.style import in_words
 
@@ -212,6 +213,7 @@ class Session:
             )
         self.playing = False
         self._move(wanted[0] if ahead else wanted[-1])
+        self._note = self._happened(self.cursor)
 
     def _rate(self, _: str, command: Mapping[str, Any]) -> None:
         self.rate = min(max(_finite(command["value"]), RATES[0]), RATES[1])
@@ -390,7 +392,7 @@ class Session:
         part = self.history.part(rows[0], rows[-1])
         frames = self._layout.frames(part, [row - rows[0] for row in rows], self._pushes)
         self._shown = self.cursor = float(part.time[-1])
-        told = [[e.time, int(e.kind), self._where(e), _contact(e)] for e in events]
+        told = [[event.time, int(event.kind), _contact(event)] for event in events]
         self._board.add(frames, told)
 
     def _move(self, time: float) -> None:
@@ -442,10 +444,19 @@ class Session:
             raise RefusedError("this is a run that is over: there is nothing to push or set")
         return self._stage
 
+    def _happened(self, time: float) -> str:
+        """Return in words what happened at a time (s), and where."""
+        places: dict[str, list[str]] = {}
+        for event in self.history.events:
+            if abs(event.time - time) <= SAME:
+                places.setdefault(in_words(_kind(event)), []).append(self._where(event))
+        told = [f"{kind} ({', '.join(filter(None, each))})" for kind, each in places.items()]
+        return f"at {time:.6g} s: {'; '.join(told)}".replace(" ()", "")
+
     def _where(self, event: Event) -> str:
-        robot = self._layout.robot if self._layout else None
-        if robot is None:
+        if self._layout is None or event.kind is EventKind.BRIDGE:
             return ""
+        robot = self._layout.robot
         names = robot.joint_names if event.kind in OF_JOINTS else robot.contact_names
         return in_words(names[event.contact]) if 0 <= event.contact < len(names) else ""
 
@@ -492,7 +503,7 @@ def _kind(event: Event) -> str:
 
 
 def _contact(event: Event) -> int:
-    return -1 if event.kind in OF_JOINTS else event.contact
+    return -1 if event.kind in (*OF_JOINTS, EventKind.BRIDGE) else event.contact
 
 
 def _finite(value: Any) -> float:
