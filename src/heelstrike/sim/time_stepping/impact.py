@@ -222,7 +222,8 @@ def find_members(
     members = 0
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        takes_part = candidate >= 2 * (model.nc + model.nv)  # as dry friction and loops always do
+        # Dry friction and loops are always there.
+        takes_part = candidate >= 2 * (model.nc + model.nv)
         if not takes_part:
             now = gap_of(model, memory, impact.corner, candidate)
             touched = impact.touching[candidate] == before

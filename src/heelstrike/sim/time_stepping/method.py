@@ -266,9 +266,9 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
     if ground.concave == 1:
         locate_corners(model, ground, equations.tree, work.impact.corner)
-    find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
 
 
 @dissolved_kernel
@@ -663,8 +663,8 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        # Rows of corners are there.
-        joints = count - dry_joint.shape[0] - corners - memory.loops.unknown.shape[0]
+        rows_there = dry_joint.shape[0] + corners + memory.loops.unknown.shape[0]
+        joints = count - rows_there
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, count, equations, assembly)
     problem.count = count

@@ -502,8 +502,8 @@ def _kind(event: Event) -> str:
 
 
 def _contact(event: Event) -> int:
-    placeless = event.kind.of_joint or event.kind is EventKind.BRIDGE
-    return -1 if placeless else event.contact
+    of_point = not event.kind.of_joint and event.kind is not EventKind.BRIDGE
+    return event.contact if of_point else -1
 
 
 def _finite(value: Any) -> float:
