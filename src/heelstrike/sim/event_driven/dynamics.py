@@ -39,9 +39,9 @@ from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 
-# How far a projection may move a state, as a multiple of the error that a step may make: beyond
-# that, the motion has not kept its constraints.
-EXPLAINED = 100.0
+# How far a projection may move a state, as a multiple of the error that a step may make: the end of
+# a step, beyond which the motion has not kept its constraints, and a place on its dense output.
+EXPLAINED, INTERPOLATED = 100.0, 1e4
 
 
 @kernel
@@ -403,11 +403,11 @@ def project(
 
 
 @kernel
-def explained(before: Floats, after: Floats, phase: Phase) -> bool:
-    """Whether the error that a step may make explains how far a state was moved."""
+def explained(before: Floats, after: Floats, times: float, phase: Phase) -> bool:
+    """Whether some multiple of the error that a step may make explains how far a state moved."""
     size = before.shape[0]
     total = 0.0
     for i in range(size):
         scale = phase.absolute + phase.relative * max(abs(before[i]), abs(after[i]))
         total += ((after[i] - before[i]) / scale) ** 2
-    return bool(total <= size * EXPLAINED**2)
+    return bool(total <= size * times**2)

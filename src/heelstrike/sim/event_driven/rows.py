@@ -10,7 +10,7 @@ from heelstrike.sim.contacts.loops import note_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
-from heelstrike.sim.event_driven.dynamics import evaluate, explained, project
+from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
@@ -46,7 +46,7 @@ def write_row(
     for i in range(state.shape[0]):
         trial[i] = state[i]
     project(model, scene.ground, memory, phase, trial)
-    if not explained(state, trial, phase):
+    if not explained(state, trial, INTERPOLATED, phase):
         for i in range(state.shape[0]):
             trial[i] = state[i]
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
