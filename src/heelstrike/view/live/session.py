@@ -25,7 +25,6 @@ from heelstrike.view.live.history import SAME, History
 from heelstrike.view.live.light import light_of
 from heelstrike.view.live.live_simulation import LiveSimulation
 from heelstrike.view.live.stage import Stage
-from heelstrike.view.page.page import OF_JOINTS
 from heelstrike.view.page.scene import scene
 from heelstrike.view.style import in_words
 
@@ -457,7 +456,7 @@ class Session:
         if self._layout is None or event.kind is EventKind.BRIDGE:
             return ""
         robot = self._layout.robot
-        names = robot.joint_names if event.kind in OF_JOINTS else robot.contact_names
+        names = robot.joint_names if event.kind.of_joint else robot.contact_names
         return in_words(names[event.contact]) if 0 <= event.contact < len(names) else ""
 
     def _tell_busy(self, what: str) -> None:
@@ -503,7 +502,8 @@ def _kind(event: Event) -> str:
 
 
 def _contact(event: Event) -> int:
-    return -1 if event.kind in (*OF_JOINTS, EventKind.BRIDGE) else event.contact
+    of_point = not event.kind.of_joint and event.kind is not EventKind.BRIDGE
+    return event.contact if of_point else -1
 
 
 def _finite(value: Any) -> float:

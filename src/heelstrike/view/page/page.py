@@ -33,8 +33,6 @@ MOST_EVENTS = 4000
 MOST_PHASES = 2000
 """Phases of support that a page shows below its timeline."""
 
-OF_JOINTS = (EventKind.JOINT_STOP, EventKind.JOINT_SLIP, EventKind.JOINT_STICK)
-
 
 def save_html(
     run: Run,
@@ -167,7 +165,7 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
                 "time": event.time,
                 "kind": event.kind.name.lower().replace("_", " "),
                 "where": _where(run, event.kind, event.contact),
-                "contact": -1 if event.kind in OF_JOINTS else event.contact,
+                "contact": -1 if event.kind.of_joint else event.contact,
                 "impulse": event.impulse[0] if math.isfinite(event.impulse[0]) else 0.0,
                 "impact": event.kind in IMPACTS,
             }
@@ -181,5 +179,5 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
 
 
 def _where(run: Run, kind: EventKind, index: int) -> str:
-    names = run.robot.joint_names if kind in OF_JOINTS else run.robot.contact_names
+    names = run.robot.joint_names if kind.of_joint else run.robot.contact_names
     return in_words(names[index]) if 0 <= index < len(names) else ""
