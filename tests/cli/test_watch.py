@@ -77,6 +77,7 @@ def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]
         (["--speed", "0"], "rate must lie between"),
         (["--step", "0"], "step must be a positive number"),
         (["--friction", "-1"], "friction coefficient"),
+        (["compass_gait", "--ground", "rough:0.02:1"], "compass_gait has no motors"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_served(
