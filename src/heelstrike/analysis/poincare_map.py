@@ -5,8 +5,8 @@ state after touchdown is relabelled - left and right exchanged, a wheel turned b
 moved back along the ground.
 
 On this section the feet obey equations: points on the ground have no gap, those that stand have no
-velocity, and where along the ground they are does not matter. A :class:`Chart` numbers what these
-leave free.
+velocity, and where along the ground they are does not matter; closed loops hold, and
+joints are where latches have them. A :class:`Chart` numbers what these leave free.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -78,6 +79,18 @@ class Section:
         at_rest[:, 1] &= at_rest[:, 0]
         return touching, at_rest
 
+    def to_latches(self, state: State) -> Floats:
+        """How far joints are from the ends of their ranges at which latches hold them."""
+        model = self.robot.model
+        joint, above = model.latch_joint, model.latch_side > 0
+        end: Floats = np.where(above, model.upper[joint], model.lower[joint])
+        return end - state.q[joint]
+
+    def latched(self, state: State) -> Flags:
+        """Which latches have their joints, at rest, where they hold them or have just let go."""
+        there: Flags = np.abs(self.to_latches(state)) <= ON_THE_GROUND
+        return there & (np.abs(state.v[self.robot.model.latch_joint]) <= AT_REST)
+
     def foothold(self, state: State) -> int:
         """First contact point that stands, or else the lowest."""
         _, gap, _ = self.contacts(state)
@@ -123,6 +136,7 @@ class Chart:
         self._origin = np.concatenate((origin.q, origin.v))
         self._touching, self._at_rest = section.standing(origin)
         self._foothold = section.foothold(origin)
+        self._latched = section.latched(origin)
         gradient = derivative(
             lambda change: self._equations(self._origin + change), len(self._origin), DISTURBANCE
         )
@@ -141,9 +155,14 @@ class Chart:
 
     def _equations(self, x: Floats) -> Floats:
         """What vanishes on the section."""
-        place, gap, velocity = self._section.contacts(State(x[: self._nq], x[self._nq :]))
+        robot, q, v = self._section.robot, x[: self._nq], x[self._nq :]
+        place, gap, velocity = self._section.contacts(State(q, v))
+        way, joint = self._section.to_latches(State(q, v)), robot.model.latch_joint
+        held = way[self._latched], v[joint[self._latched]]
+        loops = loop_displacement(robot, q), loop_jacobian(robot, q) @ v
+        foothold = [place[self._foothold]]
         return np.concatenate(
-            (gap[self._touching], velocity[self._at_rest], [place[self._foothold]])
+            (gap[self._touching], velocity[self._at_rest], foothold, *loops, *held)
         )
 
     def state(self, coordinates: Floats) -> State:

@@ -290,33 +290,6 @@ class VirtualConstraints(Law):
         )
         self.gait = gait
 
-    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
-        """Return parameters and memory for a robot, which must be of the same kind.
-
-        Parameters
-        ----------
-        robot : Robot
-            The robot that is simulated.
-
-        Returns
-        -------
-        tuple of Bundle
-            Parameters and memory.
-
-        Raises
-        ------
-        ControllerError
-            If it does not stand on two points, or they do not fit it.
-        """
-        if [foot.contacts[:1] for foot in robot.feet] != [
-            foot.contacts for foot in self.gait.robot.feet
-        ]:
-            raise ControllerError(
-                f"these virtual constraints are for robot {self.gait.robot.name!r} on its two "
-                f"point feet; robot {robot.name!r} has others"
-            )
-        return super().numbers(robot)
-
 
 def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     gains = per_actuator(name, value, robot)

@@ -460,7 +460,13 @@ def actuated_joints(robot: Robot) -> tuple[str, ...]:
     return tuple(robot.joint_names[j] for j in robot.model.actuator_joint)
 
 
-YOUNGER = frozenset({"stall_torque", "no_load_speed", "winding_resistance"})
+YOUNGER = frozenset(
+    {
+        "stall_torque", "no_load_speed", "winding_resistance",
+        "loop_link", "loop_position", "coupling_joint", "coupling_polynomial",
+        "latch_joint", "latch_side", "latch_release",
+    }
+)  # fmt: skip
 """Numbers of a robot that are younger than the first gaits in files."""
 
 

@@ -45,7 +45,8 @@ class EventKind(enum.IntEnum):
         Newton's restitution with friction made energy in an impact (Kane's paradox).
     ``JOINT_STOP``
         A joint reached the end of its range, with the impulse that took, or was pressed against it
-        by an impact elsewhere; the event's `contact` is the index of the joint.
+        by an impact elsewhere (or, held by a latch, pulled off it: the impulse is negative then);
+        the event's `contact` is the index of the joint.
     ``JOINT_SLIP``, ``JOINT_STICK``
         A joint with dry friction broke away, or turned round; it came to rest. The event's
         `contact` is the index of the joint.
@@ -58,6 +59,8 @@ class EventKind(enum.IntEnum):
         It is in the ground, by so little as rounding and turning explain, and neither it nor a
         joint can be pushed out without the other being pressed in: from here on they are left where
         they are until that ends.
+    ``JOINT_RELEASE``
+        A latch let go of a joint, whose index the event's `contact` is.
     """
 
     TOUCHDOWN = 0
@@ -74,6 +77,12 @@ class EventKind(enum.IntEnum):
     JOINT_STICK = 11
     BRIDGE = 12
     WEDGED = 13
+    JOINT_RELEASE = 14
+
+    @property
+    def of_joint(self) -> bool:
+        """Whether it happens to a joint, and not to a contact point."""
+        return self.name.startswith("JOINT_")
 
 
 class Scheme(enum.IntEnum):

@@ -217,6 +217,12 @@ class Run:
     slip_velocity : (nt, nc) float
         Tangential velocity (m/s) at the end of the step of the points in the contact problem;
         zero for the others.
+    loop_force : (nt, loops, 2) float
+        Force (x, z) on the first link of each closed loop at its hinge (N), in world axes: the mean
+        over the step. The second link feels the opposite.
+    coupling_force : (nt, couplings) float
+        Generalised force on each joint that follows another (N m, or N for a slide); the leader
+        feels it times minus the slope of the coupling.
     residual : (nt, 3) float
         Relative residuals of the contact problem: complementarity, cone, non-penetration.
     events : tuple of Event
@@ -279,6 +285,14 @@ class Run:
     slip_velocity: Floats = recorded(
         "nc", of="reaction.slip", unit="m/s",
         label="tangential velocity of the contact points at the end of the step",
+    )  # fmt: skip
+    loop_force: Floats = recorded(
+        "loops", "axes", of="loops.loop_force", unit="N", later=True,
+        label="force on the first link of the closed loops, mean over the step that follows",
+    )  # fmt: skip
+    coupling_force: Floats = recorded(
+        "couplings", of="loops.coupling_force", unit="N m or N", later=True,
+        label="force on the joints that follow others",
     )  # fmt: skip
     residual: Floats = recorded(
         "conditions", of="assembly.answer.residual", unit="1",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time as clock_time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn, Unpack
@@ -21,6 +21,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
@@ -86,6 +87,9 @@ class Simulation:
         of what it was at first. By default true for floating robots with several feet.
     pushes : sequence of Push
         Forces from outside, each on a point of the robot over a window of time.
+    latched : iterable of str or int, optional
+        Joints that their latches hold as it begins. By default those at rest at their latched end,
+        unless the link whose touchdown lets go stands on the ground.
     checked : bool
         Run a compiled controller in Python, some hundred times slower, and look at every index: one
         that reads or writes beyond its arrays, or writes where it may not, ends the run with a
@@ -135,6 +139,7 @@ class Simulation:
         record_every: int = 1,
         stop_when_fallen: bool | None = None,
         pushes: Sequence[Push] | Push = (),
+        latched: Iterable[str | int] | None = None,
         checked: bool = False,
     ) -> None:
         begin, given = state.state if isinstance(state, Snapshot) else state, ground
@@ -142,7 +147,7 @@ class Simulation:
             ground = _ground_of(state)
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
-            stop_when_fallen=stop_when_fallen, pushes=pushes, checked=checked,
+            stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, checked=checked,
         )  # fmt: skip
         law_of(controller, begin=True)
         self._begin(setting, checked_method(method))
@@ -156,6 +161,8 @@ class Simulation:
             ):
                 self._clock.fallen_height = setting.fallen_height
             self.apply(setting.pushes)
+            if latched is not None:
+                self.latched = latched
 
     def __reduce__(self) -> NoReturn:
         """Copies would share memory that compiled code finds by address."""
@@ -185,6 +192,7 @@ class Simulation:
         self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
         self._memory.q[:] = setting.state.q
         self._memory.v[:] = setting.state.v
+        self._memory.loops.held[:] = setting.held
         self._work = method.new_work(self.robot)
         rows, events = method.room(self.robot)
         self._clock = Clock(
@@ -251,6 +259,18 @@ class Simulation:
         if not all(np.array_equal(mine[name], its[name]) for name in mine):
             self.method.forget_ground(self.robot, self._work, self._clock)
         self._ground = ground
+
+    @property
+    def latched(self) -> tuple[str, ...]:
+        """Joints that latches hold; when others are set, the latches of the rest let go at once."""
+        held = self._memory.loops.held
+        return tuple(name for name, one in zip(self.robot.latch_names, held, strict=True) if one)
+
+    @latched.setter
+    def latched(self, joints: Iterable[str | int]) -> None:
+        held = self._memory.loops.held
+        held[:] = latches_at(self.robot, self.state, self._ground, joints)
+        self.method.reconsider(self._work)
 
     @property
     def controller(self) -> Controller | None:

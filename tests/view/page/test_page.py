@@ -234,8 +234,7 @@ def test_events_say_where_they_were_and_in_which_unit(kind: EventKind, tmp_path:
     """Indices of joints are none of contact points, and a bridge has neither, nor an impulse."""
     robot = box()
     turns = robot.model.axis[:, 0] != 0.0
-    of_joint = kind.name.startswith("JOINT")
-    at = (int(turns.argmax()), int(turns.argmin())) if of_joint else (0, 1)
+    at = (int(turns.argmax()), int(turns.argmin())) if kind.of_joint else (0, 1)
     events = [Event(0.05, kind, index, (0.5, 0.1)) for index in at]
     run = make_run(robot, [0.0, 0.1], events=events)
     _, content = read(save_html(run, tmp_path / "run.html"))
@@ -245,7 +244,7 @@ def test_events_say_where_they_were_and_in_which_unit(kind: EventKind, tmp_path:
     ]
     if kind is EventKind.BRIDGE:
         assert told == [(-1, "", 0.0, "")] * 2
-    elif of_joint:
+    elif kind.of_joint:
         names = [robot.joint_names[i].replace("_", " ") for i in at]
         assert told == [(-1, names[0], 0.5, "N m s"), (-1, names[1], 0.5, "N s")]
     else:

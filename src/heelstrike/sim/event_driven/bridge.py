@@ -28,6 +28,7 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
@@ -134,6 +135,7 @@ def gather_corners(
     assembly, contacts, surface = memory.assembly, memory.contacts, memory.surface
     tree, scratch = memory.equations.tree, phase.scratch[0]
     first = count
+    room = assembly.candidate.shape[0] - memory.loops.unknown.shape[0]
     for place in range(first):
         contact = assembly.candidate[place]
         if contact >= model.nc:
@@ -148,7 +150,7 @@ def gather_corners(
             face = nearest_face(ground, x, z, radius)
         for other in range(ground.friction.shape[0]):
             far = distance_to(ground, other, x, z) - radius > length * CLOSING_SPEED
-            if far or count == assembly.candidate.shape[0]:
+            if far or count == room:
                 continue
             if closes_corner(ground, face, other, x, z, radius):
                 locate_on_face(model, ground, tree, contact, 2 * other, contacts, surface)
@@ -231,16 +233,20 @@ def find_impulses(
         phase.impulse[contact, 1] = 0.0
     first = gather_near(model, length, bouncing, phase, memory)
     count = gather_corners(model, scene.ground, length, first, memory, phase)
-    if count > 0:
-        assemble_delassus(model, equations, count, assembly)
+    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    free_loops(total, memory.loops, trial[model.nq :], 0.5 * length, assembly)
+    for place in range(count, total):
+        phase.lean[place] = 0.0
+    if total > 0:
+        assemble_delassus(model, total, equations, assembly)
         guess, friction = memory.reaction.mode, memory.surface.friction
-        status = solve_candidates(count, False, friction, guess, phase, assembly)
+        status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
         note_residual(answer.residual, memory.tally)
         if status != SOLVED:
             return False
-        if made_energy(count, assembly, phase):
+        if made_energy(total, assembly, phase):
             return False
-        add_impulse(model, assembly, count, equations, end[model.nq :])
+        add_impulse(model, assembly, total, equations, end[model.nq :])
     collect_impulses(scene.ground, first, count, memory, phase)
     for place in range(count):
         if assembly.candidate[place] >= phase.first_dry:  # a finite force works on the way
@@ -252,8 +258,8 @@ def find_impulses(
         finite = finite and np.isfinite(end[i])
         trial[i] = begin[i]
         trial[model.nq + i] = begin[model.nq + i]
-    if count > 0:
-        add_impulse(model, assembly, count, equations, trial[model.nq :])
+    if total > 0:
+        add_impulse(model, assembly, total, equations, trial[model.nq :])
     return finite
 
 

@@ -13,6 +13,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
@@ -25,6 +26,7 @@ from heelstrike.sim.contacts.geometry import (
     solve_mass_matrix,
     weigh,
 )
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -34,12 +36,12 @@ from heelstrike.sim.event_driven.faces import has_corners, locate, watch_corners
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Equations, Memory
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 from heelstrike.sim.push import Pushes, add_pushes
 
-# How far a projection may move a state, as a multiple of the error that a step may make: beyond
-# that, the motion has not kept its constraints.
-EXPLAINED = 100.0
+# How far a projection may move a state, as a multiple of the error that a step may make: the end of
+# a step, beyond which the motion has not kept its constraints, and a place on its dense output.
+EXPLAINED, INTERPOLATED = 100.0, 1e4
 
 
 @kernel
@@ -56,8 +58,13 @@ def tangential_place(
 
 
 @kernel
-def list_unknowns(count: int, candidate: Integers, friction: Floats, phase: Phase) -> int:
-    """List the Jacobian rows along which closed points are held, and friction per normal force."""
+def list_unknowns(
+    count: int, loops: int, candidate: Integers, friction: Floats, phase: Phase
+) -> int:
+    """List the Jacobian rows along which closed points are held, and friction per normal force.
+
+    The rows of the loops, which come after the `count` contacts, are held always.
+    """
     size = 0
     for place in range(count):
         contact = candidate[place]
@@ -69,6 +76,10 @@ def list_unknowns(count: int, candidate: Integers, friction: Floats, phase: Phas
             phase.row[size] = 2 * place + 1
             phase.lean[size] = 0.0
             size += 1
+    for place in range(count, count + loops):
+        phase.row[size] = 2 * place
+        phase.lean[size] = 0.0
+        size += 1
     return size
 
 
@@ -169,7 +180,9 @@ def watch_geometry(
 
 
 @dissolved_kernel
-def watch_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase) -> None:
+def watch_forces(
+    count: int, loops: int, assembly: Assembly, friction: Floats, phase: Phase
+) -> None:
     """Event functions of closed points: normal forces, and what is left to the friction limit."""
     delassus, free = assembly.problem.delassus, assembly.problem.free
     impulse = assembly.answer.impulse
@@ -183,9 +196,18 @@ def watch_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
             phase.value[2 * contact + 1] = limit - abs(impulse[2 * place + 1])
         elif phase.slide[contact] != 0 and phase.group[contact] == contact:
             acceleration = free[2 * place + 1]
-            for column in range(2 * count):
+            for column in range(2 * (count + loops)):
                 acceleration += delassus[2 * place + 1, column] * impulse[column]
             phase.rate[2 * contact + 1] = phase.slide[contact] * acceleration
+
+
+@dissolved_kernel
+def trust_latches(held: Integers, phase: Phase) -> None:
+    """Stops that hold their joint never open, whatever the sign of their force."""
+    for latch in range(held.shape[0]):
+        stop = phase.latch_stop[latch]
+        if held[latch] == 1 and phase.closed[stop] == 1:
+            phase.value[2 * stop] = 1.0
 
 
 @dissolved_kernel
@@ -210,11 +232,13 @@ def free_acceleration(
 
 @kernel
 def gather_closed(
-    model: Model, contacts: Contacts, phase: Phase, equations: Equations, assembly: Assembly
-) -> int:
+    model: Model, contacts: Contacts, phase: Phase, loops: Loops, equations: Equations,
+    assembly: Assembly,
+) -> int:  # fmt: skip
     """Jacobian rows and Delassus matrix of the closed contacts; return their number.
 
-    Dry joints that move are none of them: their friction is known.
+    Dry joints that move are none of them: their friction is known. The rows of the loops come
+    after those of the contacts and are not counted; they have been found for the state.
     """
     count = 0
     for contact in range(phase.closed.shape[0]):
@@ -223,8 +247,9 @@ def gather_closed(
             gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
             assembly.candidate[count] = contact
             count += 1
-    if count > 0:
-        assemble_delassus(model, equations, count, assembly)
+    total = append_loops(phase.closed.shape[0], count, loops, assembly)
+    if total > 0:
+        assemble_delassus(model, total, equations, assembly)
     return count
 
 
@@ -242,7 +267,12 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
         if contact >= phase.first_dry:
             joint = phase.dry_joint[contact - phase.first_dry]
             impulse[2 * place] = model.dry_friction[joint]
-    size = list_unknowns(count, assembly.candidate, friction, phase)
+    loops = memory.loops.unknown.shape[0]
+    total = count + loops
+    free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)
+    for row in range(2 * count, 2 * total):
+        impulse[row] = 0.0
+    size = list_unknowns(count, loops, assembly.candidate, friction, phase)
     for i in range(size):
         phase.system[i, size] = -assembly.problem.free[phase.row[i]]
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, phase)
@@ -251,7 +281,7 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
         impulse[phase.row[i]] += phase.unknown[i]
         if phase.lean[i] != 0.0:
             impulse[phase.row[i] + 1] += phase.lean[i] * phase.unknown[i]
-    add_impulse(model, assembly, count, memory.equations, memory.equations.rate)
+    add_impulse(model, assembly, total, memory.equations, memory.equations.rate)
 
 
 @kernel
@@ -293,14 +323,17 @@ def evaluate(
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    count = gather_closed(model, memory.contacts, phase, equations, assembly)
+    loops = memory.loops.unknown.shape[0]
+    find_rows(model, q, v, equations.tree, memory.loops.rows)
+    count = gather_closed(model, memory.contacts, phase, memory.loops, equations, assembly)
     phase.closed_count = count
-    if count > 0:
+    if count + loops > 0:
         hold_closed(model, count, friction, phase, memory)
     share_forces(count, assembly, friction, phase)
-    watch_forces(count, assembly, friction, phase)
+    watch_forces(count, loops, assembly, friction, phase)
+    trust_latches(memory.loops.held, phase)
     if count > 0 and phase.deficient == 1:
-        share_redundant(count, friction, memory.reaction.mode, phase, assembly)
+        share_redundant(count, memory.loops, friction, memory.reaction.mode, phase, assembly)
     for i in range(model.nv):
         slope[i] = v[i]
         slope[model.nq + i] = rate[i]
@@ -311,11 +344,13 @@ def evaluate(
 
 @kernel
 def displacement(
-    row: int, model: Model, tree: Workspace, contacts: Contacts, assembly: Assembly, phase: Phase,
+    row: int, model: Model, tree: Workspace, contacts: Contacts, memory: Memory, phase: Phase,
     state: Floats,
 ) -> float:  # fmt: skip
     """How far a candidate is along its row from where its constraint wants it."""
-    contact = assembly.candidate[row // 2]
+    contact = memory.assembly.candidate[row // 2]
+    if contact >= phase.closed.shape[0]:
+        return memory.loops.rows.displacement[contact - phase.closed.shape[0]]
     if row % 2 == 0:
         return gap_now(contact, contacts, phase, state)
     if contact >= phase.first_dry:
@@ -331,23 +366,25 @@ def project(
 ) -> float:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
-    Closed points return to the ground, sticking ones (and joints) to where they began to stick, and
-    their velocities along these directions vanish. Returns how far (m) the worst is left from its
-    place: constraints that say the same twice need not agree.
+    Closed points return to the ground, sticking ones (and joints) to where they began to stick,
+    ends of loops to each other, and their velocities along these directions vanish. Returns how far
+    (m) the worst is left from its place: constraints that say the same twice need not agree.
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
-    system, row = phase.system, phase.row
+    system, row, loops = phase.system, phase.row, memory.loops.unknown.shape[0]
     for attempt in range(5):
         observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
-        count = gather_closed(model, contacts, phase, equations, assembly)
-        if count == 0:
+        find_rows(model, q, v, equations.tree, memory.loops.rows)
+        count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
+        total = count + loops
+        if total == 0:
             return 0.0
-        size = list_unknowns(count, assembly.candidate, memory.surface.friction, phase)
+        size = list_unknowns(count, loops, assembly.candidate, memory.surface.friction, phase)
         worst = 0.0
         for i in range(size):
-            error = displacement(row[i], model, equations.tree, contacts, assembly, phase, state)
+            error = displacement(row[i], model, equations.tree, contacts, memory, phase, state)
             system[i, size] = -error
             worst = max(worst, abs(error))
         positions = worst > 1e-14 and attempt < 4
@@ -355,22 +392,22 @@ def project(
             for i in range(size):
                 system[i, size] = -row_product(assembly.jacobian, row[i], v)
         solve_constraints(size, 0.0, assembly.problem.delassus, phase)
-        for i in range(2 * count):
+        for i in range(2 * total):
             assembly.answer.impulse[i] = 0.0
         for i in range(size):
             assembly.answer.impulse[row[i]] = phase.unknown[i]
-        add_impulse(model, assembly, count, equations, q if positions else v)
+        add_impulse(model, assembly, total, equations, q if positions else v)
         if not positions:
             return worst
     return math.inf
 
 
 @kernel
-def explained(before: Floats, after: Floats, phase: Phase) -> bool:
-    """Whether the error that a step may make explains how far a state was moved."""
+def explained(before: Floats, after: Floats, times: float, phase: Phase) -> bool:
+    """Whether some multiple of the error that a step may make explains how far a state moved."""
     size = before.shape[0]
     total = 0.0
     for i in range(size):
         scale = phase.absolute + phase.relative * max(abs(before[i]), abs(after[i]))
         total += ((after[i] - before[i]) / scale) ** 2
-    return bool(total <= size * EXPLAINED**2)
+    return bool(total <= size * times**2)

@@ -7,6 +7,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
@@ -15,6 +16,7 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
 from heelstrike.sim.event_driven.faces import locate
@@ -82,9 +84,12 @@ def collide(
         count += 1
     if count == 0:
         return True, 0.0
-    assemble_delassus(model, equations, count, assembly)
+    find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
+    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    free_loops(total, memory.loops, v, 0.0, assembly)
+    assemble_delassus(model, total, equations, assembly)
     friction, guess = memory.surface.friction, memory.reaction.mode
-    status = solve_candidates(count, False, friction, guess, phase, assembly)
+    status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
@@ -92,7 +97,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    add_impulse(model, assembly, count, equations, v)
+    add_impulse(model, assembly, total, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -125,22 +130,26 @@ def short_bounces(
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
     locate(model, ground, equations.tree, phase, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    count = gather_closed(model, contacts, phase, equations, assembly)
+    loops = memory.loops.unknown.shape[0]
+    find_rows(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops.rows)
+    count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
     for place in range(count):
         contact = assembly.candidate[place]
         free_gap_acceleration(model, contacts, equations, contact, place, phase, assembly)
-    if count > 0:
-        solve_candidates(count, True, friction, memory.reaction.mode, phase, assembly)
-        add_impulse(model, assembly, count, equations, equations.rate)
+    total = count + loops
+    free_loops(total, memory.loops, equations.rate, 1.0, assembly)
+    if total > 0:
+        solve_candidates(count, memory.loops, True, friction, memory.reaction.mode, phase, assembly)
+        add_impulse(model, assembly, total, equations, equations.rate)
     found = False
     for contact in range(phase.closed.shape[0]):
         touched = phase.hit[contact] == 1 or was_closed[contact] == 1
         if phase.closed[contact] == 1 or not touched:
             continue
-        gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
-        free_gap_acceleration(model, contacts, equations, contact, count, phase, assembly)
+        gap_rows(model, equations.tree, contacts, phase, contact, total, assembly)
+        free_gap_acceleration(model, contacts, equations, contact, total, phase, assembly)
         normal, _ = gap_velocity(contact, model, contacts, equations.tree, phase, state)
-        pull = -assembly.problem.free[2 * count]
+        pull = -assembly.problem.free[2 * total]
         if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
@@ -197,7 +206,8 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
             phase.last_impact[contact] = time
         if contact < model.nc and normal > impulse[largest, 0]:
             largest = contact
-        if not normal > 0.0:
+        pulls = contact >= model.nc and normal < 0.0  # as a latch may
+        if not (normal > 0.0 or pulls):
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1

@@ -21,7 +21,7 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import evaluate, explained, look, project
+from heelstrike.sim.event_driven.dynamics import EXPLAINED, evaluate, explained, look, project
 from heelstrike.sim.event_driven.faces import has_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
@@ -274,7 +274,7 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     for i in range(end.shape[0]):
         before[i] = end[i]
     left = project(scene.model, scene.ground, memory, phase, end)
-    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, phase)
+    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
 
 
 @kernel

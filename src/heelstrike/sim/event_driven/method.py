@@ -18,6 +18,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, momentum
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
@@ -28,6 +29,8 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
 )
+from heelstrike.sim.contacts.latches import react
+from heelstrike.sim.contacts.loops import close_loops, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
@@ -46,7 +49,7 @@ from heelstrike.sim.event_driven.location import TOGETHER, integrate, shortest_s
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
-from heelstrike.sim.frame import DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import switch_at
@@ -189,7 +192,8 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_capacity(robot) + 8
+        latches = robot.model.latches
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_capacity(robot) + 2 * latches + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
@@ -236,6 +240,10 @@ class EventDriven(Method):
         work.accumulation[: robot.nc] = np.inf
         work.fired[:] = 0
         clock.begun = 0
+
+    def reconsider(self, work: Phase) -> None:
+        """Decide contact modes anew: what they hang on has been changed."""
+        work.undecided = 1
 
     def rows_in(self, duration: float, record_every: int) -> int:
         """Return about how many rows the record of a time has."""
@@ -321,7 +329,7 @@ def leave_if_possible(
             log_event(phase.time, PAINLEVE, contact, 0.0, 0.0, record)
     if several and apart:
         for place in range(count):
-            if assembly.candidate[place] < phase.first_dry:
+            if assembly.candidate[place] < phase.first_dry and assembly.problem.set[place] != LINE:
                 assembly.answer.mode[place] = OPEN
 
 
@@ -334,7 +342,8 @@ def begin_phase(
     Returns false if the state is not one of such modes.
     """
     assembly, friction = memory.assembly, memory.surface.friction
-    leave_if_possible(count, friction, phase, assembly, record)
+    if memory.loops.unknown.shape[0] == 0:  # with loops neither matrix nor free term tell enough
+        leave_if_possible(count, friction, phase, assembly, record)
     if count > 0:
         note_residual(assembly.answer.residual, memory.tally)
     adopt_modes(model, count, assembly, phase, memory.reaction)
@@ -354,7 +363,9 @@ def begin_phase(
     for i in range(begin.shape[0]):
         fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
     if fits:
+        first = record.events
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
+        react(model, first, begin[: model.nq], record, memory.loops)
     else:
         for i in range(begin.shape[0]):
             begin[i] = before[i]
@@ -393,7 +404,9 @@ def decide_modes(
                 continue
         count = phase.closed_count
         if not jammed and count > 0:
-            status = solve_candidates(count, True, friction, guess, phase, memory.assembly)
+            status = solve_candidates(
+                count, memory.loops, True, friction, guess, phase, memory.assembly
+            )
             jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
@@ -569,6 +582,7 @@ def meet_event(
     """
     contacts, tree, direction = memory.contacts, memory.equations.tree, phase.scratch[0]
     momentum(model, tree, direction)
+    first = record.events
     impact, forced = find_what_happened(
         starting, direction[0], model, ground, tree, contacts, memory.surface, phase
     )
@@ -580,6 +594,7 @@ def meet_event(
             if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
                 contacts.force[contact, 0] = phase.impulse[contact, 0]
                 contacts.force[contact, 1] = phase.impulse[contact, 1]
+        react(model, first, phase.begin[: model.nq], record, memory.loops)
     phase.started = BEGUN if starting else WALKING
     phase.undecided = 1
     phase.forced = 1 if forced else 0
@@ -593,6 +608,10 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.assembly.solver.settings.amendments = 0
+    if memory.loops.unknown.shape[0] > 0:
+        if not close_loops(model, equations, memory.loops, q):
+            return DIVERGED
+        steady_loops(model, q, equations, memory.loops, v)
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]
@@ -671,9 +690,11 @@ def move_over(
         period = phase.output_period * phase.row_every
         due = phase.next_row * period
         end = min(stop, due if due > phase.time + 1e-12 else due + period)
+    first = record.events
     if not cross(scene, end, control, memory, phase, record):
         phase.reason = NO_BRIDGE
         return SOLVER_FAILED
+    react(scene.model, first, phase.begin[: scene.model.nq], record, memory.loops)
     pass_time(phase.length, end, phase)
     clock.time = phase.time
     phase.bridge_end = phase.time

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 from heelstrike.sim.memory import contact_capacity
@@ -35,6 +36,8 @@ class Phase(Bundle):
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     dry_joint : (nd,) int
         Joints with dry friction.
+    latch_stop : (latches,) int
+        The stop that each latch is, as contacts are numbered here.
     order : (3,) int
         Contact solvers in the order in which they are tried.
     closed : (nc,) int
@@ -63,13 +66,13 @@ class Phase(Bundle):
         Impulses of the impact in this instant (N s).
     last_impact, accumulation : (nc,) float
         When each point hit the ground last; when its accumulating impacts come to rest.
-    row : (2 nc,) int
-    lean, scale : (2 nc,) float
-    system : (2 nc, 2 nc + 1) float
-    unknown : (2 nc,) float
-    column : (2 nc,) int
-        Equations of the contact forces: row of the Jacobian, tangential per normal force, unit of
-        each, the equations themselves, their solution, and its order.
+    row : (forces,) int
+    lean, scale : (forces,) float
+    system : (forces, forces + 1) float
+    unknown : (forces,) float
+    column : (forces,) int
+        Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal
+        force, unit of each, the equations themselves, their solution, and its order.
     value, rate, end_value, end_rate : (2 nc + points,) float
     before, before_rate, sample, sample_rate : (2 nc + points,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
@@ -132,6 +135,7 @@ class Phase(Bundle):
     stop_side: Floats = array("ns")
     stop_limit: Floats = array("ns")
     dry_joint: Integers = array("nd", of=int)
+    latch_stop: Integers = array("latches", of=int)
     order: Integers = array(3, of=int)
     closed: Integers = array("contacts", of=int)
     slide: Integers = array("contacts", of=int)
@@ -149,12 +153,12 @@ class Phase(Bundle):
     impulse: Floats = array("contacts", "components")
     last_impact: Floats = array("contacts")
     accumulation: Floats = array("contacts")
-    row: Integers = array("2 contacts", of=int)
-    lean: Floats = array("2 contacts")
-    scale: Floats = array("2 contacts")
-    system: Floats = array("2 contacts", "2 contacts + 1")
-    unknown: Floats = array("2 contacts")
-    column: Integers = array("2 contacts", of=int)
+    row: Integers = array("forces", of=int)
+    lean: Floats = array("forces")
+    scale: Floats = array("forces")
+    system: Floats = array("forces", "forces + 1")
+    unknown: Floats = array("forces")
+    column: Integers = array("forces", of=int)
     value: Floats = array("functions")
     rate: Floats = array("functions")
     end_value: Floats = array("functions")
@@ -214,13 +218,25 @@ def allocate_phase(robot: Robot) -> Phase:
     contacts = contact_capacity(robot)
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        functions=2 * contacts + robot.nc,
+        forces=2 * contacts + count_rows(model), functions=2 * contacts + robot.nc,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
+        latch_stop=np.array(
+            [
+                robot.nc
+                + (
+                    len(lower) + int(np.searchsorted(upper, joint))
+                    if side > 0
+                    else int(np.searchsorted(lower, joint))
+                )
+                for joint, side in zip(model.latch_joint, model.latch_side, strict=True)
+            ],
+            dtype=np.int64,
+        ),
         closed=(np.arange(contacts) >= contacts - len(dry)).astype(np.int64),
         last_impact=np.full(contacts, -np.inf),
         accumulation=np.full(contacts, np.inf),

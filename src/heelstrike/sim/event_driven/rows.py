@@ -6,10 +6,11 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.contacts.loops import note_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
-from heelstrike.sim.event_driven.dynamics import evaluate, explained, project
+from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
@@ -45,17 +46,18 @@ def write_row(
     for i in range(state.shape[0]):
         trial[i] = state[i]
     project(model, scene.ground, memory, phase, trial)
-    if not explained(state, trial, phase):
+    if not explained(state, trial, INTERPOLATED, phase):
         for i in range(state.shape[0]):
             trial[i] = state[i]
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
-    count = phase.closed_count
-    if count > 0:
+    count, loops = phase.closed_count, memory.loops.unknown.shape[0]
+    if count + loops > 0:
         friction, guess = memory.surface.friction, memory.reaction.mode
-        solve_candidates(count, True, friction, guess, phase, assembly)
+        solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
         note_residual(residual, memory.tally)
+        note_loops(model, count + loops, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
     note_state(model, row, trial, record)

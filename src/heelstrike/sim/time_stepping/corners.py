@@ -79,7 +79,8 @@ def locate_corners(model: Model, ground: GroundModel, tree: Workspace, corner: C
 def join_forces(model: Model, corner: Corner, contacts: Contacts) -> None:
     """Put the forces of both faces of every point into one, and that where it acts.
 
-    About the centre of the disc only friction has a moment, r λ_t of either face.
+    About the centre of the disc only friction has a moment, r λ_t of either face. The resultant of
+    forces that nearly cancel each other, as those of a wedge, may act off the disc.
     """
     for i in range(model.nc):
         other = corner.contacts.force[i]

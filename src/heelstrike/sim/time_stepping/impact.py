@@ -32,6 +32,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
@@ -94,7 +95,7 @@ class Impact(Bundle):
 
 def allocate_impact(robot: Robot) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    capacity = contact_capacity(robot) + robot.nc
+    capacity = contact_capacity(robot) + robot.nc + count_rows(robot.model)
     places = 2 * (robot.nc + robot.nv)
     return Impact.allocate(
         nv=robot.nv,
@@ -221,7 +222,8 @@ def find_members(
     members = 0
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        takes_part = candidate >= 2 * (model.nc + model.nv)  # dry friction is always there
+        # Dry friction and loops are always there.
+        takes_part = candidate >= 2 * (model.nc + model.nv)
         if not takes_part:
             now = gap_of(model, memory, impact.corner, candidate)
             touched = impact.touching[candidate] == before

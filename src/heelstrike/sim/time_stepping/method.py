@@ -35,10 +35,11 @@ from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
-from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -58,11 +59,20 @@ from heelstrike.sim.contacts.geometry import (
     weigh,
     write_unit_row,
 )
+from heelstrike.sim.contacts.latches import hold, react
+from heelstrike.sim.contacts.loops import (
+    append_loops,
+    close_loops,
+    free_loops,
+    note_loop,
+    speed_along,
+    steady_loops,
+)
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
@@ -201,7 +211,8 @@ class TimeStepping(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
-        return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names) + 1
+        events = 2 * (robot.nc + robot.nv) + len(robot.joint_names) + robot.model.latches + 1
+        return 1, events
 
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one."""
@@ -227,7 +238,12 @@ def is_linearised(scheme: int) -> bool:
 
 @dissolved_kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
-    """Begin: there is nothing to prepare."""
+    """Begin with closed loops."""
+    if memory.loops.unknown.shape[0] > 0:
+        equations, loops, q = memory.equations, memory.loops, memory.q
+        if not close_loops(model, equations, loops, q):
+            return DIVERGED
+        steady_loops(model, q, equations, loops, memory.v)
     return DONE
 
 
@@ -250,6 +266,7 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
     if ground.concave == 1:
         locate_corners(model, ground, equations.tree, work.impact.corner)
 
@@ -402,6 +419,26 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
     return count
 
 
+@dissolved_kernel
+def hold_latched(model: Model, count: int, memory: Memory) -> int:
+    """Let the stops of engaged latches hold; return how many candidates there are with them.
+
+    Where the gap decides, and a scheme has left a joint before its stop, it is held there.
+    """
+    loops, assembly = memory.loops, memory.assembly
+    missing = hold(count, loops.latch_stop, loops.held, assembly)
+    while missing >= 0:
+        joint = model.latch_joint[missing]
+        assembly.problem.free[2 * count] = -model.latch_side[missing] * memory.next_v[joint]
+        assembly.problem.free[2 * count + 1] = 0.0
+        assembly.problem.friction[count] = 0.0
+        assembly.answer.mode[count] = STICK
+        assembly.candidate[count] = loops.latch_stop[missing]
+        count += 1
+        missing = hold(count, loops.latch_stop, loops.held, assembly)
+    return count
+
+
 @kernel
 def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
     """Append the second faces of corners that could act in this step, and write their rows."""
@@ -490,7 +527,10 @@ def gather_delassus(
                 for j in range(2):
                     entry = usual.usual_problem.delassus[row + i, column + j]
                     assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
+    first_loop = 2 * (model.nc + model.nv) + dry_joint.shape[0]
     for place in range(near, count):
+        if candidate[place] >= first_loop:
+            break
         add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
 
 
@@ -525,6 +565,38 @@ def add_joint(
     for other in range(near, place + 1):
         column, its_joint, its_sign = joint_row(model, dry_joint, candidate, other)
         entry = its_sign * change[its_joint]
+        delassus[row, column] = entry
+        delassus[column, row] = entry
+
+
+@kernel
+def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -> None:
+    """Add the row of a loop at a place to the Delassus matrix, after all points and joints.
+
+    As with joints, A⁻¹ Jᵀ goes to that row of ``assembly.jacobian``.
+    """
+    assembly, usual, row = memory.assembly, memory.usual, 2 * place
+    candidate, delassus = assembly.candidate, assembly.problem.delassus
+    change = assembly.jacobian[row]
+    solve_mass_matrix(model, memory.equations, change)
+    for other in range(2 * place + 2):
+        for own in range(row, row + 2):
+            delassus[own, other] = 0.0
+            delassus[other, own] = 0.0
+    if near > 0:
+        find_velocities(model, memory.contacts, change, True, memory.equations.tree, usual)
+    for other in range(near):
+        for i in range(2):
+            entry = usual.point_velocity[candidate[other], i]
+            delassus[row, 2 * other + i] = entry
+            delassus[2 * other + i, row] = entry
+    for other in range(near, place + 1):
+        column = 2 * other
+        if other < joints:
+            column, joint, sign = joint_row(model, memory.dry_joint, candidate, other)
+            entry = sign * change[joint]
+        else:
+            entry = speed_along(other - joints, memory.loops, change)
         delassus[row, column] = entry
         delassus[column, row] = entry
 
@@ -566,7 +638,11 @@ def push_all(
     contacts, assembly = memory.contacts, memory.assembly
     equations, usual = memory.equations, memory.usual
     if straight:
-        push_candidates(model, contacts, assembly, near, count, equations, usual, v)
+        joints = count - memory.loops.unknown.shape[0]
+        push_candidates(model, contacts, assembly, near, joints, equations, usual, v)
+        for place in range(joints, count):
+            for j in range(model.nv):
+                v[j] += assembly.answer.impulse[2 * place] * assembly.jacobian[2 * place, j]
     else:
         add_impulse(model, assembly, count, equations, v)
 
@@ -581,12 +657,16 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        joints = count - memory.loops.unknown.shape[0]
+        for place in range(joints, count):
+            add_loop(model, near, joints, place, memory)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        joints = count - dry_joint.shape[0] - corners  # whose rows are there
+        rows_there = dry_joint.shape[0] + corners + memory.loops.unknown.shape[0]
+        joints = count - rows_there
         write_rows(model, equations.tree, contacts, joints, assembly)
-        assemble_delassus(model, equations, count, assembly)
+        assemble_delassus(model, count, equations, assembly)
     problem.count = count
     solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
     resolves = solved and work.scheme == IMPACT_RESOLVED
@@ -691,12 +771,16 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
         count = select_stops(model, work, near, memory)
+        count = hold_latched(model, count, memory)
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
         impact.corner.count = 0
         if impact.corner.near > 0:
             count = select_corners(model, count, work, memory)
+        first_loop = 2 * (model.nc + model.nv) + memory.dry_joint.shape[0]
+        count = append_loops(first_loop, count, memory.loops, assembly)
+        free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
         if impact.relaxed == 1:
             close_gaps(model, work.step, count, impact, memory)
         if count > 0:
@@ -745,7 +829,10 @@ def note_answer(
         stop = memory.assembly.candidate[place] - model.nc
         other = stop - 2 * model.nv
         dry = other - model.nc
-        if dry >= 0:
+        loop = dry - memory.dry_joint.shape[0]
+        if loop >= 0:
+            note_loop(model, loop, answer.impulse[2 * place] / step, memory.loops)
+        elif dry >= 0:
             reaction.friction_torque[memory.dry_joint[dry]] = answer.impulse[2 * place + 1] / step
             reaction.dry_mode[dry] = answer.mode[place]
         elif other >= 0:
@@ -768,7 +855,9 @@ def decide(
     note_extremes(model, memory)
     if work.impact.relaxed == 1:
         note_wedge(model, clock.time, memory, work.impact, record)
+    first = record.events
     note_events(model, clock.time, work.step, memory, record)
+    react(model, first, memory.q, record, memory.loops)
     return DONE if solved else SOLVER_FAILED
 
 
@@ -800,6 +889,9 @@ def move(
         integrate(model, q, next_v, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
+    has_loops = memory.loops.unknown.shape[0] > 0
+    if has_loops and not close_loops(model, memory.equations, memory.loops, q):
+        return DIVERGED
     clock.time = clock.start + (clock.index + 1) * work.step
     return DONE
 

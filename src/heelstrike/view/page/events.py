@@ -24,14 +24,14 @@ def kind_in_words(event: Event) -> str:
 
 def contact_of(event: Event) -> int:
     """Index of the contact point at which it happened, -1 if it was at none."""
-    return -1 if event.kind in NOWHERE or _of_joint(event) else event.contact
+    return -1 if event.kind in NOWHERE or event.kind.of_joint else event.contact
 
 
 def place_of(event: Event, robot: Robot) -> str:
     """Name of the joint or contact point at which it happened; nothing if it was at none."""
     if event.kind in NOWHERE:
         return ""
-    names = robot.joint_names if _of_joint(event) else robot.contact_names
+    names = robot.joint_names if event.kind.of_joint else robot.contact_names
     return in_words(names[event.contact]) if 0 <= event.contact < len(names) else ""
 
 
@@ -40,9 +40,5 @@ def impulse_of(event: Event, robot: Robot) -> tuple[float, str]:
     size = event.impulse[0]
     if event.kind in NOWHERE or not math.isfinite(size):
         return 0.0, ""
-    turns = _of_joint(event) and robot.model.axis[event.contact, 0] != 0.0
+    turns = event.kind.of_joint and robot.model.axis[event.contact, 0] != 0.0
     return size, "N m s" if turns else "N s"
-
-
-def _of_joint(event: Event) -> bool:
-    return event.kind.name.startswith("JOINT_")
