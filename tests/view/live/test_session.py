@@ -461,3 +461,19 @@ def test_a_slider_leaves_the_past_where_it_was(monkeypatch: pytest.MonkeyPatch) 
     assert session.live is not None
     assert session.live.simulation.ground.friction == 0.75
     assert shown.seen is not None
+
+
+def test_what_was_set_later_is_not_told_of_earlier_times() -> None:
+    session, shown = watching(walker())
+    go_on(session, 0.05)
+    ask(session, "choose", name="friction", value=0.6)
+    go_on(session, 0.1)
+    assert shown.told["values"] == {"friction": 0.6}
+    ask(session, "seek", time=0.02)
+    ask(session, "resume")
+    assert shown.told["values"] == {"friction": 0.75}
+    ask(session, "choose", name="friction", value=0.6)
+    ask(session, "reset")
+    assert session.live is not None
+    assert session.live.simulation.ground.friction == 0.75
+    assert shown.told["values"] == {"friction": 0.75}

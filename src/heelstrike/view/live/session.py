@@ -320,8 +320,8 @@ class Session:
                 return
             finally:
                 self._tell_busy("")
-            self._set(dict(wanted))
             self.live, self.history = live, History()
+            self._set(self._stage.found(wanted, simulation))
             self.history.take(run)
             self._show_scene(run)
         self._tell()
@@ -431,6 +431,8 @@ class Session:
         row = self.history.row_at(self.cursor)
         time = float(self.history.time[row])
         live.go_back(time)
+        stage = self._needs_stage()
+        self._set(stage.found(self.values, live.simulation))
         self.history.cut(time)
         self._board.cut(time)
         self._shown = self._goal = self.cursor = time
