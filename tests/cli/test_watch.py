@@ -57,6 +57,11 @@ def test_what_is_asked_for_is_what_viewers_find_set(made: dict[str, Any]) -> Non
     assert values["slope"] == pytest.approx(-2.0)
 
 
+def test_time_stepping_is_called_as_everywhere(made: dict[str, Any]) -> None:
+    asked("compass_gait", "--method", "time-stepping")
+    assert made["stage"].fitted({})["method"] == "impact-resolved"
+
+
 def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]) -> None:
     asked("--ground", "rough:0.004:9")
     assert made["stage"].fitted({})["roughness"] == 0.004
@@ -77,6 +82,7 @@ def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]
         (["--speed", "0"], "rate must lie between"),
         (["--step", "0"], "step must be a positive number"),
         (["--friction", "-1"], "friction coefficient"),
+        (["compass_gait", "--ground", "rough:0.02:1"], "compass_gait has no motors"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_served(

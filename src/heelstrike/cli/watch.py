@@ -76,6 +76,8 @@ def watch(
     Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, to whoever has
     the address that is printed. Ctrl-C ends it.
     """
+    if method == Method.TIME_STEPPING.value:  # as the other commands call it
+        method = METHODS[0]
     if method is not None and method not in METHODS:
         raise typer.BadParameter(
             f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method"

@@ -13,6 +13,7 @@ import numpy as np
 from heelstrike.analysis.limit_cycle import LimitCycle
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque, Encoder
+from heelstrike.errors import GaitError
 from heelstrike.experiments.passive import passive_walk
 from heelstrike.experiments.walk import beginning, design, typical_step
 from heelstrike.gait import Gait, load_gait
@@ -109,10 +110,16 @@ class WalkStage(Stage):
         self._robots = {self._name: load_robot(robot, **how)}
         self._methods, self._method_names = methods, method_names
         self._gaits: dict[tuple[Any, ...], Gait | LimitCycle] = {}
+        robot_at_first = self._robots[self._name]
+        if self._first.roughness and not robot_at_first.nu:
+            raise GaitError(
+                f"{robot_at_first.name} has no motors, and without them no walk repeats on rough "
+                "ground: choose a flat or sloping one"
+            )
         gait = self._first.gait
         self._saved = "" if gait is None else Path(gait).name
         if gait is not None:
-            self._gaits[self._name, self._saved] = load_gait(gait, self._robots[self._name])
+            self._gaits[self._name, self._saved] = load_gait(gait, robot_at_first)
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
         """Robot, gait, controller, speed, ground, method and step."""

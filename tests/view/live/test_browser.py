@@ -247,6 +247,20 @@ def test_it_says_so_when_the_server_stops(chromium: Any, viewer: Viewer) -> None
         assert seen.page.locator("#play").is_disabled()
 
 
+def test_a_page_that_stays_open_forgets_the_oldest_frames(chromium: Any, viewer: Viewer) -> None:
+    with Page(chromium, viewer) as seen:
+        seen.halt()
+        board = viewer._session._board
+        last = board._frames[-1]
+        for _ in range(3):
+            more = np.repeat(last[None], 15_000, axis=0)
+            more[:, 0] = last[0] + 0.01 * np.arange(1, 15_001)
+            last = more[-1]
+            board.add(more)
+        wait_until(lambda: seen.time == last[0], "the last of many frames")
+        assert 15_000 <= seen.data("frames") <= 40_000
+
+
 def test_a_run_is_looked_at(chromium: Any) -> None:
     with view(run=walking.walk(steps=2)) as viewer, Page(chromium, viewer) as seen:
         wait_until(lambda: seen.time > 0.1, "the run to play")

@@ -12,6 +12,7 @@ import heelstrike as hs
 from heelstrike.analysis import friction_use, zero_moment_point
 from heelstrike.analysis.intervals import event_impulse
 from heelstrike.dynamics import center_of_mass, link_poses
+from heelstrike.robot import read_mjcf
 from heelstrike.view.live.frames import MOST_PUSHES, Layout, mean_forces
 
 
@@ -107,3 +108,15 @@ def test_every_curve_is_in_the_frame(name: str) -> None:
     limits = [panel["limits"] for panel in described["panels"] if panel["group"] == "torques"]
     assert all(limits) == bool(np.isfinite(layout.robot.model.torque_lower).all())
     assert sum(width for _, width in described["fields"].values()) == described["width"]
+
+
+def test_motors_of_slides_give_forces() -> None:
+    robot = read_mjcf(
+        """<mujoco><worldbody><geom type="plane" size="1 1 .1"/>
+        <body name="cart"><joint name="along" type="slide" axis="1 0 0"/>
+        <geom type="sphere" size="0.1" mass="1"/></body></worldbody>
+        <actuator><motor name="along" joint="along"/></actuator></mujoco>""",
+        name="cart",
+    )
+    (panel,) = (each for each in Layout(robot).described()["panels"] if each["group"] == "torques")
+    assert (panel["title"], panel["unit"]) == ("along force", "N")

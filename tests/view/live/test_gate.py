@@ -89,3 +89,14 @@ def test_tokens_differ_and_are_long() -> None:
     other = Gate().token
     assert other != GATE.token
     assert len(other) >= 43  # 256 bits in base64
+
+
+def test_browsers_leave_out_the_port_of_http() -> None:
+    target = f"/live?token={GATE.token}"
+    sent = {"Host": "127.0.0.1", "Origin": "http://127.0.0.1"}
+    assert GATE.admits(target, sent.get, 80) == "/live"
+    assert GATE.admits(target, sent.get, PORT) is None
+
+
+def test_bytes_that_are_no_text_are_no_token() -> None:
+    assert admitted("/?token=\udcff", Origin=None) is None

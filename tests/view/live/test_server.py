@@ -174,3 +174,12 @@ def test_a_port_of_choice() -> None:
     with view(run=walking.walk(steps=1), port=port) as viewer:
         assert viewer.port == port
         assert f"127.0.0.1:{port}/" in viewer.url
+
+
+def test_what_cannot_be_served_is_not_silent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such as by a package that is older or newer than all that was tried."""
+    before = threading.active_count()
+    monkeypatch.setattr("websockets.asyncio.server.serve", lambda *_, **__: 1 / 0)
+    with pytest.raises(ViewError, match=r"cannot be served: ZeroDivisionError.*websockets"):
+        view(run=walking.walk(steps=1))
+    assert threading.active_count() == before

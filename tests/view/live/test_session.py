@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,8 @@ import walking
 
 import heelstrike as hs
 from heelstrike.sim import EventKind
+from heelstrike.view.live import live_simulation
+from heelstrike.view.live import session as sessions
 from heelstrike.view.live.board import Board
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
@@ -419,3 +422,58 @@ def test_what_cannot_begin_says_why() -> None:
     assert "nothing to see yet" in ask(session, "play", on=True)
     session.update(TICK)
     assert not session.playing
+    # What acts at once on a walk begins one where there is none.
+    assert ask(session, "choose", name="friction", value=0.3).startswith("there is no such gait")
+
+
+def test_updates_come_however_many_commands_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    session, _ = watching(walking.walk(steps=1))
+    clock, obeyed = itertools.count(step=0.01), itertools.count(1)
+    monkeypatch.setattr(sessions.clock_time, "perf_counter", lambda: next(clock))
+
+    def obey(*_: Any) -> None:
+        assert next(obeyed) < 100, "commands that keep coming leave no time for an update"
+        session.ask("a", {"do": "nothing"})
+
+    monkeypatch.setattr(session, "obey", obey)
+    session.ask("a", {"do": "nothing"})
+    session._obey_until(0.0, wait=False)
+    assert next(obeyed) > 1  # and where updates are late, commands are obeyed all the same
+
+
+def test_commands_that_wait_are_not_without_bounds() -> None:
+    session, _ = watching(walking.walk(steps=1))
+    for _ in range(2 * sessions.MOST_COMMANDS):
+        session.ask("a", {"do": "seek", "time": 0.0})
+    assert session._commands.qsize() == sessions.MOST_COMMANDS
+    session.ask("a", {"do": "release"})  # or it would pull for ever
+    assert session._commands.qsize() == sessions.MOST_COMMANDS + 1
+
+
+def test_a_slider_leaves_the_past_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_simulation, "MOST_SNAPSHOTS", 4)
+    session, shown = watching(walker())
+    go_on(session, 0.1)
+    for friction in np.linspace(0.75, 0.6, 10):
+        assert ask(session, "choose", name="friction", value=float(friction)) == ""
+    ask(session, "seek", time=0.05)
+    assert ask(session, "resume") == ""
+    assert session.live is not None
+    assert session.live.simulation.ground.friction == 0.75
+    assert shown.seen is not None
+
+
+def test_what_was_set_later_is_not_told_of_earlier_times() -> None:
+    session, shown = watching(walker())
+    go_on(session, 0.05)
+    ask(session, "choose", name="friction", value=0.6)
+    go_on(session, 0.1)
+    assert shown.told["values"] == {"friction": 0.6}
+    ask(session, "seek", time=0.02)
+    ask(session, "resume")
+    assert shown.told["values"] == {"friction": 0.75}
+    ask(session, "choose", name="friction", value=0.6)
+    ask(session, "reset")
+    assert session.live is not None
+    assert session.live.simulation.ground.friction == 0.75
+    assert shown.told["values"] == {"friction": 0.75}

@@ -227,3 +227,26 @@ def test_bad_requests(tmp_path: Path) -> None:
         save_html(run, tmp_path / "none" / "run.html")
     with pytest.raises(ViewError, match="has no rows"):
         save_html(make_run(box(), []), tmp_path / "run.html")
+
+
+@pytest.mark.parametrize("kind", EventKind)
+def test_events_say_where_they_were_and_in_which_unit(kind: EventKind, tmp_path: Path) -> None:
+    """Indices of joints are none of contact points, and a bridge has neither, nor an impulse."""
+    robot = box()
+    turns = robot.model.axis[:, 0] != 0.0
+    at = (int(turns.argmax()), int(turns.argmin())) if kind.of_joint else (0, 1)
+    events = [Event(0.05, kind, index, (0.5, 0.1)) for index in at]
+    run = make_run(robot, [0.0, 0.1], events=events)
+    _, content = read(save_html(run, tmp_path / "run.html"))
+    told = [
+        (each["contact"], each["where"], each["impulse"], each["unit"])
+        for each in content["events"]
+    ]
+    if kind is EventKind.BRIDGE:
+        assert told == [(-1, "", 0.0, "")] * 2
+    elif kind.of_joint:
+        names = [robot.joint_names[i].replace("_", " ") for i in at]
+        assert told == [(-1, names[0], 0.5, "N m s"), (-1, names[1], 0.5, "N s")]
+    else:
+        names = [name.replace("_", " ") for name in robot.contact_names]
+        assert told == [(i, names[i], 0.5, "N s") for i in at]

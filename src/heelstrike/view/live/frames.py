@@ -186,10 +186,11 @@ class Layout:
             alike = " ".join(word for word in words if word.lower() not in SIDES)
             side = " ".join(word for word in words if word.lower() in SIDES)
             unit = angular if model.axis[joint, 0] != 0.0 else linear
+            effort = " torque" if unit == angular else " force"
             panel = panels.setdefault(
                 (alike, unit),
                 {
-                    "title": f"{alike or names[i]}{' torque' if field == 'torque' else ''}",
+                    "title": f"{alike or names[i]}{effort if field == 'torque' else ''}",
                     "unit": unit,
                     "group": f"{'torques' if field == 'torque' else 'joints'}",
                     "curves": [],

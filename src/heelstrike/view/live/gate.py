@@ -14,6 +14,7 @@ from urllib.parse import parse_qs, urlsplit
 Header = Callable[[str], str | None]
 
 PAGE, SOCKET = "/", "/live"
+HTTP = 80
 NAMES = ("127.0.0.1", "localhost")
 """By which a browser on this machine calls it, one that comes through a tunnel of ssh too."""
 
@@ -43,14 +44,19 @@ class Gate:
             Where the server listens.
         """
         host = header("Host")
-        if host not in [f"{name}:{port}" for name in NAMES]:
+        known = [f"{name}:{port}" for name in NAMES]
+        if port == HTTP:  # which browsers leave out
+            known += NAMES
+        if host not in known:
             return None
         try:
             parts = urlsplit(target)
         except ValueError:  # no address at all
             return None
         given = parse_qs(parts.query).get("token", [""])
-        if len(given) != 1 or not secrets.compare_digest(given[0].encode(), self.token.encode()):
+        if len(given) != 1 or not secrets.compare_digest(
+            given[0].encode(errors="replace"), self.token.encode()
+        ):
             return None
         origin = header("Origin")
         # Browsers always say where the script comes from that opens a socket.

@@ -7,6 +7,7 @@
   const WEIGHT_LENGTH = 0.35; // of the robot's size, the arrow of its weight
   const STRONGEST = 4; // weights of the robot, of a push
   const TRAIL = 2.5, FLASH = 0.25; // s
+  const MOST_FRAMES = 20000, MOST_EVENTS = 20000; // the oldest go, as on the server
   const NEAR = 14; // pixels within which a part is hit
   const RATES = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5, 10];
   const MARKS = { forces: "↑ forces, pushes", cones: "▽ friction cones",
@@ -32,6 +33,11 @@
     }
     add(numbers) {
       const more = numbers.length / this.width;
+      if (this.count + more > 2 * MOST_FRAMES) {
+        const kept = Math.max(Math.min(this.count, MOST_FRAMES - more), 0);
+        this.numbers.copyWithin(0, (this.count - kept) * this.width, this.count * this.width);
+        this.count = kept;
+      }
       if ((this.count + more) * this.width > this.numbers.length) {
         const larger = new Float64Array(2 * (this.numbers.length + numbers.length));
         larger.set(this.numbers);
@@ -127,7 +133,7 @@
 
   function addEvents(more) {
     const known = new Set(events.map(([, kind]) => kind));
-    events = events.concat(more);
+    events = events.concat(more).slice(-MOST_EVENTS);
     if (more.some(([, kind]) => !known.has(kind))) showKinds();
   }
 
@@ -138,9 +144,11 @@
   }
 
   function showState(changed) {
-    at("lamp").textContent = LAMPS[state.light.level];
-    at("lamp").dataset.level = state.light.level;
-    at("light-text").textContent = state.light.text;
+    if (state.light) {
+      at("lamp").textContent = LAMPS[state.light.level];
+      at("lamp").dataset.level = state.light.level;
+      at("light-text").textContent = state.light.text;
+    }
     at("play").textContent = state.playing ? "❚❚ pause" : "▶ play";
     at("play").setAttribute("aria-label", state.playing ? "pause" : "play");
     at("resume").disabled = state.end || !state.returns;
@@ -149,7 +157,9 @@
     at("note").textContent = state.note;
     showBanner(state.busy || state.message);
     if (changed.rate !== undefined) showRates();
-    if (changed.controls !== undefined || changed.values !== undefined) showControls();
+    // What was chosen and refused goes back to what there is.
+    const refused = changed.note || changed.busy === "";
+    if (changed.controls !== undefined || changed.values !== undefined || refused) showControls();
   }
 
   function showRates() {
@@ -172,6 +182,7 @@
   const inputs = new Map();
 
   function showControls() {
+    if (!state.controls) return;
     const wanted = JSON.stringify(state.controls);
     if (wanted !== made) {
       made = wanted;
@@ -284,6 +295,7 @@
       && state.rate >= 0.5 && !glance ? `, reaches × ${state.reached}` : "";
     at("clock").textContent = `${frame.time.toFixed(frame.time < 100 ? 4 : 3)} s${rate}`;
     plane.dataset.time = frame.time;
+    plane.dataset.frames = course.count;
     plane.dataset.pushed = Array.from(frame.push).filter((_, i) => i % 4 > 1)
       .reduce((sum, f) => sum + (Number.isFinite(f) ? f * f : 0), 0) ** 0.5;
   }

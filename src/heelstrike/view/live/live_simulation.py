@@ -145,5 +145,7 @@ class LiveSimulation:
         self._last = self.time
         kept = snapshot_of(self.simulation)
         if kept is not None:
+            if self._snapshots and self._snapshots[-1].time >= kept.time:
+                self._snapshots.pop()  # a slider sets many values at one instant, the last holds
             self._snapshots.append(kept)
             del self._snapshots[: max(len(self._snapshots) - MOST_SNAPSHOTS, 0)]

@@ -83,7 +83,7 @@ class Server:
         self.listens_at: list[tuple[str, int]] = []
         self._viewers = 0
         self._begun = threading.Event()
-        self._trouble: OSError | None = None
+        self._trouble: Exception | None = None
         self._loop = asyncio.new_event_loop()
         self._over = asyncio.Event()
         self._thread = threading.Thread(target=self._go, name="heelstrike-serve", daemon=True)
@@ -103,11 +103,16 @@ class Server:
         """
         self._thread.start()
         self._begun.wait()
-        if self._trouble is not None:
+        if isinstance(self._trouble, OSError):
             raise ViewError(
                 f"port {self.port} of {ADDRESS} cannot be had "
                 f"({self._trouble.strerror or self._trouble}); choose another, or leave the port "
                 "out and a free one is taken"
+            ) from self._trouble
+        if self._trouble is not None:
+            raise ViewError(
+                f"the live view cannot be served: {self._trouble!r}. Is websockets up to date? "
+                "pip install -U 'heelstrike[watch]'"
             ) from self._trouble
 
     def close(self) -> None:
@@ -120,7 +125,7 @@ class Server:
         asyncio.set_event_loop(self._loop)
         try:
             self._loop.run_until_complete(self._serve())
-        except OSError as error:
+        except Exception as error:  # told by start(), in the thread of whoever waits
             self._trouble = error
         finally:
             self._begun.set()

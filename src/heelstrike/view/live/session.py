@@ -25,6 +25,7 @@ from heelstrike.view.live.history import SAME, History
 from heelstrike.view.live.light import light_of
 from heelstrike.view.live.live_simulation import LiveSimulation
 from heelstrike.view.live.stage import Stage
+from heelstrike.view.page.events import contact_of, kind_in_words, place_of
 from heelstrike.view.page.scene import scene
 from heelstrike.view.style import in_words
 
@@ -40,6 +41,8 @@ IDLE = 0.25
 """Seconds between two looks whether there is something to do, when there was not."""
 SLOW = 0.03
 """Seconds that one update may take; what takes longer simulates less at a time."""
+MOST_COMMANDS = 1000
+"""Commands that may wait, while a gait is designed or viewers send more than can be done."""
 WORDS_LAST = 0.5
 """Seconds that the words of the light stay."""
 RANDOM_PUSH = (0.08, 0.25)
@@ -111,8 +114,12 @@ class Session:
         self._thread.join(timeout)
 
     def ask(self, viewer: str, command: dict[str, Any]) -> None:
-        """Put a command of a viewer in line; see :meth:`obey`."""
-        self._commands.put((viewer, command))
+        """Put a command of a viewer in line; see :meth:`obey`.
+
+        Where `MOST_COMMANDS` wait, more are not taken, but for those that let go.
+        """
+        if self._commands.qsize() < MOST_COMMANDS or command.get("do") in ("release", "leave"):
+            self._commands.put((viewer, command))
 
     def _go(self) -> None:
         try:
@@ -137,9 +144,16 @@ class Session:
             before = now
 
     def _obey_until(self, due: float, *, wait: bool) -> None:
-        """Carry out commands until an update is due, or wait for one a while."""
+        """Carry out commands until an update is due, or wait for one a while.
+
+        Commands that keep coming put an update off by `SLOW` and one command at most.
+        """
+        latest = max(due, clock_time.perf_counter()) + SLOW
         while not self._closing.is_set():
-            left = IDLE if wait else due - clock_time.perf_counter()
+            now = clock_time.perf_counter()
+            if now > latest and not wait:
+                return
+            left = IDLE if wait else due - now
             try:
                 viewer, command = self._commands.get(timeout=max(left, 0.0))
             except queue.Empty:
@@ -253,8 +267,8 @@ class Session:
             raise RefusedError(f"{name} cannot be {value!r}")
         kept = {each: v for each, v in self.values.items() if each not in control.resets}
         chosen = stage.fitted(kept | {name: value})
-        if control.at_once:
-            live = self._needs_live()
+        live = self.live
+        if control.at_once and live is not None:
             live.lay(stage.ground(chosen, live.simulation))
             self._set(chosen)
         else:
@@ -306,8 +320,8 @@ class Session:
                 return
             finally:
                 self._tell_busy("")
-            self._set(dict(wanted))
             self.live, self.history = live, History()
+            self._set(self._stage.found(wanted, simulation))
             self.history.take(run)
             self._show_scene(run)
         self._tell()
@@ -391,7 +405,7 @@ class Session:
         part = self.history.part(rows[0], rows[-1])
         frames = self._layout.frames(part, [row - rows[0] for row in rows], self._pushes)
         self._shown = self.cursor = float(part.time[-1])
-        told = [[event.time, int(event.kind), _contact(event)] for event in events]
+        told = [[event.time, int(event.kind), contact_of(event)] for event in events]
         self._board.add(frames, told)
 
     def _move(self, time: float) -> None:
@@ -417,6 +431,8 @@ class Session:
         row = self.history.row_at(self.cursor)
         time = float(self.history.time[row])
         live.go_back(time)
+        stage = self._needs_stage()
+        self._set(stage.found(self.values, live.simulation))
         self.history.cut(time)
         self._board.cut(time)
         self._shown = self._goal = self.cursor = time
@@ -448,16 +464,12 @@ class Session:
         places: dict[str, list[str]] = {}
         for event in self.history.events:
             if abs(event.time - time) <= SAME:
-                places.setdefault(in_words(_kind(event)), []).append(self._where(event))
+                places.setdefault(kind_in_words(event), []).append(self._where(event))
         told = [f"{kind} ({', '.join(filter(None, each))})" for kind, each in places.items()]
         return f"at {time:.6g} s: {'; '.join(told)}".replace(" ()", "")
 
     def _where(self, event: Event) -> str:
-        if self._layout is None or event.kind is EventKind.BRIDGE:
-            return ""
-        robot = self._layout.robot
-        names = robot.joint_names if event.kind.of_joint else robot.contact_names
-        return in_words(names[event.contact]) if 0 <= event.contact < len(names) else ""
+        return "" if self._layout is None else place_of(event, self._layout.robot)
 
     def _tell_busy(self, what: str) -> None:
         self._busy = what
@@ -499,11 +511,6 @@ class Session:
 
 def _kind(event: Event) -> str:
     return event.kind.name.lower()
-
-
-def _contact(event: Event) -> int:
-    of_point = not event.kind.of_joint and event.kind is not EventKind.BRIDGE
-    return event.contact if of_point else -1
 
 
 def _finite(value: Any) -> float:

@@ -15,6 +15,8 @@ from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 
 Value = float | str
+FRICTION = "friction"
+"""Name of the control of the ground's friction, which acts at once."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,15 @@ class Stage(ABC):
             If there is none of these values.
         """
 
+    def found(self, values: Mapping[str, Any], simulation: Simulation) -> dict[str, Any]:
+        """Values as they are in a simulation that has begun anew, or was taken back.
+
+        What was set at once and later than that is forgotten with all else that came later.
+        """
+        if FRICTION not in values:
+            return dict(values)
+        return {**values, FRICTION: float(np.min(simulation.ground.model().friction))}
+
     @abstractmethod
     def ground(self, values: Mapping[str, Any], simulation: Simulation) -> Ground:
         """Make the ground of the values that act at once."""
@@ -151,5 +162,5 @@ def snapshot_of(simulation: Simulation) -> Snapshot | None:
 def friction_control(value: float) -> Control:
     """Return the control of the ground's friction."""
     return Control(
-        "friction", "friction μ", value, low=0.0, high=max(1.5, value), step=0.01, at_once=True
+        FRICTION, "friction μ", value, low=0.0, high=max(1.5, value), step=0.01, at_once=True
     )

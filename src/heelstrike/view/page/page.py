@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,17 +11,17 @@ from heelstrike.analysis.summary import lines, summarize
 from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.errors import GaitError, ViewError
-from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.run import Run
+from heelstrike.sim.run import Event, Run
 from heelstrike.view.page.columns import TOLERANCE, packed
 from heelstrike.view.page.curves import plots
+from heelstrike.view.page.events import contact_of, impulse_of, kind_in_words, place_of
 from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
 from heelstrike.view.page.motion import frames
 from heelstrike.view.page.provenance import provenance
 from heelstrike.view.page.rows import IMPACTS, shown_rows
 from heelstrike.view.page.scene import scene
 from heelstrike.view.page.verdict import judge
-from heelstrike.view.style import in_words, view_errors
+from heelstrike.view.style import view_errors
 from heelstrike.whole_file import check_target, write_whole
 
 if TYPE_CHECKING:
@@ -160,17 +159,7 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
         "scene": scene(run.robot, run.ground),
         "data": packed(run.time[rows], columns),
         "plots": [panel.described() for panel in panels],
-        "events": [
-            {
-                "time": event.time,
-                "kind": event.kind.name.lower().replace("_", " "),
-                "where": _where(run, event.kind, event.contact),
-                "contact": -1 if event.kind.of_joint else event.contact,
-                "impulse": event.impulse[0] if math.isfinite(event.impulse[0]) else 0.0,
-                "impact": event.kind in IMPACTS,
-            }
-            for event in events
-        ],
+        "events": [_described(event, run) for event in events],
         "phases": [[phase.start, phase.end, *phase.feet] for phase in phases],
         "left_out": len(run.events) - len(events),
         "recorded": len(run.time),
@@ -178,6 +167,14 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
     }
 
 
-def _where(run: Run, kind: EventKind, index: int) -> str:
-    names = run.robot.joint_names if kind.of_joint else run.robot.contact_names
-    return in_words(names[index]) if 0 <= index < len(names) else ""
+def _described(event: Event, run: Run) -> dict[str, Any]:
+    impulse, unit = impulse_of(event, run.robot)
+    return {
+        "time": event.time,
+        "kind": kind_in_words(event),
+        "where": place_of(event, run.robot),
+        "contact": contact_of(event),
+        "impulse": impulse,
+        "unit": unit,
+        "impact": event.kind in IMPACTS,
+    }

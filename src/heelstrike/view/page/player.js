@@ -98,6 +98,9 @@
     }
   }
 
+  const inWords = ({ kind, where, impulse, unit }) => [kind, where,
+    impulse ? `${HeelstrikeDrawing.words(impulse)} ${unit}` : ""].filter(Boolean).join(" ");
+
   function tell(frame) {
     const { words } = HeelstrikeDrawing;
     at("clock").textContent = `${state.now.toFixed(3)} s`;
@@ -109,8 +112,7 @@
         ? total + HeelstrikeDrawing.pressed(frame, k).normal : total, 0);
       return `${foot.name} ${words(Math.abs(sum) < 1e-6 * scene.weight ? 0 : sum)} N`;
     }).join(", ");
-    const told = near.map((event) => `${event.kind} ${event.where}`
-      + (event.impulse ? ` ${words(event.impulse)} N s` : "")).join("; ");
+    const told = near.map(inWords).join("; ");
     at("now").textContent = [normal, told].filter(Boolean).join(" — ");
     if (!state.playing)
       at("plane").setAttribute("aria-label",
@@ -245,8 +247,7 @@
   for (const event of events.slice(0, 400)) {
     const button = document.createElement("button");
     button.type = "button";
-    button.textContent = `${event.time.toFixed(3)} s ${event.kind} ${event.where}`
-      + (event.impulse ? ` ${HeelstrikeDrawing.words(event.impulse)} N s` : "");
+    button.textContent = `${event.time.toFixed(3)} s ${inWords(event)}`;
     button.addEventListener("click", () => { play(false); go(event.time); });
     at("list").append(button);
   }

@@ -90,14 +90,14 @@ var HeelstrikeRecording = (() => {
         const same = found.find((one) => one.time === event.time && one.label);
         if (same) same.impulse += event.impulse;
         found.push({ x, z, strength, time: event.time, impulse: event.impulse,
-          label: same ? "" : event.kind });
+          unit: event.unit, label: same ? "" : event.kind });
       }
       // Of feet that chatter the last touches are shown, and the last one is told.
       const shown = found.slice(-FLASHES), last = shown.length ? shown.at(-1).time : 0;
       for (const flash of shown) {
         if (flash.time !== last) flash.label = "";
         else if (flash.label && flash.impulse)
-          flash.label += ` ${HeelstrikeDrawing.words(flash.impulse)} N s`;
+          flash.label += ` ${HeelstrikeDrawing.words(flash.impulse)} ${flash.unit}`;
       }
       return shown;
     }
