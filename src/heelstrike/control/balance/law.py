@@ -1,0 +1,267 @@
+"""Walking by whole-body control and footstep feedback: the law, from touchdown to torques."""
+
+from __future__ import annotations
+
+from math import atan, exp, inf, sqrt
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.balance.constrained import constrain, point_task
+from heelstrike.control.balance.footsteps import make_plan
+from heelstrike.control.balance.numbers import Memory, Parameters
+from heelstrike.control.balance.reference import curvature_at, slope_at, value_at
+from heelstrike.control.balance.tasks import (
+    add_contact,
+    add_motors,
+    add_pressure,
+    add_task,
+    clear,
+    solve_torques,
+)
+from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
+from heelstrike.dynamics.kernels import center_of_mass, point_position
+from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.robot.model import Floats
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.law import controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+
+@kernel
+def exchange_at_touchdown(
+    t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Exchange stance and swing when the swing foot has met the ground."""
+    if memory.phase < parameters.touchdown or t - memory.start < 0.3 * parameters.planning.earliest:
+        return
+    swing = 1 - memory.stance
+    for i in range(robot.nc):
+        if robot.contact_foot[i] == swing and contacts.force[i, 0] > 0.0:
+            length = memory.swing[0] - memory.sole[0]
+            rise = memory.swing[1] - memory.sole[1]
+            if abs(length) > 0.1 * parameters.reference.length:
+                memory.slope = 0.4 * memory.slope + 0.6 * rise / length
+            memory.stance = swing
+            memory.start = t
+            memory.landed = 0
+            memory.phase = 0.0
+            memory.late = 0.0
+            memory.steps += 1
+            return
+
+
+@kernel
+def has_landed(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot, settling: float,
+    memory: Memory,
+) -> bool:  # fmt: skip
+    """Whether the stance foot is past the impact that made it the stance foot."""
+    landed = memory.landed == 1 or t - memory.start > settling
+    if not landed:
+        landed = True
+        for i in range(robot.nc):
+            if robot.contact_foot[i] == memory.stance:
+                link = robot.foot_link[memory.stance]
+                speed = approaching_speed(state.kinematics, contacts, link, i)
+                landed = landed and speed < LANDED_SPEED
+    memory.landed = 1 if landed else 0
+    return landed
+
+
+@kernel
+def locate(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Find soles, centre of mass and capture point."""
+    work, legs, plan = state.kinematics, parameters.legs, memory.plan
+    stance, swing = memory.stance, 1 - memory.stance
+    point_position(work, robot.foot_link[stance], legs.point[stance], memory.sole)
+    point_position(work, robot.foot_link[swing], legs.point[swing], memory.swing)
+    place = place_of(work, memory.swing)
+    memory.speed[0], memory.speed[1] = velocity_at(work.velocity, robot.foot_link[swing], place)
+    center_of_mass(robot.model, work, memory.mass)
+    robot.center_of_mass_velocity(state, robot.other)
+    plan.capture = memory.mass[0] - memory.sole[0] + robot.other[0] / parameters.reference.rate
+    plan.swing = memory.swing[0] - memory.sole[0]
+    plan.speed = memory.speed[0]
+
+
+@kernel
+def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> None:
+    """Plan the landing, move the reference's clock on, and see how alarming all this is."""
+    reference, plan = parameters.reference, memory.plan
+    elapsed = max(t - memory.time, 0.0)
+    memory.phase = min(memory.phase + memory.rate * elapsed, 1.0)
+    if memory.phase >= 1.0:
+        memory.late += elapsed
+    memory.time = t
+    plan.length = parameters.length
+    more = (plan.length - reference.length) / (exp(reference.rate * reference.duration) - 1.0)
+    plan.offset = reference.end - reference.length + more
+    plan.phase = memory.phase
+    plan.elapsed = t - memory.start
+    make_plan(parameters.planning, reference, parameters.adapts == 1, plan)
+    memory.rate = (1.0 - memory.phase) / plan.remaining
+    if landed:
+        span = parameters.alarmed - parameters.calm
+        alarm = min(max((abs(plan.error) - parameters.calm) / span, 0.0), 1.0)
+        memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
+
+
+@kernel
+def want_height(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add the task of the hip's height, which no leg may be too short for."""
+    reference, legs, plan, alarm = parameters.reference, parameters.legs, memory.plan, memory.alarm
+    work, on, rate = state.kinematics, memory.on, memory.rate
+    hip = work.origin[legs.hip[memory.stance]]
+    ankle = work.origin[robot.foot_link[memory.stance]]
+    own = value_at(reference.hip, memory.phase)
+    # The plane in which the body goes: parallel to the ground.
+    rise = memory.slope * (hip[0] - memory.sole[0])
+    reach = (1.0 - 0.015 * alarm) * legs.length
+    across = hip[0] - ankle[0]
+    under = ankle[1] - memory.sole[1]
+    room = under + sqrt(max(reach * reach - across * across, 0.0)) - rise
+    omega = reference.rate
+    there = plan.pressure + plan.remaining * 0.0
+    x = memory.mass[0] - memory.sole[0]
+    grown, shrunk = exp(omega * plan.remaining), exp(-omega * plan.remaining)
+    speed = omega * (plan.capture - x)
+    ahead = there + (x - there) * 0.5 * (grown + shrunk) + speed / omega * 0.5 * (grown - shrunk)
+    across = plan.foothold - (hip[0] - memory.sole[0] + ahead - x)
+    limit = under + sqrt(max(reach * reach - across * across, 0.25 * reach * reach))
+    low = min(min(own - parameters.crouch, room), limit)
+    height = own + alarm * (low - own)
+    point_task(robot, state, legs.hip[memory.stance], hip, on)
+    place = place_of(work, hip)
+    velocity = velocity_at(work.velocity, legs.hip[memory.stance], place)
+    calm = 1.0 - alarm
+    missing = calm * curvature_at(reference.hip, memory.phase) * rate * rate - on.shift[1]
+    missing += parameters.kp * (height + rise - (hip[1] - memory.sole[1]))
+    wanted = calm * slope_at(reference.hip, memory.phase) * rate + memory.slope * velocity[0]
+    missing += damping * parameters.kd * (wanted - velocity[1])
+    add_task(on.rows, 1, missing, parameters.weights.height, memory.program)
+
+
+@kernel
+def want_trunk(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add the task of the trunk's rotation."""
+    pitch, phase, rate, work = parameters.reference.pitch, memory.phase, memory.rate, state.kinematics
+    on = memory.on
+    point_task(robot, state, 2, work.origin[2], on)
+    missing = curvature_at(pitch, phase) * rate * rate - on.shift[2]
+    missing += parameters.kp * (value_at(pitch, phase) - work.angle[2])
+    missing += damping * parameters.kd * (slope_at(pitch, phase) * rate - work.velocity[2, 0])
+    add_task(on.rows, 2, missing, parameters.weights.pitch, memory.program)
+
+
+@kernel
+def want_foothold(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add the tasks of the swing foot: to its foothold, over the ground, parallel to it."""
+    reference, weights, plan = parameters.reference, parameters.weights, memory.plan
+    phase, rate, on, program = memory.phase, memory.rate, memory.on, memory.program
+    swing, alarm = 1 - memory.stance, memory.alarm
+    link = robot.foot_link[swing]
+    point_task(robot, state, link, memory.swing, on)
+    squared = rate * rate
+
+    # Along the ground: what is wrong vanishes, in the time that is left, with the least effort.
+    left = max(plan.remaining, 0.05 * reference.duration)
+    off = plan.swing - value_at(reference.swing_x, phase)
+    drift = plan.speed - slope_at(reference.swing_x, phase) * rate
+    goal = plan.foothold - reference.length
+    pull = 6.0 * (goal - off) / (left * left) - damping * 4.0 * drift / left
+    limit = parameters.planning.acceleration
+    pull = min(max(pull, -limit), limit)
+    ahead = curvature_at(reference.swing_x, phase) * squared + pull
+    add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
+
+    # Over the ground: the gait's way, higher when alarmed; a late foot looks for the ground.
+    up = memory.slope * plan.swing + value_at(reference.swing_z, phase)
+    speed = memory.slope * plan.speed + slope_at(reference.swing_z, phase) * rate
+    bend = curvature_at(reference.swing_z, phase) * squared
+    s, r = phase, 1.0 - phase
+    up += alarm * parameters.lift * 16.0 * s * s * r * r
+    speed += alarm * parameters.lift * 32.0 * s * r * (r - s) * rate
+    bend += alarm * parameters.lift * 32.0 * (1.0 - 6.0 * s * r) * squared
+    height = memory.swing[1] - memory.sole[1]
+    if memory.late > 0.0:
+        part = min(memory.late / parameters.search, 1.0)
+        speed = -parameters.slow - part * (parameters.fast - parameters.slow)
+        rise = parameters.foot_kd * damping * (speed - memory.speed[1])
+    else:
+        rise = bend + parameters.foot_kp * (up - height)
+        rise += damping * parameters.foot_kd * (speed - memory.speed[1])
+    add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
+
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[swing]
+    own = value_at(reference.swing_angle, phase) - atan(memory.slope)
+    turn = curvature_at(reference.swing_angle, phase) * squared
+    turn += parameters.foot_kp * (own - tilt)
+    wanted = slope_at(reference.swing_angle, phase) * rate
+    turn += damping * parameters.foot_kd * (wanted - state.kinematics.velocity[link, 0])
+    add_task(on.rows, 2, turn - on.shift[2], weights.angle, program)
+
+
+@kernel
+def want_posture(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add what settles what the other tasks leave open: the gait's joints, bent knees, effort."""
+    reference, legs, weights = parameters.reference, parameters.legs, parameters.weights
+    program, on, phase, rate = memory.program, memory.on, memory.phase, memory.rate
+    for i in range(robot.nu):
+        table = reference.joints[memory.stance, :, i]
+        wanted = curvature_at(table, phase) * rate * rate
+        wanted += parameters.joint_kp * (value_at(table, phase) - state.joint_position[i])
+        speed = slope_at(table, phase) * rate
+        wanted += damping * parameters.joint_kd * (speed - state.joint_velocity[i])
+        program.hessian[i, i] += weights.posture
+        program.gradient[i] -= weights.posture * wanted
+        add_task(on.torque, i, -on.hold[i], weights.torque, program)
+    for foot in range(2):
+        knee = legs.knee[foot]
+        bent = legs.bend[foot] * (state.joint_position[knee] - legs.straight[foot])
+        least = memory.alarm * parameters.knee
+        if memory.alarm > 0.0 and bent < least:
+            wanted = parameters.joint_kp * (least - bent)
+            wanted -= parameters.joint_kd * legs.bend[foot] * state.joint_velocity[knee]
+            if wanted > 0.0:
+                program.hessian[knee, knee] += weights.knee
+                program.gradient[knee] -= weights.knee * legs.bend[foot] * wanted
+
+
+@controller
+def keep_balance(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, torque: Floats,
+) -> None:  # fmt: skip
+    """Joint torques that walk, by the gait or by where the next foot has to land."""
+    exchange_at_touchdown(t, contacts, robot, parameters, memory)
+    locate(state, robot, parameters, memory)
+    landed = has_landed(t, state, contacts, robot, parameters.settling, memory)
+    decide(t, landed, parameters, memory)
+    stance, on, program = memory.stance, memory.on, memory.program
+    link = robot.foot_link[stance]
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[stance]
+    constrain(robot, state, link, memory.sole, on)
+    clear(program)
+    weights = parameters.weights
+    add_pressure(weights.pressure, tilt, memory.plan.pressure, parameters.weight, on, program)
+    damping = 1.0 if landed else 0.0
+    want_height(state, robot, parameters, damping, memory)
+    want_trunk(state, robot, parameters, damping, memory)
+    want_foothold(state, robot, parameters, damping, memory)
+    want_posture(state, robot, parameters, damping, memory)
+    add_contact(parameters, tilt, on, program)
+    add_motors(robot, state, on, program)
+    solve_torques(robot, state, memory, torque)
