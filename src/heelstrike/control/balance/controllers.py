@@ -45,9 +45,9 @@ class FootstepFeedback(Law):
             adapts=int(adapts), length=gait.step_length if length is None else length,
             kp=150.0 / scale, kd=25.0 / pace, foot_kp=400.0 / scale, foot_kd=40.0 / pace,
             joint_kp=150.0 / scale, joint_kd=25.0 / pace, friction=friction, least_force=0.15 * weight,
-            weight=weight, touchdown=0.4, settling=0.02 * T, calm=0.03 * scale, alarmed=0.1 * scale,
+            weight=weight, touchdown=0.4, settling=0.02 * T, calm=0.02 * scale, alarmed=0.08 * scale,
             calming=1.0 * pace, crouch=0.03 * scale, lift=0.03 * scale, knee=0.12, slow=0.15 * pace,
-            fast=1.0 * pace, search=0.1 * pace)
+            fast=1.0 * pace, haste=0.1*pace, search=0.1 * pace, smoothing=0.01 * pace)
         for name, value in numbers.items():
             for group in (planning, weights, rest):
                 if name in group: group[name] = value; break

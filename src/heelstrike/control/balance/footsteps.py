@@ -16,6 +16,9 @@ from heelstrike.compiler.bundle import Bundle, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.reference import Reference, value_at
 
+COMMITTED = 0.06
+"""A landing sooner than this, in durations of a step, is not planned anew."""
+
 TIMES = 25
 """Remaining times that a plan is chosen from, besides the gait's own."""
 
@@ -61,6 +64,8 @@ class Plan(Bundle):
         Step that is wanted (m), and capture point before the foot as it lands (m).
     phase, elapsed : float
         Where the reference is, and how long the foot has stood (s).
+    gone : float
+        Time since the plan before (s).
     capture : float
         Capture point before the stance sole's middle (m).
     swing, speed : float
@@ -80,6 +85,7 @@ class Plan(Bundle):
     offset: float = cell(float)
     phase: float = cell(float)
     elapsed: float = cell(float)
+    gone: float = cell(float)
     capture: float = cell(float)
     swing: float = cell(float)
     speed: float = cell(float)
@@ -112,7 +118,7 @@ def consider(
     slow = exp(reference.rate * max(remaining, planning.soon))
     free = own + correction + (plan.capture - own) * grown
     wanted = plan.length + plan.offset
-    shift = (own + correction + (plan.capture - own) * slow - wanted) / (slow - 1.0)
+    shift = (free - wanted) / (slow - 1.0)
     shift = min(max(shift, planning.heel - own), planning.toe - own)
     end = free - shift * (grown - 1.0)
     light, heavy = planning.foothold_weight, planning.capture_weight
@@ -133,6 +139,24 @@ def consider(
 
 
 @kernel
+def choose_time(
+    planning: Planning, reference: Reference, own: float, correction: float, soonest: float,
+    plan: Plan,
+) -> None:  # fmt: skip
+    """Look for a remaining time that costs less: on a grid, then between its points."""
+    least = max(planning.earliest - plan.elapsed, soonest)
+    most = max(planning.latest - plan.elapsed, least)
+    width = (most - least) / (TIMES - 1)
+    for k in range(TIMES):
+        consider(planning, reference, own, correction, least + width * k, plan)
+    for _ in range(4):
+        width *= 0.5
+        middle = plan.remaining
+        consider(planning, reference, own, correction, max(middle - width, least), plan)
+        consider(planning, reference, own, correction, min(middle + width, most), plan)
+
+
+@kernel
 def make_plan(planning: Planning, reference: Reference, retimed: bool, plan: Plan) -> None:
     """Write the landing that costs least; if not `retimed`, when the gait lands."""
     own = own_pressure(planning, reference, plan.phase)
@@ -141,20 +165,16 @@ def make_plan(planning: Planning, reference: Reference, retimed: bool, plan: Pla
     capture = value_at(reference.capture, plan.phase)
     correction = reference.end - own - (capture - own) * grown
     plan.error = own + correction + (plan.capture - own) * grown - plan.length - plan.offset
-    least = max(planning.earliest - plan.elapsed, 0.03 * reference.duration)
-    most = max(planning.latest - plan.elapsed, least)
     plan.cost = 1e30
-    usual = min(max(reference.duration - plan.elapsed, least), most)
-    consider(planning, reference, own, correction, usual, plan)
-    if retimed:
-        for k in range(TIMES):
-            time = least + (most - least) * k / (TIMES - 1)
-            consider(planning, reference, own, correction, time, plan)
-        width = (most - least) / (TIMES - 1)
-        for _ in range(4):
-            width *= 0.5
-            middle = plan.remaining
-            consider(planning, reference, own, correction, max(middle - width, least), plan)
-            consider(planning, reference, own, correction, min(middle + width, most), plan)
+    least = COMMITTED * reference.duration
+    left = plan.remaining - plan.gone
+    if left < least and plan.elapsed > 0.0:
+        # The foot is as good as down: what is left is too short to be worth another plan.
+        consider(planning, reference, own, correction, max(left, 1e-4), plan)
+    else:
+        rest = reference.duration - plan.elapsed
+        consider(planning, reference, own, correction, max(rest, least), plan)
+        if retimed:
+            choose_time(planning, reference, own, correction, least, plan)
     plan.pressure += value_at(reference.pressure, plan.phase)
     plan.pressure = min(max(plan.pressure, planning.heel), planning.toe)

@@ -44,6 +44,8 @@ def exchange_at_touchdown(
             memory.start = t
             memory.landed = 0
             memory.phase = 0.0
+            memory.rate = 1.0 / parameters.reference.duration
+            memory.plan.remaining = parameters.reference.duration
             memory.late = 0.0
             memory.steps += 1
             return
@@ -94,16 +96,18 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     if memory.phase >= 1.0:
         memory.late += elapsed
     memory.time = t
+    plan.gone = elapsed
     plan.length = parameters.length
     more = (plan.length - reference.length) / (exp(reference.rate * reference.duration) - 1.0)
     plan.offset = reference.end - reference.length + more
     plan.phase = memory.phase
     plan.elapsed = t - memory.start
     make_plan(parameters.planning, reference, parameters.adapts == 1, plan)
-    memory.rate = (1.0 - memory.phase) / plan.remaining
+    rate = (1.0 - memory.phase) / plan.remaining
+    memory.rate += min(elapsed / parameters.smoothing, 1.0) * (rate - memory.rate)
     if landed:
         span = parameters.alarmed - parameters.calm
-        alarm = min(max((abs(plan.error) - parameters.calm) / span, 0.0), 1.0)
+        alarm = min(max((sqrt(plan.cost) - parameters.calm) / span, 0.0), 1.0)
         memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
 
 
@@ -174,7 +178,7 @@ def want_foothold(
     squared = rate * rate
 
     # Along the ground: what is wrong vanishes, in the time that is left, with the least effort.
-    left = max(plan.remaining, 0.05 * reference.duration)
+    left = max(plan.remaining, parameters.haste)
     off = plan.swing - value_at(reference.swing_x, phase)
     drift = plan.speed - slope_at(reference.swing_x, phase) * rate
     goal = plan.foothold - reference.length

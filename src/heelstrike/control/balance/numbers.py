@@ -104,8 +104,10 @@ class Parameters(Bundle):
         knee stays bent then (rad).
     slow, fast : float
         Speeds at which a late foot looks for the ground (m/s), first and after `search`.
-    search : float
-        A time (s).
+    haste : float
+        The swing foot is not brought to its foothold in less than this (s).
+    search, smoothing : float
+        That time, and the one in which the reference's clock follows new plans (s).
     """
 
     reference: Reference = part(Reference)
@@ -133,7 +135,9 @@ class Parameters(Bundle):
     knee: float = number(float)
     slow: float = number(float)
     fast: float = number(float)
+    haste: float = number(float)
     search: float = number(float)
+    smoothing: float = number(float)
 
 
 class Memory(Bundle):
