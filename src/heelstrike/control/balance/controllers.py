@@ -37,7 +37,7 @@ class FootstepFeedback(Law):
         T = gait.step_duration
         planning = dict(
             heel=-half + margin, toe=half - margin, shortest=-0.5 * scale, longest=0.65 * scale,
-            earliest=0.4 * T, latest=1.29 * T, soon=0.12 * pace, acceleration=60.0,
+            earliest=0.4 * T, latest=1.29 * T, soon=0.12 * pace, acceleration=60.0, hurry=3.5,
             foothold_weight=1.0, time_weight=0.3 * scale, capture_weight=30.0)
         weights = dict(pressure=1e6, height=1.0, swing=1.0, pitch=1.0, angle=0.05, posture=1e-3,
                        knee=1.0, torque=1e-7)

@@ -38,6 +38,8 @@ class Planning(Bundle):
         The centre of pressure is not planned for less than this (s).
     acceleration : float
         That of the swing foot at most (m/s²).
+    hurry : float
+        How many times faster than in the gait the swing foot may move.
     foothold_weight, time_weight, capture_weight : float
         Costs of deviations (1/m², 1/s², 1/m²).
     """
@@ -50,6 +52,7 @@ class Planning(Bundle):
     latest: float = number(float)
     soon: float = number(float)
     acceleration: float = number(float)
+    hurry: float = number(float)
     foothold_weight: float = number(float)
     time_weight: float = number(float)
     capture_weight: float = number(float)
@@ -175,6 +178,7 @@ def make_plan(planning: Planning, reference: Reference, retimed: bool, plan: Pla
         rest = reference.duration - plan.elapsed
         consider(planning, reference, own, correction, max(rest, least), plan)
         if retimed:
+            least = max(least, (1.0 - plan.phase) * reference.duration / planning.hurry)
             choose_time(planning, reference, own, correction, least, plan)
     plan.pressure += value_at(reference.pressure, plan.phase)
     plan.pressure = min(max(plan.pressure, planning.heel), planning.toe)

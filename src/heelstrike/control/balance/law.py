@@ -156,11 +156,12 @@ def want_trunk(
 ) -> None:  # fmt: skip
     """Add the task of the trunk's rotation."""
     pitch, phase, rate, work = parameters.reference.pitch, memory.phase, memory.rate, state.kinematics
-    on = memory.on
+    on, calm = memory.on, 1.0 - memory.alarm
     point_task(robot, state, 2, work.origin[2], on)
-    missing = curvature_at(pitch, phase) * rate * rate - on.shift[2]
-    missing += parameters.kp * (value_at(pitch, phase) - work.angle[2])
-    missing += damping * parameters.kd * (slope_at(pitch, phase) * rate - work.velocity[2, 0])
+    missing = calm * curvature_at(pitch, phase) * rate * rate - on.shift[2]
+    missing += parameters.kp * (calm * value_at(pitch, phase) - work.angle[2])
+    wanted = calm * slope_at(pitch, phase) * rate
+    missing += damping * parameters.kd * (wanted - work.velocity[2, 0])
     add_task(on.rows, 2, missing, parameters.weights.pitch, memory.program)
 
 
@@ -185,7 +186,7 @@ def want_foothold(
     pull = 6.0 * (goal - off) / (left * left) - damping * 4.0 * drift / left
     limit = parameters.planning.acceleration
     pull = min(max(pull, -limit), limit)
-    ahead = curvature_at(reference.swing_x, phase) * squared + pull
+    ahead = min(max(curvature_at(reference.swing_x, phase) * squared + pull, -limit), limit)
     add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
 
     # Over the ground: the gait's way, higher when alarmed; a late foot looks for the ground.
@@ -204,6 +205,7 @@ def want_foothold(
     else:
         rise = bend + parameters.foot_kp * (up - height)
         rise += damping * parameters.foot_kd * (speed - memory.speed[1])
+    rise = min(max(rise, -limit), limit)
     add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
 
     tilt = state.kinematics.angle[link] - parameters.legs.angle[swing]
@@ -223,14 +225,15 @@ def want_posture(
     """Add what settles what the other tasks leave open: the gait's joints, bent knees, effort."""
     reference, legs, weights = parameters.reference, parameters.legs, parameters.weights
     program, on, phase, rate = memory.program, memory.on, memory.phase, memory.rate
+    weight = weights.posture * (1.0 - 0.98 * memory.alarm)
     for i in range(robot.nu):
         table = reference.joints[memory.stance, :, i]
         wanted = curvature_at(table, phase) * rate * rate
         wanted += parameters.joint_kp * (value_at(table, phase) - state.joint_position[i])
         speed = slope_at(table, phase) * rate
         wanted += damping * parameters.joint_kd * (speed - state.joint_velocity[i])
-        program.hessian[i, i] += weights.posture
-        program.gradient[i] -= weights.posture * wanted
+        program.hessian[i, i] += weight
+        program.gradient[i] -= weight * wanted
         add_task(on.torque, i, -on.hold[i], weights.torque, program)
     for foot in range(2):
         knee = legs.knee[foot]
