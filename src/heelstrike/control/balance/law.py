@@ -10,6 +10,7 @@ from heelstrike.control.balance.footsteps import make_plan
 from heelstrike.control.balance.numbers import Memory, Parameters
 from heelstrike.control.balance.reference import curvature_at, slope_at, value_at
 from heelstrike.control.balance.tasks import (
+    KNEE_LEVEL,
     add_contact,
     add_motors,
     add_pressure,
@@ -223,7 +224,7 @@ def want_posture(
     memory: Memory,
 ) -> None:  # fmt: skip
     """Add what settles what the other tasks leave open: the gait's joints, bent knees, effort."""
-    reference, legs, weights = parameters.reference, parameters.legs, parameters.weights
+    reference, weights = parameters.reference, parameters.weights
     program, on, phase, rate = memory.program, memory.on, memory.phase, memory.rate
     weight = weights.posture * (1.0 - 0.98 * memory.alarm)
     for i in range(robot.nu):
@@ -235,16 +236,27 @@ def want_posture(
         program.hessian[i, i] += weight
         program.gradient[i] -= weight * wanted
         add_task(on.torque, i, -on.hold[i], weights.torque, program)
+
+
+@kernel
+def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory) -> None:
+    """Add rows that let no knee pass the angle beyond which its leg could not lift the body.
+
+    A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v.
+    """
+    legs, program, stiffness = parameters.legs, memory.program, parameters.knee_kp
+    least = parameters.straight_knee + memory.alarm * (parameters.knee - parameters.straight_knee)
     for foot in range(2):
-        knee = legs.knee[foot]
-        bent = legs.bend[foot] * (state.joint_position[knee] - legs.straight[foot])
-        least = memory.alarm * parameters.knee
-        if memory.alarm > 0.0 and bent < least:
-            wanted = parameters.joint_kp * (least - bent)
-            wanted -= parameters.joint_kd * legs.bend[foot] * state.joint_velocity[knee]
-            if wanted > 0.0:
-                program.hessian[knee, knee] += weights.knee
-                program.gradient[knee] -= weights.knee * legs.bend[foot] * wanted
+        knee, sign = legs.knee[foot], legs.bend[foot]
+        bent = sign * (state.joint_position[knee] - legs.straight[foot])
+        row = program.count
+        for i in range(program.x.shape[0]):
+            program.rows[row, i] = 0.0
+        program.rows[row, knee] = sign
+        speed = sign * state.joint_velocity[knee]
+        program.bound[row] = stiffness * (least - bent) - 2.0 * sqrt(stiffness) * speed
+        program.level[row] = KNEE_LEVEL
+        program.count = row + 1
 
 
 @controller
@@ -271,4 +283,5 @@ def keep_balance(
     want_posture(state, robot, parameters, damping, memory)
     add_contact(parameters, tilt, on, program)
     add_motors(robot, state, on, program)
+    keep_knees_bent(state, parameters, memory)
     solve_torques(robot, state, memory, torque)

@@ -133,6 +133,8 @@ class Parameters(Bundle):
     crouch: float = number(float)
     lift: float = number(float)
     knee: float = number(float)
+    straight_knee: float = number(float)
+    knee_kp: float = number(float)
     slow: float = number(float)
     fast: float = number(float)
     haste: float = number(float)
