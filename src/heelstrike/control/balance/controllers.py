@@ -46,7 +46,7 @@ class FootstepFeedback(Law):
             kp=150.0 / scale, kd=25.0 / pace, foot_kp=400.0 / scale, foot_kd=40.0 / pace,
             joint_kp=150.0 / scale, joint_kd=25.0 / pace, friction=friction, least_force=0.15 * weight,
             weight=weight, touchdown=0.4, settling=0.02 * T, calm=0.02 * scale, alarmed=0.08 * scale,
-            calming=1.0 * pace, crouch=0.03 * scale, lift=0.03 * scale, knee=0.10, straight_knee=-0.1, knee_kp=900.0/scale, slow=0.15 * pace,
+            calming=1.0 * pace, crouch=0.03 * scale, lift=0.03 * scale, knee=0.10, straight_knee=-0.25, knee_kp=900.0/scale, slow=0.15 * pace,
             fast=1.0 * pace, haste=0.1*pace, search=0.1 * pace, smoothing=0.01 * pace)
         for name, value in numbers.items():
             for group in (planning, weights, rest):
