@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from math import atan, exp, inf, sqrt
+from math import atan, exp, sqrt
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import constrain, point_task
 from heelstrike.control.balance.footsteps import make_plan
 from heelstrike.control.balance.numbers import Memory, Parameters
-from heelstrike.control.balance.reference import curvature_at, slope_at, value_at
+from heelstrike.control.balance.reference import (
+    Reference,
+    curvature_at,
+    slope_at,
+    value_at,
+)
 from heelstrike.control.balance.tasks import (
     KNEE_LEVEL,
     add_contact,
@@ -27,6 +32,10 @@ from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 
+JUST_BEGUN = 0.05
+"""A step has just begun up to this phase."""
+
+
 @kernel
 def exchange_at_touchdown(
     t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
@@ -42,13 +51,9 @@ def exchange_at_touchdown(
             if abs(length) > 0.1 * parameters.reference.length:
                 memory.slope = 0.4 * memory.slope + 0.6 * rise / length
             memory.stance = swing
-            memory.start = t
             memory.landed = 0
-            memory.phase = 0.0
-            memory.rate = 1.0 / parameters.reference.duration
-            memory.plan.remaining = parameters.reference.duration
-            memory.late = 0.0
             memory.steps += 1
+            begin_step(t, parameters.reference, memory)
             return
 
 
@@ -89,6 +94,43 @@ def locate(
 
 
 @kernel
+def begin_step(t: float, reference: Reference, memory: Memory) -> None:
+    """Set the reference to the beginning of a step."""
+    memory.start = t
+    memory.phase = 0.0
+    memory.late = 0.0
+    memory.rate = 1.0 / reference.duration
+    memory.plan.remaining = reference.duration
+
+
+@kernel
+def stand_or_walk(t: float, parameters: Parameters, memory: Memory) -> None:
+    """Begin to stand once the feet are together, and to walk if that is wanted or needed."""
+    plan, hold = memory.plan, parameters.hold
+    away = abs(plan.capture)
+    if memory.stands == 1:
+        if parameters.speed != 0.0 or away > hold:
+            memory.stands = 0
+            begin_step(t, parameters.reference, memory)
+    elif parameters.speed == 0.0 and memory.phase < JUST_BEGUN and memory.landed == 1:
+        level = abs(memory.swing[1] - memory.sole[1]) < 0.1 * hold
+        if level and abs(plan.swing) < hold and away < 0.5 * hold:
+            memory.stands = 1
+
+
+@kernel
+def stay(t: float, parameters: Parameters, memory: Memory) -> None:
+    """Stand: press beyond the capture point, so that it comes back to the middle of the sole."""
+    plan, planning = memory.plan, parameters.planning
+    memory.alarm *= exp(-max(t - memory.time, 0.0) / parameters.calming)
+    memory.time = t
+    memory.rate = 0.0
+    plan.foothold = plan.swing
+    plan.remaining = parameters.reference.duration
+    plan.pressure = min(max(2.0 * plan.capture, planning.heel), planning.toe)
+
+
+@kernel
 def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> None:
     """Plan the landing, move the reference's clock on, and see how alarming all this is."""
     reference, plan = parameters.reference, memory.plan
@@ -98,7 +140,7 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
         memory.late += elapsed
     memory.time = t
     plan.gone = elapsed
-    plan.length = parameters.length
+    plan.length = parameters.speed * reference.duration
     more = (plan.length - reference.length) / (exp(reference.rate * reference.duration) - 1.0)
     plan.offset = reference.end - reference.length + more
     plan.phase = memory.phase
@@ -106,7 +148,7 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     make_plan(parameters.planning, reference, parameters.adapts == 1, plan)
     rate = (1.0 - memory.phase) / plan.remaining
     memory.rate += min(elapsed / parameters.smoothing, 1.0) * (rate - memory.rate)
-    if landed:
+    if landed and parameters.adapts == 1:
         span = parameters.alarmed - parameters.calm
         alarm = min(max((sqrt(plan.cost) - parameters.calm) / span, 0.0), 1.0)
         memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
@@ -130,12 +172,12 @@ def want_height(
     under = ankle[1] - memory.sole[1]
     room = under + sqrt(max(reach * reach - across * across, 0.0)) - rise
     omega = reference.rate
-    there = plan.pressure + plan.remaining * 0.0
+    # How far the hip will be before the foot that lands, the body falling over where it presses.
     x = memory.mass[0] - memory.sole[0]
     grown, shrunk = exp(omega * plan.remaining), exp(-omega * plan.remaining)
-    speed = omega * (plan.capture - x)
-    ahead = there + (x - there) * 0.5 * (grown + shrunk) + speed / omega * 0.5 * (grown - shrunk)
-    across = plan.foothold - (hip[0] - memory.sole[0] + ahead - x)
+    fallen = 0.5 * (plan.capture - plan.pressure) * (grown - 1.0)
+    fallen += 0.5 * (2.0 * x - plan.capture - plan.pressure) * (shrunk - 1.0)
+    across = plan.foothold - (hip[0] - memory.sole[0]) - fallen
     limit = under + sqrt(max(reach * reach - across * across, 0.25 * reach * reach))
     low = min(min(own - parameters.crouch, room), limit)
     height = own + alarm * (low - own)
@@ -219,6 +261,20 @@ def want_foothold(
 
 
 @kernel
+def want_rest(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Add the task of the other foot as the robot stands: to stay where it is."""
+    weights, on, program = parameters.weights, memory.on, memory.program
+    link, kd = robot.foot_link[1 - memory.stance], parameters.foot_kd
+    point_task(robot, state, link, memory.swing, on)
+    add_task(on.rows, 0, -kd * memory.speed[0] - on.shift[0], weights.swing, program)
+    add_task(on.rows, 1, -kd * memory.speed[1] - on.shift[1], weights.swing, program)
+    turn = -kd * state.kinematics.velocity[link, 0]
+    add_task(on.rows, 2, turn - on.shift[2], weights.angle, program)
+
+
+@kernel
 def want_posture(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
     memory: Memory,
@@ -230,7 +286,8 @@ def want_posture(
     for i in range(robot.nu):
         table = reference.joints[memory.stance, :, i]
         wanted = curvature_at(table, phase) * rate * rate
-        wanted += parameters.joint_kp * (value_at(table, phase) - state.joint_position[i])
+        if memory.stands == 0:
+            wanted += parameters.joint_kp * (value_at(table, phase) - state.joint_position[i])
         speed = slope_at(table, phase) * rate
         wanted += damping * parameters.joint_kd * (speed - state.joint_velocity[i])
         program.hessian[i, i] += weight
@@ -245,7 +302,7 @@ def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory)
     A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v.
     """
     legs, program, stiffness = parameters.legs, memory.program, parameters.knee_kp
-    least = parameters.straight_knee + memory.alarm * (parameters.knee - parameters.straight_knee)
+    least = parameters.straight_knee + memory.alarm * (parameters.bent_knee - parameters.straight_knee)
     for foot in range(2):
         knee, sign = legs.knee[foot], legs.bend[foot]
         bent = sign * (state.joint_position[knee] - legs.straight[foot])
@@ -268,7 +325,11 @@ def keep_balance(
     exchange_at_touchdown(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
     landed = has_landed(t, state, contacts, robot, parameters.settling, memory)
-    decide(t, landed, parameters, memory)
+    stand_or_walk(t, parameters, memory)
+    if memory.stands == 1:
+        stay(t, parameters, memory)
+    else:
+        decide(t, landed, parameters, memory)
     stance, on, program = memory.stance, memory.on, memory.program
     link = robot.foot_link[stance]
     tilt = state.kinematics.angle[link] - parameters.legs.angle[stance]
@@ -279,7 +340,10 @@ def keep_balance(
     damping = 1.0 if landed else 0.0
     want_height(state, robot, parameters, damping, memory)
     want_trunk(state, robot, parameters, damping, memory)
-    want_foothold(state, robot, parameters, damping, memory)
+    if memory.stands == 1:
+        want_rest(state, robot, parameters, memory)
+    else:
+        want_foothold(state, robot, parameters, damping, memory)
     want_posture(state, robot, parameters, damping, memory)
     add_contact(parameters, tilt, on, program)
     add_motors(robot, state, on, program)

@@ -19,9 +19,8 @@ class Weights(Bundle):
         Centre of pressure (1/m²).
     height, swing : float
         Accelerations of hip and swing foot (s⁴/m²).
-    pitch, angle, posture, knee : float
-        Those of trunk, swing foot, joints and of a knee that is straighter than it should be
-        (s⁴/rad²).
+    pitch, angle, posture : float
+        Those of trunk, swing foot and joints (s⁴/rad²).
     torque : float
         Torques (1/(N m)²).
     """
@@ -32,7 +31,6 @@ class Weights(Bundle):
     pitch: float = number(float)
     angle: float = number(float)
     posture: float = number(float)
-    knee: float = number(float)
     torque: float = number(float)
 
 
@@ -76,14 +74,16 @@ class Parameters(Bundle):
         The gait, how landings are planned, how much tasks count, the legs.
     adapts : int
         Whether foothold and time are adapted; otherwise they are the gait's.
-    length : float
-        Step that is wanted (m).
+    speed : float
+        That is wanted (m/s); zero to stop and stand.
     kp, kd : float
         Gains of hip and trunk (1/s², 1/s).
     foot_kp, foot_kd : float
         Gains of the swing foot's height and angle.
     joint_kp, joint_kd : float
         Gains of the posture.
+    knee_kp : float
+        How hard a knee is kept from straightening too far (1/s²).
     friction : float
         That the ground is believed to have.
     least_force : float
@@ -99,15 +99,19 @@ class Parameters(Bundle):
         and from which on balance is all that counts.
     calming : float
         Time constant in which an alarm fades (s).
-    crouch, lift, knee : float
-        How much lower the hip, how much higher the swing foot is when alarmed (m), and how far a
-        knee stays bent then (rad).
+    crouch, lift : float
+        How much lower the hip, how much higher the swing foot is when alarmed (m).
+    bent_knee, straight_knee : float
+        How far a knee stays bent when alarmed, and otherwise (rad).
     slow, fast : float
         Speeds at which a late foot looks for the ground (m/s), first and after `search`.
     haste : float
         The swing foot is not brought to its foothold in less than this (s).
     search, smoothing : float
         That time, and the one in which the reference's clock follows new plans (s).
+    hold : float
+        A robot that stands takes a step if its capture point is farther from the middle of its sole
+        than this (m).
     """
 
     reference: Reference = part(Reference)
@@ -115,13 +119,14 @@ class Parameters(Bundle):
     weights: Weights = part(Weights)
     legs: Legs = part(Legs)
     adapts: int = number(int)
-    length: float = number(float)
+    speed: float = number(float)
     kp: float = number(float)
     kd: float = number(float)
     foot_kp: float = number(float)
     foot_kd: float = number(float)
     joint_kp: float = number(float)
     joint_kd: float = number(float)
+    knee_kp: float = number(float)
     friction: float = number(float)
     least_force: float = number(float)
     weight: float = number(float)
@@ -132,14 +137,14 @@ class Parameters(Bundle):
     calming: float = number(float)
     crouch: float = number(float)
     lift: float = number(float)
-    knee: float = number(float)
+    bent_knee: float = number(float)
     straight_knee: float = number(float)
-    knee_kp: float = number(float)
     slow: float = number(float)
     fast: float = number(float)
     haste: float = number(float)
     search: float = number(float)
     smoothing: float = number(float)
+    hold: float = number(float)
 
 
 class Memory(Bundle):
@@ -153,6 +158,8 @@ class Memory(Bundle):
         When its step began, and the last call (s).
     landed : int
         Whether it is past the impact that made it the stance foot.
+    stands : int
+        Whether the robot stands on both feet.
     phase, rate : float
         Where in the step the reference is, and how fast it moves (1/s).
     late : float
@@ -179,6 +186,7 @@ class Memory(Bundle):
     start: float = cell(float)
     time: float = cell(float)
     landed: int = cell(int)
+    stands: int = cell(int)
     phase: float = cell(float)
     rate: float = cell(float)
     late: float = cell(float)
