@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +126,29 @@ def test_how_a_file_is_read(tmp_path: Path) -> None:
     assert told["coordinates"][:3] == ["root_x", "root_z", "root_pitch"]
     knee = told["coordinates"].index("left_knee")
     assert told["reference"][knee] == pytest.approx(np.deg2rad(23.0))
+
+
+def test_files_of_packages_and_unequal_legs(tmp_path: Path) -> None:
+    """A model that the robot includes from elsewhere; legs that are made alike."""
+    (tmp_path / "shelf" / "bravo").mkdir(parents=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of its outline
+        part = load_robot("bravo7").save(tmp_path / "shelf" / "bravo" / "model.sdf")
+    text = part.read_text("utf-8")
+    mass = re.search("<mass>([^<]+)</mass>", text[text.index('<link name="left_thigh"') :])
+    assert mass is not None
+    heavier = text.replace(mass[0], f"<mass>{1.01 * float(mass[1])!r}</mass>", 1)
+    part.write_text(heavier, "utf-8")
+    path = tmp_path / "robot.sdf"
+    path.write_text(
+        '<sdf version="1.9"><model name="whole"><include merge="true"><uri>model://bravo</uri>'
+        "</include></model></sdf>",
+        "utf-8",
+    )
+    assert "not there" in CliRunner().invoke(app, ["inspect", str(path)]).stderr
+    there = ["inspect", str(path), "--json", "--package-path", str(tmp_path / "shelf")]
+    assert not json.loads(CliRunner().invoke(app, there).stdout)["symmetric"]
+    assert json.loads(CliRunner().invoke(app, [*there, "--mirror"]).stdout)["symmetric"]
 
 
 def _inspect(*arguments: str, encoding: str) -> subprocess.CompletedProcess[bytes]:

@@ -30,7 +30,16 @@ def test_options_that_all_of_them_have(command: str) -> None:
     """With the ground's kinds whole, however narrow the terminal is."""
     result = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "200"})
     assert result.exit_code == 0
-    for option in ("floating", "projected", "forward", "pose", "ground", "push"):
+    for option in (
+        "floating",
+        "projected",
+        "forward",
+        "pose",
+        "mirror",
+        "package-path",
+        "ground",
+        "push",
+    ):
         assert f"--{option} " in result.stdout
     assert "FILE|flat|slope:-3|stairs:0.02x0.3|rough:0.01:7" in result.stdout
 

@@ -12,11 +12,13 @@ import typer
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     AsJson,
+    Averaged,
     Debug,
     Floating,
     Forward,
     Friction,
     OnGround,
+    Packages,
     Pose,
     Projected,
     Pushed,
@@ -71,6 +73,8 @@ def compare(
     projected: Projected = False,
     forward: Forward = None,
     pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
     ] = Path("compare"),
@@ -85,7 +89,9 @@ def compare(
 
     surface = ground_called(ground, friction=friction, restitution=restitution)
     pushes = pushes_called(push)
-    machine = hs.load_robot(robot, **reading(floating, projected, forward, pose))
+    machine = hs.load_robot(
+        robot, **reading(floating, projected, forward, pose, mirror, package_path)
+    )
     for each in pushes:
         each.place(machine)
     ways = method or [way for way in Way if not way.startswith("paper")]

@@ -12,10 +12,12 @@ from rich.text import Text
 
 from heelstrike.cli.options import (
     AsJson,
+    Averaged,
     Debug,
     Floating,
     Forward,
     OnGround,
+    Packages,
     Pose,
     Projected,
     Pushed,
@@ -51,6 +53,8 @@ def inspect(
     projected: Projected = False,
     forward: Forward = None,
     pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
@@ -66,7 +70,9 @@ def inspect(
         raise typer.BadParameter(
             "ground and pushes are drawn: say into which file", param_hint="--out"
         )
-    inspection = inspect_robot(robot, **reading(floating, projected, forward, pose))
+    inspection = inspect_robot(
+        robot, **reading(floating, projected, forward, pose, mirror, package_path)
+    )
     look_at(inspection, picture, as_json=as_json, ground=surface, pushes=pushes)
     if not inspection.sound:
         raise typer.Exit(FOUND)

@@ -33,7 +33,9 @@ class Way(StrEnum):
 
 RobotName = Annotated[
     str,
-    typer.Argument(help="A built-in robot, or an MJCF or URDF file.", autocompletion=_built_in),
+    typer.Argument(
+        help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=_built_in
+    ),
 ]
 Floating = Annotated[
     bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
@@ -44,6 +46,20 @@ Projected = Annotated[
 Forward = Annotated[
     Way | None,
     typer.Option(help="Where the robot looks in its file.", show_default="the plane it moves in"),
+]
+Averaged = Annotated[
+    bool, typer.Option("--mirror", help="Make left and right equal, which nearly are.")
+]
+Packages = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--package-path",
+        exists=True,
+        file_okay=False,
+        help="Folder of ROS packages or Gazebo models, for files that the robot names; repeat the "
+        "option for more.",
+        show_default="around the file",
+    ),
 ]
 Pose = Annotated[
     list[str] | None,
@@ -82,13 +98,22 @@ Debug = Annotated[
 
 
 def reading(
-    floating: bool, projected: bool, forward: Way | None, pose: list[str] | None
+    floating: bool,
+    projected: bool,
+    forward: Way | None,
+    pose: list[str] | None,
+    averaged: bool,
+    packages: list[Path] | None,
 ) -> LoadOptions:
     """Return how a robot's file is to be read."""
-    way = None if forward is None else forward.value
     return {
-        "floating": floating, "projected": projected, "forward": way, "pose": pose_called(pose)
-    }  # fmt: skip
+        "floating": floating,
+        "projected": projected,
+        "forward": None if forward is None else forward.value,
+        "pose": pose_called(pose),
+        "mirror": "average" if averaged else None,
+        "package_path": packages or (),
+    }
 
 
 def method_called(name: str, step: float, *, passive: bool = False) -> Method:

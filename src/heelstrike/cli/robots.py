@@ -19,7 +19,8 @@ def robots(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="A built-in robot, or an MJCF or URDF file, to see in detail.", show_default=False
+            help="A built-in robot, or an MJCF, URDF or SDF file, to see in detail.",
+            show_default=False,
         ),
     ] = None,
     picture: Annotated[

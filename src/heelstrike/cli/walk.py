@@ -11,11 +11,13 @@ import typer
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     AsJson,
+    Averaged,
     Debug,
     Floating,
     Forward,
     Friction,
     OnGround,
+    Packages,
     Pose,
     Projected,
     Pushed,
@@ -115,6 +117,8 @@ def walk(
     projected: Projected = False,
     forward: Forward = None,
     pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
     out: Annotated[
         Path,
         typer.Option(file_okay=False, help="For the results; those of an earlier walk go."),
@@ -138,7 +142,9 @@ def walk(
 
         # All that is cheap to refuse is refused before anything that takes long.
         surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
-        machine = load_robot(robot, **reading(floating, projected, forward, pose))
+        machine = load_robot(
+            robot, **reading(floating, projected, forward, pose, mirror, package_path)
+        )
         for each in pushes:
             each.place(machine)
         through = _through_time(method, scheme, step, passive=not machine.nu)

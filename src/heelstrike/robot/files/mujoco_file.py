@@ -168,7 +168,7 @@ def _screened(source: Path | str, options: Options, label: str) -> Screened:
     written = source
     if options.arguments is not None and isinstance(source, Path):
         written = expanded(source, options.arguments, options.packages, label)
-    file = screen(written, label)
+    file = screen(written, label, options.packages)
     if file.xml.tag != "sdf":
         return file
     directory = source.parent if isinstance(source, Path) else Path()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from urllib.parse import unquote
@@ -10,6 +11,9 @@ from urllib.parse import unquote
 DEEPEST_FOLDER = 40  # most folders in the path of a file, and above a robot file
 DEEPEST_PACKAGE = 3  # folders below one of ROS_PACKAGE_PATH in which packages are sought
 MOST_FOLDERS = 2000  # that are looked into for one package
+
+LONGEST_CONFIGURATION = 100_000  # letters of a model.config
+_SDF_FILE = re.compile(r"<sdf[^>]*>\s*([\w.-]+)\s*</sdf>")
 
 _SCHEMES = ("package://", "model://", "file://")
 
@@ -57,6 +61,45 @@ def find_package(name: str, directory: Path, packages: Sequence[Path]) -> Path |
         Folders of packages, or that hold such, which are sought first.
     """
     return next((p for p in _package_folders(name, directory, packages) if p.is_dir()), None)
+
+
+def find_model(name: str, directory: Path, packages: Sequence[Path]) -> Path | None:
+    """Return the SDF file that the address of a model means, None if it is not there.
+
+    Parameters
+    ----------
+    name : str
+        A file, or the folder of a model, whose ``model.config`` names its file; a path, or an
+        address that begins with model://, package:// or file://.
+    directory : Path
+        Folder of the file that names it.
+    packages : sequence of Path
+        Folders of models, or that hold such, which are sought first.
+    """
+    file = find_file(name, directory, packages)
+    if file is not None:
+        return file
+    plain = name.removeprefix("model://").removeprefix("file://").replace("\\", "/").strip("/")
+    if not plain or "\0" in plain or len(Path(plain).parts) > DEEPEST_FOLDER:
+        return None
+    folder = directory / plain
+    if not _is_file(folder / "model.sdf") and not _is_file(folder / "model.config"):
+        found = None if "/" in plain else find_package(plain, directory, packages)
+        if found is None:
+            return None
+        folder = found
+    named = _SDF_FILE.search(_text(folder / "model.config"))
+    path = folder / (named[1] if named else "model.sdf")
+    return path if _is_file(path) else None
+
+
+def _text(path: Path) -> str:
+    """Beginning of a small file, nothing where there is none."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return file.read(LONGEST_CONFIGURATION)
+    except (OSError, ValueError):
+        return ""
 
 
 def _package_folders(name: str, directory: Path, packages: Sequence[Path]) -> Iterator[Path]:

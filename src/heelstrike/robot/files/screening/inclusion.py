@@ -7,12 +7,13 @@ or the same one again and again.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.files.packages import find_model
 from heelstrike.robot.files.screening.xml_tree import MOST_ELEMENTS, Node, xml_tree
 
 LARGEST_FILE = 16 * 2**20
@@ -40,6 +41,8 @@ class Reading:
         How much has been read, repetitions included.
     models : dict of str to Node
         The other models (``<asset><model>``) of the robot, by names for the parser's eyes.
+    packages : sequence of Path
+        Folders of packages and models, or that hold such.
     """
 
     label: str
@@ -47,6 +50,7 @@ class Reading:
     characters: int = 0
     elements: int = 0
     models: dict[str, Node] = field(default_factory=dict)
+    packages: Sequence[Path] = ()
 
 
 @dataclass(frozen=True)
@@ -118,14 +122,15 @@ def _tree(text: str, label: str, place: Place, reading: Reading) -> Node:
     if "\0" in text:
         raise RobotError(f"{label}: this is not a text file; MJCF and URDF are XML text.")
     root = xml_tree(text, label)
+    if root.tag.lower() == "robot":
+        return root  # it includes nothing of this kind
     # MuJoCo takes <INCLUDE> for <include>.
     parents = [e for e in root.iter() if any(c.tag.lower() == "include" for c in e)]
-    if root.tag.lower() in ("robot", "sdf"):
-        return root  # they include nothing of this kind
+    put = _included_models if root.tag == "sdf" else _included
     for parent in parents:
         for index in range(len(parent) - 1, -1, -1):
             if parent[index].tag.lower() == "include":
-                parent[index : index + 1] = _included(parent[index], label, place, reading)
+                parent[index : index + 1] = put(parent[index], label, place, reading)
     return root
 
 
@@ -143,19 +148,61 @@ def _included(include: Element, label: str, place: Place, reading: Reading) -> l
             "and beside the one that includes it."
         )
     root = _below(path, f"{reading.label}: included {path}", where, place, reading)
+    if not len(root):
+        raise RobotError(f"{where}: the file {name!r} has nothing in it. Remove the <include>.")
+    _join(root, path, line, where, reading)
+    return list(root)
+
+
+def _included_models(include: Element, label: str, place: Place, reading: Reading) -> list[Element]:
+    """Return the model that an SDF file means by an ``<include>``, with the name and place there.
+
+    One that is nowhere, of a world's ground or sun, stays as it is.
+    """
+    line = getattr(include, "line", 0)
+    where = f"{label}: line {line}: <include>"
+    address = (include.findtext("uri") or "").strip()
+    path = find_model(address, place.own, reading.packages)
+    if path is None:
+        return [include]
+    root = _below(path, f"{reading.label}: included {path}", where, place, reading)
+    models = root.findall("model")
+    if root.tag != "sdf" or len(models) != 1:
+        raise RobotError(f"{where}: {path.name} is no SDF file of one <model>.")
+    _join(root, path, line, where, reading)
+    if root.get("version", "1.7") in ("1.2", "1.3", "1.4"):
+        raise RobotError(
+            f"{where}: {path.name} is of SDF version {root.get('version')}, in which axes mean "
+            "something else. Gazebo's `gz sdf -p` writes a newer one."
+        )
+    (model,) = models
+    for tag in ("pose", "static"):
+        given = include.find(tag)
+        if given is not None:
+            for old in model.findall(tag):
+                model.remove(old)
+            model.insert(0, given)
+    if include.find("pose") is not None:
+        model.attrib.pop("placement_frame", None)
+    changes = {tag: (include.findtext(tag) or "").strip() for tag in ("name", "placement_frame")}
+    model.attrib.update({name: value for name, value in changes.items() if value})
+    if isinstance(model, Node):
+        model.merged = include.get("merge") in ("true", "1")
+    return [model]
+
+
+def _join(root: Element, path: Path, line: int, where: str, reading: Reading) -> None:
+    """Count what a file adds to a robot, and let it stand on the line that brought it."""
     reading.elements += sum(1 for _ in root.iter())
     if reading.elements > MOST_ELEMENTS:
         raise RobotError(
             f"{where}: with what it includes, the robot has more than {MOST_ELEMENTS} elements, "
             "which no robot needs."
         )
-    if not len(root):
-        raise RobotError(f"{where}: the file {name!r} has nothing in it. Remove the <include>.")
     for element in root.iter():
         if isinstance(element, Node):
             element.line = line
             element.folder = element.folder or path.parent
-    return list(root)
 
 
 def _below(path: Path, label: str, where: str, place: Place, reading: Reading) -> Node:

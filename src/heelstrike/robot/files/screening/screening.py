@@ -9,6 +9,7 @@ parser at all. Everything else is left to MuJoCo, whose messages name line and e
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -94,7 +95,7 @@ class _Weight(NamedTuple):
     depth: int
 
 
-def screen(source: Path | str, label: str) -> Screened:
+def screen(source: Path | str, label: str, packages: Sequence[Path] = ()) -> Screened:
     """Refuse what is no robot file, or one that would hurt the machine.
 
     Parameters
@@ -103,6 +104,8 @@ def screen(source: Path | str, label: str) -> Screened:
         Path of the file, or the XML text itself.
     label : str
         What to call it in messages.
+    packages : sequence of Path
+        Folders of models that an SDF file may include, or that hold such.
 
     Returns
     -------
@@ -114,7 +117,7 @@ def screen(source: Path | str, label: str) -> Screened:
     RobotError
         With the file and what to do about it.
     """
-    reading = Reading(label)
+    reading = Reading(label, packages=packages)
     root, place, text = read_tree(source, reading)
     if root.tag not in ("mujoco", "robot", "sdf"):
         raise RobotError(

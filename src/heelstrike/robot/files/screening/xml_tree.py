@@ -40,11 +40,14 @@ class Node(Element):
         Folder of the file that it was included from, None if it is in the main file.
     mended : bool
         Whether the text had to be changed to be read.
+    merged : bool
+        Whether it is an SDF model that becomes a part of the one that includes it.
     """
 
     line = 0
     folder: Path | None = None
     mended = False
+    merged = False
 
 
 def xml_tree(text: str, label: str) -> Node:

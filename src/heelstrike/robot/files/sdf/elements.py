@@ -161,6 +161,14 @@ def transform(element: Element | None, label: str) -> Floats:
     return result
 
 
+def inverse(place: Floats) -> Floats:
+    """Return the pose that undoes another."""
+    result = np.eye(4)
+    result[:3, :3] = place[:3, :3].T
+    result[:3, 3] = -place[:3, :3].T @ place[:3, 3]
+    return result
+
+
 def rotation(roll: float, pitch: float, yaw: float) -> Floats:
     """Return the matrix of a rotation about the fixed axes x, y, z, in this order."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in (roll, pitch, yaw))

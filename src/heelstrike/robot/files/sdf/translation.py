@@ -22,6 +22,7 @@ from heelstrike.robot.files.sdf.elements import (
     Floats,
     check,
     error,
+    inverse,
     number,
     numbers,
     transform,
@@ -29,6 +30,7 @@ from heelstrike.robot.files.sdf.elements import (
     word,
 )
 from heelstrike.robot.files.sdf.frames import MODEL, WORLD, Frames, frames_of
+from heelstrike.robot.files.sdf.nesting import JOINTS, flat
 from heelstrike.robot.warning import warn
 
 HINGES, SLIDES = ("revolute", "continuous"), ("prismatic",)
@@ -89,7 +91,7 @@ def as_mjcf(sdf: Node, directory: Path, packages: Sequence[Path], label: str) ->
     RobotWarning
         Of what is left out, and of what SDF assumes where the file says nothing.
     """
-    element = _the_model(sdf, label)
+    element = flat(_the_model(sdf, label), label)
     strange = list(check(element, label))
     if strange:
         more = f"; and {len(strange) - SHOWN} more" if len(strange) > SHOWN else ""
@@ -97,13 +99,13 @@ def as_mjcf(sdf: Node, directory: Path, packages: Sequence[Path], label: str) ->
     joints = [
         _of_drake(child) if child.tag == "drake:joint" else child
         for child in element
-        if child.tag in ("joint", "drake:joint")
+        if child.tag in JOINTS
     ]
     frames = frames_of(element, joints, label)
     placed: Floats = transform(element.find("pose"), label)
     if element.get("placement_frame"):
-        placed = placed @ _inverse(frames.pose(element.get("placement_frame", ""), element))
-    frames.found[WORLD] = _inverse(placed)
+        placed = placed @ inverse(frames.pose(element.get("placement_frame", ""), element))
+    frames.found[WORLD] = inverse(placed)
     root = Node("mujoco", {"model": element.get("name", "") or "robot"})
     root.line = getattr(sdf, "line", 0)
     _put(root, sdf, "compiler", angle="radian", autolimits="true", strippath="false")
@@ -128,15 +130,12 @@ def _the_model(sdf: Node, label: str) -> Element:
     moving = [model for model in models if not truth(model, "static", label)]
     if len(moving) != 1:
         names = ", ".join(repr(model.get("name", "")) for model in moving) or "none"
+        missing = [word(each, "uri") for each in sdf.iter("include")]
+        sought = f" Not found, so not read: {', '.join(missing)[:200]}." if missing else ""
         raise RobotError(
             f"{label}: a robot is the one <model> of an SDF file that is not static; here are "
-            f"{names}. Keep one, and put its parts into it."
+            f"{names}. Keep one, and put its parts into it.{sought}"
         )
-    for tag in ("include", "model"):
-        nested = moving[0].find(tag)
-        if nested is not None:
-            raise error(nested, label, f"<{tag}> in a <model> is not read. Put the links and "
-                        "joints of that model in its place.")  # fmt: skip
     return moving[0]
 
 
@@ -217,10 +216,10 @@ def _write_tree(model: _Model, element: Element, joints: list[Element], world: N
 def _below(model: _Model, link: str, joint: Element | None, parent: str) -> Floats:
     """Pose of a link in the link (or world) that it hangs on."""
     pose, asking = model.frames.pose, model.frames.given[link][0]
-    above = _inverse(pose(parent, asking))
+    above = inverse(pose(parent, asking))
     if joint is not None and joint.get("type") == PLANAR:
         # Drake's joints begin where the two frames that they connect are one.
-        child = _inverse(pose(word(joint, "child"), joint)) @ pose(link, asking)
+        child = inverse(pose(word(joint, "child"), joint)) @ pose(link, asking)
         return above @ pose(word(joint, "parent"), joint) @ child
     return above @ pose(link, asking)
 
@@ -306,7 +305,7 @@ def _shape_pose(model: _Model, collision: Element, link: str) -> Floats:
     if base:
         frames = model.frames
         there = frames.pose(base, collision)
-        place = _inverse(frames.pose(link, collision)) @ there @ place
+        place = inverse(frames.pose(link, collision)) @ there @ place
     return place
 
 
@@ -322,7 +321,8 @@ def _sizes(shape: Element, tag: str, count: int, label: str) -> Floats:
 
 
 def _mesh(model: _Model, shape: Element, link: str) -> dict[str, str]:
-    file = find_file(word(shape, "uri"), model.directory, model.packages)
+    folder = getattr(shape, "folder", None) or model.directory
+    file = find_file(word(shape, "uri"), folder, model.packages)
     if file is None or not is_mesh(file) or shape.find("submesh") is not None:
         model.tell(
             "collision meshes that are not where the file says, or none that MuJoCo reads (binary "
@@ -341,7 +341,7 @@ def _mesh(model: _Model, shape: Element, link: str) -> dict[str, str]:
 
 def _write_joint(model: _Model, joint: Element, link: str, body: Node, sense: float) -> None:
     kind, name = joint.get("type", ""), joint.get("name", "")
-    here = _inverse(model.frames.pose(link, joint))
+    here = inverse(model.frames.pose(link, joint))
     place: Floats = here @ model.frames.of_joint(joint)
     if kind in HINGES or kind in SLIDES:
         _write_axis(model, joint, joint.find("axis"), name, body, here, place, sense)
@@ -423,14 +423,6 @@ def _direction(model: _Model, axis: Element, here: Floats, place: Floats) -> Flo
         place = here @ model.frames.pose(MODEL, axis)
     direction: Floats = place[:3, :3] @ given
     return direction / np.linalg.norm(direction)
-
-
-def _inverse(place: Floats) -> Floats:
-    """Return the pose that undoes another."""
-    result = np.eye(4)
-    result[:3, :3] = place[:3, :3].T
-    result[:3, 3] = -place[:3, :3].T @ place[:3, 3]
-    return result
 
 
 def _placed(place: Floats) -> dict[str, str]:

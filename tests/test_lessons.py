@@ -1,0 +1,39 @@
+"""The lessons and the gallery run from top to bottom, and what they say comes out.
+
+Cells that carry the tag `check` hold what is asserted of the figures in the text; pages leave them
+out.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+LESSONS = sorted((ROOT / "docs" / "lessons").glob("*.ipynb"))
+GALLERY = ROOT / "docs" / "gallery.ipynb"
+
+
+@pytest.mark.filterwarnings("ignore:stick_slip. numbers that are unlikely")
+@pytest.mark.parametrize("lesson", [*LESSONS, GALLERY], ids=lambda path: path.stem)
+def test_a_lesson_runs(lesson: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(plt, "show", lambda: None)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for cell in json.loads(lesson.read_text(encoding="utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), f"{lesson.name} {cell['id']}", "exec"), names)
+    plt.close("all")
+
+
+def test_there_are_lessons_in_the_navigation_without_results() -> None:
+    """Pictures come from the build of the pages, so that they are of this version."""
+    navigation = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert len(LESSONS) == 6
+    for lesson in (*LESSONS, GALLERY):
+        assert f"- {lesson.relative_to(ROOT / 'docs').as_posix()}\n" in navigation
+        cells = json.loads(lesson.read_text(encoding="utf-8"))["cells"]
+        assert not any(cell.get("outputs") for cell in cells)
