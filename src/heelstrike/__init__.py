@@ -44,8 +44,14 @@ if TYPE_CHECKING:
     from heelstrike.contact import contact_kinematics as contact_kinematics
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
+    from heelstrike.control import Actuated as Actuated
     from heelstrike.control import ComputedTorque as ComputedTorque
     from heelstrike.control import Encoder as Encoder
+    from heelstrike.control import Encoders as Encoders
+    from heelstrike.control import Estimated as Estimated
+    from heelstrike.control import FootSensors as FootSensors
+    from heelstrike.control import InertialUnit as InertialUnit
+    from heelstrike.control import Sensed as Sensed
     from heelstrike.control import controller as controller
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
@@ -77,6 +83,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
     from heelstrike.sim import Push as Push
     from heelstrike.sim import Run as Run
+    from heelstrike.sim import RunStatus as RunStatus
     from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import Simulation as Simulation
     from heelstrike.sim import Snapshot as Snapshot
@@ -91,6 +98,7 @@ __version__ = "0.1.0"
 # Public name -> the package that defines it. The imports above repeat this for type checkers,
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
+    "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
     "Bundle": "heelstrike.compiler.bundle",
     "Compliant": "heelstrike.sim",
@@ -98,13 +106,17 @@ _HOME = {
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
     "Encoder": "heelstrike.control",
+    "Encoders": "heelstrike.control",
+    "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
+    "FootSensors": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
     "HuntCrossley": "heelstrike.sim",
+    "InertialUnit": "heelstrike.control",
     "InfeasibleGaitError": "heelstrike.errors",
     "KelvinVoigt": "heelstrike.sim",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
@@ -116,7 +128,9 @@ _HOME = {
     "RobotWarning": "heelstrike.robot",
     "Run": "heelstrike.sim",
     "RunFileError": "heelstrike.errors",
+    "RunStatus": "heelstrike.sim",
     "Scheme": "heelstrike.sim",
+    "Sensed": "heelstrike.control",
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 import walking
 from synthetic_runs import liftoff, make_run, touchdown
@@ -67,3 +68,40 @@ def test_nothing_lands(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_points_that_are_not_there(monkeypatch: pytest.MonkeyPatch, feet: list[int]) -> None:
     with pytest.raises(hs.SimulationError, match="from 0 to 3"):
         landing(monkeypatch, [], feet=feet)
+
+
+def test_a_controller_is_called_as_often_as_it_is_to_be() -> None:
+    robot, gait = walking.bravo7(), walking.gait()
+    law = hs.ComputedTorque(robot, gait)
+    coarse = hs.EventDriven(rtol=1e-6, atol=1e-8)
+    ends = [
+        PoincareMap(Section(robot, hs.Ground()), law, coarse, None, None, 2.0, period)(
+            gait.initial_state
+        ).state.v
+        for period in (None, 1e-3, 2e-2)
+    ]
+    near, far = (np.abs(each - ends[0]).max() for each in ends[1:])
+    assert 1e-6 < near < 0.1 * far
+
+
+def test_a_state_of_time_stepping_is_lifted_out_of_the_ground() -> None:
+    robot, ground = walking.bravo7(), hs.Ground(slope=0.1)
+    section = Section(robot, ground)
+    q = robot.reference_state().q
+
+    _, gap, _ = section.contacts(hs.State(q, 0.0 * q))
+    normal = np.array([-section.along[1], section.along[0]])
+
+    def at_depth(depth: float) -> hs.State:
+        placed = q.copy()
+        placed[:2] -= (gap.min() + depth) * normal
+        return hs.State(placed, np.zeros(robot.nv))
+
+    for depth in (5e-6, 9e-5):
+        state = at_depth(depth)
+        lifted = section.lifted(state)
+        _, above, _ = section.contacts(lifted)
+        assert abs(above.min()) < 1e-12
+        assert np.abs((lifted.q - state.q)[:2] @ section.along) < 1e-15
+    deep = at_depth(2e-3)  # that is no penetration of a method: the simulation says so
+    assert section.lifted(deep) is deep

@@ -12,13 +12,14 @@ from heelstrike.analysis.friction import FrictionUse, friction_use
 from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
 from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
+from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.analysis.slip import max_slip, slip_distance
-from heelstrike.analysis.sole import Sole, soles
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
     Stance,
     SupportPhase,
     double_support_fraction,
+    phase_time,
     single_support,
     stances,
     support_phases,
@@ -36,6 +37,7 @@ from heelstrike.analysis.zero_moment_point import (
     zero_moment_point,
     zero_moment_point_limits,
 )
+from heelstrike.robot.sole import Sole, soles
 
 __all__ = [
     "CostOfTransport",
@@ -43,6 +45,7 @@ __all__ = [
     "FrictionUse",
     "LimitCycle",
     "Motion",
+    "Recovery",
     "ReferenceMotion",
     "Sole",
     "Stance",
@@ -60,6 +63,8 @@ __all__ = [
     "friction_use",
     "max_slip",
     "penetration",
+    "phase_time",
+    "recovery",
     "reference_motion",
     "run_motion",
     "single_support",

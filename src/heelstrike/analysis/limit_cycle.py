@@ -82,6 +82,7 @@ def find_limit_cycle(
     *,
     ground: Ground | None = None,
     method: EventDriven | None = None,
+    control_period: float | None = None,
     landing: Sequence[int] | None = None,
     symmetry: Callable[[State], State] | None = None,
     longest_step: float = 3.0,
@@ -97,14 +98,19 @@ def find_limit_cycle(
     robot : Robot
         The robot; its first two coordinates are the world position x, z of one of its points.
     state : State
-        Where to begin, anywhere in a step; the search starts at the first touchdown after it.
+        Where to begin, anywhere in a step; the search starts at the first touchdown after it. A
+        state up to 0.1 mm in the ground, such as time stepping leaves, is lifted out of it.
     controller : object with ``torque(t, state, contacts)``, or None
-        Begins afresh at every touchdown: at time 0, with the memory it starts with.
+        Begins afresh at every touchdown: at time 0, with the memory it starts with. What it
+        remembers from one step to the next is no part of the map.
     ground : Ground
         Flat or sloping ground; ``Ground()`` by default.
     method : EventDriven
         Way through time, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default. Passive walkers
         whose swing foot scuffs need ``swing_feet_pass=True``.
+    control_period : float, optional
+        Seconds between two calls of the controller, whose torques are held between them; counted
+        from every touchdown. By default that of the controller, or it acts continuously.
     landing : sequence of int, optional
         Contact points all of which must have come down to complete a step. By default those of
         either foot if the robot has a mirror image, else any point.
@@ -151,8 +157,8 @@ def find_limit_cycle(
             f"coordinates of {robot.name!r} are not its position x, z"
         )
     section = Section(robot, ground)
-    step = PoincareMap(section, controller, method, landing, symmetry, longest_step)
-    state = step(state).state
+    step = PoincareMap(section, controller, method, landing, symmetry, longest_step, control_period)
+    state = step(state if method.swing_feet_pass else section.lifted(state)).state
     residual = np.inf
     for iteration in range(max_iterations + 1):
         chart = Chart(section, state)

@@ -32,6 +32,8 @@ from heelstrike.sim.whole_run import whole
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+# A state this deep (m) in the ground is lifted out of it: penetration of other methods.
+SHALLOW = 1e-4
 # A contact point is on the ground up to this gap (m), and at rest up to this speed (m/s).
 ON_THE_GROUND = 1e-9
 AT_REST = 1e-8
@@ -80,6 +82,16 @@ class Section:
         _, gap, _ = self.contacts(state)
         _, at_rest = self.standing(state)
         return int(np.argmax(at_rest[:, 0]) if at_rest.any() else np.argmin(gap))
+
+    def lifted(self, state: State) -> State:
+        """Return the state with the robot raised out of the ground, if it is a little in it."""
+        _, gap, _ = self.contacts(state)
+        depth = -float(gap.min(initial=0.0))
+        if not 0.0 < depth <= SHALLOW:
+            return state
+        q = state.q.copy()
+        q[:2] += depth * np.array([-self.along[1], self.along[0]])
+        return State(q, state.v)
 
     def moved_back(self, state: State) -> tuple[State, float]:
         """Return the state with its foothold level with the world's origin, and how far it was."""
@@ -181,6 +193,8 @@ class PoincareMap:
         Relabels the legs after a step.
     longest : float
         Seconds after which a step has failed.
+    control_period : float, optional
+        Seconds between two calls of the controller, counted from the beginning of the step.
 
     Raises
     ------
@@ -196,10 +210,12 @@ class PoincareMap:
         landing: Sequence[int] | None,
         symmetry: Callable[[State], State] | None,
         longest: float,
+        control_period: float | None = None,
     ) -> None:
         robot = section.robot
         self._section = section
         self._controller = controller
+        self._control_period = control_period
         # Only the rows of events are looked at.
         self._method = replace(method, output_period=longest)
         self._longest = longest
@@ -258,6 +274,7 @@ class PoincareMap:
                     duration=duration,
                     method=self._method,
                     ground=self._section.ground,
+                    control_period=self._control_period,
                 )
             )
             down: set[int] = set()

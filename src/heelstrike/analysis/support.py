@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.errors import SimulationError
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.run import Event, Run
 
@@ -229,3 +230,40 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
                 taken.append(stance)
             last = {stance.foot}
     return tuple(taken)
+
+
+def phase_time(run: Run, step: int, phase: float) -> float:
+    """Return when a walk is at a phase of one of its steps: when to push it.
+
+    A simulation that begins in the same way walks in the same way until it is pushed, so that a run
+    without pushes tells when a push shall begin.
+
+    Parameters
+    ----------
+    run : Run
+        A walk.
+    step : int
+        Which step: 0 is the one that begins with the run, 1 begins with the first landing.
+    phase : float
+        Part of the step that has passed, from 0 at one landing to 1 at the next.
+
+    Returns
+    -------
+    float
+        Time in s.
+
+    Raises
+    ------
+    SimulationError
+        If the run has no such step, or the phase is none.
+    """
+    landings = [float(run.time[0]), *(stance.touchdown for stance in walking_steps(run))]
+    if not 0.0 <= phase <= 1.0:
+        raise SimulationError(f"the phase of a step is a number from 0 to 1, got {phase!r}")
+    if not 0 <= step < len(landings) - 1:
+        raise SimulationError(
+            f"there is no step {step!r} in this run: it has {len(landings) - 1} whole steps, the "
+            "first of which is step 0"
+        )
+    begin, end = landings[step : step + 2]
+    return begin + phase * (end - begin)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import Motion, in_world, run_motion
-from heelstrike.analysis.sole import soles
+from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
@@ -16,7 +16,7 @@ def foot_wrenches(run: Run, *, motion: Motion | None = None) -> Floats:
     """Wrench of the ground on each foot, (nt, nf, 3): (f_x, f_z, m_y) in N, N and N m.
 
     Forces act on the robot, in world axes. The moment is about +y and about the foot's reference
-    point, the ankle projected onto the sole (`heelstrike.analysis.sole`): the sum of
+    point, the ankle projected onto the sole (`heelstrike.robot.sole`): the sum of
     z f_x − x f_z over the foot's contact points, (x, z) being measured from that point. Unlike the
     forces of single contact points, the wrench is unique also when the foot lies flat.
 

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.motion import Motion
-from heelstrike.analysis.sole import soles
 from heelstrike.analysis.support import NOTHING, pushing, single_support
 from heelstrike.analysis.wrenches import sole_points
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]

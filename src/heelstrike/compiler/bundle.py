@@ -51,6 +51,8 @@ class Member:
         Whether it holds places in this process, or a part what is another's: nothing to keep.
     flat : bool
         Whether what a part holds is stored under the names of its own members.
+    unit, label : str
+        Of its numbers, and what they are, for those who read them.
     """
 
     role: str
@@ -58,6 +60,8 @@ class Member:
     shape: tuple[str | int, ...] = ()
     address: bool = False
     flat: bool = False
+    unit: str = ""
+    label: str = ""
 
     def prefix(self, name: str) -> str:
         """What the names begin with under which the members of a part are stored."""
@@ -74,7 +78,9 @@ class Member:
         return tuple(map(_parsed, self.shape))
 
 
-def array(*shape: str | int, of: type = float, address: bool = False) -> Any:
+def array(
+    *shape: str | int, of: type = float, address: bool = False, unit: str = "", label: str = ""
+) -> Any:
     """Declare an array of a bundle by its extents.
 
     Parameters
@@ -85,29 +91,33 @@ def array(*shape: str | int, of: type = float, address: bool = False) -> Any:
         ``float`` or ``int``.
     address : bool
         Whether it holds places in this process, which are not to be kept.
+    unit, label : str
+        Of its numbers, and what they are: what a log is recorded with.
 
     Returns
     -------
     Member
         What the class of the bundle makes a member of.
     """
-    return Member("array", of, shape, address)
+    return Member("array", of, shape, address, unit=unit, label=label)
 
 
-def cell(of: type) -> Any:
+def cell(of: type, *, unit: str = "", label: str = "") -> Any:
     """Declare a number of a bundle that kernels may change.
 
     Parameters
     ----------
     of : type
         ``float`` or ``int``.
+    unit, label : str
+        Its unit, and what it is: what a log is recorded with.
 
     Returns
     -------
     Member
         What the class of the bundle makes a member of.
     """
-    return Member("cell", of)
+    return Member("cell", of, unit=unit, label=label)
 
 
 def number(of: type) -> Any:
@@ -414,6 +424,29 @@ class Bundle:
             elif member.role == "array" and not member.address:
                 yield prefix + name, getattr(self, name)
 
+    def views(self, prefix: str = "") -> Iterator[tuple[str, Member, np.ndarray[Any, Any]]]:
+        """Yield all its numbers by name, those of a cell as an array of no dimension.
+
+        Parameters
+        ----------
+        prefix : str
+            What the names begin with.
+
+        Yields
+        ------
+        tuple of str, Member and array
+            Name, what is declared of it, and what it holds, not copied.
+        """
+        cells, place = self.__dict__["_cells"], 0
+        for name, member in self.declared.items():
+            if member.role == "part":
+                yield from getattr(self, name).views(prefix + member.prefix(name))
+            elif member.role == "array":
+                yield prefix + name, member, getattr(self, name)
+            elif member.role == "cell":
+                yield prefix + name, member, cells[place : place + 1].view(member.dtype).reshape(())
+                place += 1
+
     def stored(
         self: _Some,
         place: Callable[[str, np.ndarray[Any, Any]], np.ndarray[Any, Any]],
@@ -589,7 +622,9 @@ def _plan(cls: Any, given: frozenset[str], sizes: tuple[tuple[str, int], ...]) -
 @lru_cache
 def _settable(cls: Any) -> Any:
     numbers = {
-        name: cell(member.kind) for name, member in cls.declared.items() if member.role == "number"
+        name: cell(member.kind, unit=member.unit, label=member.label)
+        for name, member in cls.declared.items()
+        if member.role == "number"
     }
     return type(cls.__name__, (cls,), {"__module__": cls.__module__, **numbers})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from heelstrike.dynamics.inverse_kinematics import leg_joints
 from heelstrike.dynamics.queries.equations_of_motion import (
     applied_force,
     bias_force,
@@ -14,6 +15,7 @@ from heelstrike.dynamics.queries.equations_of_motion import (
     mass_matrix,
     passive_force,
 )
+from heelstrike.dynamics.queries.inverse_kinematics import LegPose, inverse_kinematics
 from heelstrike.dynamics.queries.linearization import Linearization, linearize
 from heelstrike.dynamics.queries.momenta import (
     angular_momentum,
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CasadiDynamics",
+    "LegPose",
     "Linearization",
     "LinkPoses",
     "LinkVelocities",
@@ -70,7 +73,9 @@ __all__ = [
     "gravity_force",
     "integrate",
     "inverse_dynamics",
+    "inverse_kinematics",
     "kinetic_energy",
+    "leg_joints",
     "linearize",
     "link_poses",
     "link_velocities",

@@ -414,3 +414,35 @@ def state_equations(
     mass_matrix(model, tree, matrix)
     factorize(model, matrix, factor)
     bias_force(model, tree, bias)
+
+
+@kernel
+def center_of_mass_jacobian(model: Model, work: Workspace, jacobian: Floats) -> None:
+    """Jacobian (axes, nv) of the centre of mass: linear momentum per unit velocity, over mass."""
+    mass, _, _ = first_moments(model, work)
+    composite_inertias(model, work)
+    for i in range(model.nv):
+        px, pz = linear_momentum_of(work.composite, i, spatial(work.motion, i))
+        jacobian[0, i] = px / mass
+        jacobian[1, i] = pz / mass
+
+
+@kernel
+def center_of_mass_bias_acceleration(model: Model, work: Workspace, acceleration: Floats) -> None:
+    """J̇v of :func:`center_of_mass_jacobian`: acceleration of the centre of mass at v̇ = 0.
+
+    The momentum of a link changes at the rate that its own acceleration gives, and is turned with
+    it.
+    """
+    mass = 0.0
+    x = 0.0
+    z = 0.0
+    for i in range(model.nl):
+        motion = spatial(work.velocity, i)
+        px, pz = linear_momentum_of(work.inertia, i, motion)
+        fx, fz = linear_momentum_of(work.inertia, i, spatial(work.bias_acceleration, i))
+        mass = mass + work.inertia[i, 0]
+        x = x + fx + motion[0] * pz
+        z = z + fz - motion[0] * px
+    acceleration[0] = x / mass
+    acceleration[1] = z / mass

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame
+from heelstrike.dynamics.spatial import write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 
@@ -56,6 +57,21 @@ def write_point_rows(
         column = into_frame(normal, velocity_at(work.motion, j, place))
         rows[first, j] = column[0]
         rows[first + 1, j] = column[1]
+        j = model.parent[j]
+
+
+@kernel
+def point_columns(
+    model: Model, work: Workspace, link: int, position: Floats, columns: Floats
+) -> None:
+    """Jacobian (x, z, rotation) of a point of a link, one row a coordinate."""
+    for j in range(model.nv):
+        write(j, (0.0, 0.0, 0.0), columns)
+    place = place_of(work, position)
+    j = link
+    while j >= 0:
+        x, z = velocity_at(work.motion, j, place)
+        write(j, (x, z, work.motion[j, 0]), columns)
         j = model.parent[j]
 
 

@@ -56,3 +56,21 @@ def momentum_of(inertia: Floats, i: int, motion: Spatial) -> Spatial:
     w, vx, vz = motion
     px, pz = linear_momentum_of(inertia, i, motion)
     return inertia[i, 3] * w + inertia[i, 2] * vx - inertia[i, 1] * vz, px, pz
+
+
+@kernel
+def cross(a: Spatial, b: Spatial) -> Spatial:
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def solve_three(a: Spatial, b: Spatial, c: Spatial, right: Spatial) -> Spatial:
+    """Solve [a b c] s = right, three equations with these columns."""
+    bc = cross(b, c)
+    determinant = power(a, bc)
+    return (
+        power(right, bc) / determinant,
+        power(right, cross(c, a)) / determinant,
+        power(right, cross(a, b)) / determinant,
+    )

@@ -35,7 +35,7 @@ from heelstrike.sim.controller.law import CONTROLLER_TYPE
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import center_height, sound
+from heelstrike.sim.record.recording import center_height, note_log, sound
 
 
 class Outcome(enum.IntEnum):
@@ -176,6 +176,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                 code = decide(scene, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
                     report(scene, control, memory, work, record, clock)
+                note_log(control.kept, control.logged, record)
                 if code != DONE:
                     return code
                 if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
@@ -184,6 +185,7 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     return DONE
                 clock.moving = 1
             code = move(scene, control, memory, work, record, clock)
+            note_log(control.kept, control.logged, record)
             if code != DONE:
                 return code
             clock.moving = 0

@@ -10,7 +10,7 @@ the dataset, the files and the figures follow.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -64,6 +65,26 @@ class Quantity:
 def recorded(*shape: str, of: str, unit: str, label: str, later: bool = False) -> Any:
     """Declare a recorded quantity; see :class:`Quantity`."""
     return field(metadata={"quantity": Quantity(shape, of, unit, label, later)})
+
+
+@dataclass(frozen=True, eq=False)
+class Logged:
+    """What a controller told of itself, a value a row.
+
+    Attributes
+    ----------
+    values : (nt, ...) array
+        Values: at every row what it wrote at its last call for good.
+    unit, label : str
+        As its log declares them.
+    extents : tuple of str
+        How the array of a row is declared: ``("nu",)``, ``("2",)``; nothing of a number.
+    """
+
+    values: NDArray[Any]
+    unit: str = ""
+    label: str = ""
+    extents: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -210,6 +231,8 @@ class Run:
         What the controller raised, if that ended the run.
     pushes : tuple of Push
         What pushed the robot.
+    log : mapping of str to Logged
+        What the controller told of itself, by name.
     final : Snapshot or None
         What a simulation goes on from, as if it had not stopped: hand it over as `state`. None of a
         run from a file, or under a controller in Python that takes no part in snapshots.
@@ -266,6 +289,7 @@ class Run:
     timing: Timing
     error: BaseException | None = field(default=None, repr=False)
     pushes: tuple[Push, ...] = ()
+    log: Mapping[str, Logged] = field(default_factory=dict, repr=False)
     final: Snapshot | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
@@ -377,8 +401,11 @@ QUANTITIES: dict[str, Quantity] = {
 """What is recorded, by its name, in the order of rows."""
 
 
-def joined(records: Sequence[Record], since: float) -> dict[str, Any]:
-    """Return the rows and events of consecutive records, from a time on, as fields of a run."""
+def joined(records: Sequence[Record], since: float, log: Bundle) -> dict[str, Any]:
+    """Return the rows and events of consecutive records, from a time on, as fields of a run.
+
+    `log` is the bundle whose numbers the words of the records are.
+    """
 
     def join(member: str, used: str) -> Any:
         return np.concatenate([getattr(part, member)[: getattr(part, used)] for part in records])
@@ -388,7 +415,21 @@ def joined(records: Sequence[Record], since: float) -> dict[str, Any]:
     arrays = {name: join(f"event_{name}", "events") for name in EVENT_MEMBERS}
     order = np.argsort(arrays["time"], kind="stable")
     order = order[arrays["time"][order] >= since]
-    return rows | {"events": events_of(*(values[order] for values in arrays.values()))}
+    events = events_of(*(values[order] for values in arrays.values()))
+    return rows | {"events": events, "log": _logged(join("log", "rows")[first:], log)}
+
+
+def _logged(words: NDArray[np.int64], log: Bundle) -> dict[str, Logged]:
+    """Return the words of rows as what the members of a log held."""
+    found, begin = {}, 0
+    for name, member, values in log.views():
+        end = begin + values.size
+        rows = np.ascontiguousarray(words[:, begin:end]).view(member.dtype)
+        rows = rows.reshape(len(words), *values.shape)
+        extents = tuple(map(str, member.shape))
+        found[name] = Logged(rows, member.unit, member.label, extents)
+        begin = end
+    return found
 
 
 EVENT_MEMBERS = ("time", "kind", "contact", "impulse")

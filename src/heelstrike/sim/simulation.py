@@ -178,6 +178,7 @@ class Simulation:
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
         self.robot, self.method, self._setting = setting.robot, method, setting
+        self._given_period = setting.control_period
         self._ground, self._pushes = setting.ground, setting.pushes
         method.check(setting)
         self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
@@ -442,6 +443,9 @@ class Simulation:
             )
         self._memory.command[:] = torque
         self._clock.answered = 1
+        told = self._numbers.log if isinstance(self._python, AskedLaw) else self._python_log
+        if told is not None:
+            self._logs.log.become(told)
         return ""
 
     @property
@@ -498,7 +502,8 @@ class Simulation:
         rows = self.method.rows_in(clock.until - clock.time, clock.record_every)
         rows = min(CHUNK, rows + clock.row_margin)
         try:
-            record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin)
+            words = self._control.logged.size
+            record = allocate_record(self.robot, rows, 256 + 2 * clock.event_margin, words)
         except MemoryError as error:
             if not self._records:
                 raise SimulationError("there is no memory left to record anything in") from error
@@ -514,22 +519,40 @@ class Simulation:
         """Count the events of a record and forget it."""
         kinds = record.event_kind[: record.events]
         self._event_counts += np.bincount(kinds, minlength=len(EventKind))
-        record.rows = record.events = 0
+        record.rows = record.events = record.logged = 0
 
     def _control_with(self, controller: Controller | None) -> None:
         """Begin with a controller, or stay with the one before if this one cannot be used."""
-        robot, setting, memory, clock = self.robot, self._setting, self._memory, self._clock
+        robot, memory, clock = self.robot, self._memory, self._clock
         law = law_of(controller)
+        setting = self._setting
+        if self._given_period is None:
+            setting = replace(setting, control_period=None if law is None else law.period)
+        elif law is not None and law.keeps_period and setting.control_period != law.period:
+            raise ControllerError(
+                f"controller {law.function.name!r} keeps time by its own period of {law.period} s: "
+                f"leave control_period = {setting.control_period} s out, or make it with that one"
+            )
         python: Any = controller if law is None else None
         if law is not None and controller is not None:
             in_python = setting.checked or not law.function.compiles
             python = AskedLaw(robot, law, checked=setting.checked) if in_python else None
         compiled = Law(no_torque) if law is None or python is not None else law
-        ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts)
+        told = getattr(controller, "log", None) if law is None else None
+        told = told if isinstance(told, Bundle) else None
+        begin = python.numbers.log if isinstance(python, AskedLaw) else told
+        ready = ReadyLaw(robot, compiled, memory.equations.tree, memory.contacts, begin)
+        if self._records and self._records[-1].log.shape[1] != ready.control.logged.size:
+            raise SimulationError(
+                "this controller logs other things than the one before, and rows are recorded: "
+                "begin another simulation with it, from state=simulation.state"
+            )
         self._kernel = compiled.function.finish()
+        voltage = commands_voltage(controller, robot)
+        self.method.set_clock(setting, clock)
+        self._setting, self._logs, self._python_log = setting, ready, told
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
-        voltage = commands_voltage(controller, robot)
         self._control.voltage = voltage
         self._name = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
@@ -546,18 +569,20 @@ class Simulation:
             driven = robot.model.actuator_joint
             speed = robot.model.no_load_speed[driven]
             memory.damping[driven] += robot.model.stall_torque[driven] / speed
-        self.method.set_clock(setting, clock)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
             self._control.in_python = 1
             if setting.control_period is None and self.method.python_period is not None:
                 clock.control_period = self.method.python_period
+        step, every = self.method.step_length, clock.control_every
+        self._numbers.control.robot.period = clock.control_period if step is None else every * step
         # It is due at once, and then at the whole periods, as if it had been called all the time.
         period = clock.control_period
         clock.calls = int(clock.time / period + 1e-9) if period > 0.0 else 0
         clock.answered = 0
-        self._watch = Watch(robot, ready, memory)
+        known = self._numbers.robot
+        self._watch = Watch((robot,) if known is robot else (robot, known), ready, memory)
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course hangs on.
@@ -661,10 +686,12 @@ class Simulation:
             self._pushes, self._ground, self.error = own
             del self._records[len(counts) :]
             for record, (rows, events) in zip(self._records, counts, strict=True):
-                record.rows, record.events = rows, events
+                record.rows, record.events, record.logged = rows, events, rows
 
     @property
     def _can_be_kept(self) -> bool:
+        if isinstance(self._python, AskedLaw):
+            return self._python.takes_part
         return self._python is None or isinstance(self._python, Partaking)
 
     def _decide_last(self) -> tuple[RunStatus, str]:
@@ -696,7 +723,7 @@ class Simulation:
             method=self.method,
             status=status,
             message=message,
-            **joined(self._records, self._recorded_until),
+            **joined(self._records, self._recorded_until, self._logs.log),
             **tallied(self._memory, self.method.solves_with),
             timing=self._timing,
             error=self.error,
@@ -850,7 +877,8 @@ def _place(thing: Any) -> str:
 
 
 def _partaking(controller: Any, name: str) -> Partaking:
-    if not isinstance(controller, Partaking):
+    asked = controller.partner if isinstance(controller, AskedLaw) else None
+    if not isinstance(controller if asked is None else asked, Partaking):
         raise ControllerError(
             f"{name} takes no part in snapshots: give its class methods snapshot(), which returns "
             "an array of numbers, and restore(numbers)"

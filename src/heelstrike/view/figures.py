@@ -53,8 +53,8 @@ def plot(
     what : str
         One of :data:`FIGURES`: ``"tracking"``, ``"velocities"``, ``"zmp"`` and ``"friction"`` are
         the paper's Figures 3 to 6; ``"forces"``, ``"torque"``, ``"gaps"``, ``"energy"``,
-        ``"snapshots"``. Or the name of an array of the run, such as ``"slip_velocity"``, which is
-        drawn as it is.
+        ``"snapshots"``. Or the name of an array of the run, such as ``"slip_velocity"``, or of what
+        its controller logged, which is drawn as it is.
     gait : Gait, optional
         The gait that the run followed; without it no references are drawn.
     path : str or path, optional
@@ -75,8 +75,8 @@ def plot(
     GaitError
         If the gait does not fit the robot of the run.
     """
-    if what not in _DRAWINGS and what not in QUANTITIES:
-        raise ViewError(_unknown(what))
+    if what not in _DRAWINGS and what not in QUANTITIES and what not in run.log:
+        raise ViewError(_unknown(what, tuple(run.log)))
     excerpt = Excerpt(run, _rows(run, span), gait)
     with styled():
         drawing = _DRAWINGS.get(what)
@@ -105,11 +105,11 @@ def _rows(run: Run, span: tuple[float, float] | None) -> slice:
     return slice(int(first), int(last))
 
 
-def _unknown(what: str) -> str:
-    near = difflib.get_close_matches(str(what).lower(), (*FIGURES, *QUANTITIES), n=1)
+def _unknown(what: str, logged: tuple[str, ...]) -> str:
+    near = difflib.get_close_matches(str(what).lower(), (*FIGURES, *QUANTITIES, *logged), n=1)
     guess = f" Did you mean {near[0]!r}?" if near else ""
     names = " ".join(f"{name}: {drawing.__doc__}" for name, drawing in _DRAWINGS.items())
     return (
         f"there is no figure called {what!r}.{guess} There are: {names} And what is recorded: "
-        f"{', '.join(QUANTITIES)}."
+        f"{', '.join((*QUANTITIES, *logged))}."
     )

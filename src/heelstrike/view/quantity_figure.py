@@ -5,23 +5,40 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
-from heelstrike.sim.files.dataset import DIMENSIONS, labels
+from heelstrike.sim.files.dataset import labels
+from heelstrike.sim.files.logs import dimensions
 from heelstrike.sim.run import QUANTITIES
 from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels
 
 
 def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
     """Draw a line for each coordinate, actuator or contact point, a panel for each component."""
-    run, quantity = excerpt.run, QUANTITIES[name]
-    along = [DIMENSIONS[extent] for extent in quantity.shape]
-    names = [labels(run.robot)[dimension] for dimension in along]
+    run = excerpt.run
+    if name in QUANTITIES:
+        quantity = QUANTITIES[name]
+        shape, unit, label, values = (
+            quantity.shape,
+            quantity.unit,
+            quantity.label,
+            getattr(run, name),
+        )
+    else:
+        told = run.log[name]
+        shape, unit, label, values = told.extents, told.unit, told.label or name, told.values
+    known = labels(run.robot)
+    along = dimensions(name, shape)
+    sizes = values.shape[1:]
+    names = [
+        known.get(each, [str(i) for i in range(size)])
+        for each, size in zip(along, sizes, strict=True)
+    ] or [[name]]
     if not names[0]:
         raise ViewError(f"robot {run.robot.name!r} has no {along[0]}s: there is nothing to show")
     components = names[1] if len(names) > 1 else [""]
-    values = getattr(run, name).reshape(len(run.time), len(names[0]), len(components))
+    values = values.reshape(len(run.time), len(names[0]), -1)[:, :, : len(components)]
     panels = [
         Panel(
-            quantity.unit,
+            unit,
             [
                 Curve(values[:, i, k], each.replace("_", " "), {"linewidth": THIN})
                 for i, each in enumerate(names[0])
@@ -31,4 +48,4 @@ def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
         for k, component in enumerate(components)
     ]
     height = 1.2 + 2.6 * len(panels)
-    return draw_panels(excerpt, quantity.label, panels, height=height, legends=False)
+    return draw_panels(excerpt, label, panels, height=height, legends=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from heelstrike.dynamics import kernels
-from heelstrike.dynamics.queries.equations_of_motion import weightless
 from heelstrike.dynamics.queries.evaluation import Evaluation
 from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats
@@ -18,7 +17,8 @@ def center_of_mass(at: Evaluation) -> Floats:
 @of_position("(2, nv) float: Rows x and z, in m and 1.")
 def center_of_mass_jacobian(at: Evaluation) -> Floats:
     """Jacobian of the robot's centre of mass: times v it gives the velocity."""
-    return momentum_matrix.at(at)[:-1] / at.robot.total_mass
+    shape = (at.model.axes, at.model.nv)
+    return at.filled(shape, kernels.center_of_mass_jacobian, at.model, at.work)
 
 
 @of_state("(2,) float: Along x and z, in m/s.")
@@ -30,11 +30,8 @@ def center_of_mass_velocity(at: Evaluation) -> Floats:
 @of_state("(2,) float: Along x and z, in m/s².")
 def center_of_mass_bias_acceleration(at: Evaluation) -> Floats:
     """J̇v of :func:`center_of_mass_jacobian`."""
-    model, work = weightless(at.model), at.work
-    at.filled(at.v.shape, kernels.bias_force, model, work)
-    # The recursion leaves in every link the resultant of its subtree: d'Alembert's forces.
-    rate: Floats = work.force[model.parent < 0, 1:].sum(axis=0) / at.robot.total_mass
-    return rate
+    shape = (at.model.axes,)
+    return at.filled(shape, kernels.center_of_mass_bias_acceleration, at.model, at.work)
 
 
 @of_state("(3,) float: Along x and z in N s, and about +y in N m s.")

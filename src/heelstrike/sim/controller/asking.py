@@ -21,8 +21,11 @@ def ask(
     control: Control, torque: Floats,
 ) -> None:  # fmt: skip
     """Ask a controller for its torques; they are no number if it wrote where it may not."""
+    robot = control.robot
+    robot.trial = 0
     _show(q, v, model, memory, control)
-    _ask(controller, time, control.kept, control.kept_at, control, torque)
+    at = control.kept_at, control.log_at
+    _ask(controller, time, control.kept, at, control, torque)
 
 
 @dissolved_kernel
@@ -33,8 +36,11 @@ def consult(
     """Ask a controller for the torques it would want, were this its next call; it forgets that."""
     for i in range(control.kept.shape[0]):
         control.spare[i] = control.kept[i]
+    robot = control.robot
+    robot.trial = 1
     _show(q, v, model, memory, control)
-    _ask(controller, time, control.spare, control.spare_at, control, torque)
+    at = control.spare_at, control.spare_log_at
+    _ask(controller, time, control.spare, at, control, torque)
 
 
 @dissolved_kernel
@@ -50,15 +56,19 @@ def _show(q: Floats, v: Floats, model: Model, memory: Memory, control: Control) 
         state.joint_velocity[i] = v[joint]
     if control.conduct != TRUSTED:
         _show_copies(memory, control)
+    if control.believes == 1:
+        control.robot.update(state)
 
 
 @dissolved_kernel
 def _ask(
-    controller: Any, time: float, kept: Integers, kept_at: int, control: Control, torque: Floats
-) -> None:
+    controller: Any, time: float, kept: Integers, at: tuple[int, int], control: Control,
+    torque: Floats,
+) -> None:  # fmt: skip
+    memory_at, log_at = at
     controller(
         time, address_of(control.state), address_of(control.contacts), address_of(control.robot),
-        control.parameters_at, kept_at, torque,
+        control.parameters_at, memory_at, log_at, torque,
     )  # fmt: skip
     spoilt = not (intact(torque) and intact(kept) and intact(control.parameters))
     if control.conduct != TRUSTED and not spoilt:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.dynamics.workspace import Workspace
@@ -37,13 +40,17 @@ class Control(Bundle):
     parameters : (n,) int
         Words of its parameters; guarded.
     kept, spare : (m,) int
-        Words of its memory, and of another for the calls that it shall forget; guarded.
+        Words of its memory and log, and of others for the calls that it shall forget; guarded.
     between_parameters, between_kept : int
         Where in these there are guard words.
-    parameters_at, kept_at, spare_at : int
+    logged : (k,) int
+        Where among the words of `kept` those of the log are.
+    parameters_at, kept_at, spare_at, log_at, spare_log_at : int
         Where the tables of the bundles are.
     state, contacts, robot
         What it is shown.
+    believes : int
+        Whether the robot it is shown is another than the one that moves.
     continuous : int
         Whether it acts within the steps too; otherwise its torques are held.
     voltage : int
@@ -59,12 +66,16 @@ class Control(Bundle):
     spare: Integers = array("memory", of=int)
     between_parameters: Integers = array("p", of=int, address=True)
     between_kept: Integers = array("m", of=int, address=True)
+    logged: Integers = array("logged", of=int, address=True)
     parameters_at: int = number(int)
     kept_at: int = number(int)
     spare_at: int = number(int)
+    log_at: int = number(int)
+    spare_log_at: int = number(int)
     state: ControlState = part(ControlState, address=True)
     contacts: Contacts = part(Contacts, address=True)
     robot: ControlledRobot = part(ControlledRobot, address=True)
+    believes: int = number(int)
     continuous: int = cell(int)
     voltage: int = cell(int)
     in_python: int = cell(int)
@@ -72,7 +83,7 @@ class Control(Bundle):
 
 
 class ReadyLaw:
-    """A law made ready for a robot: its numbers and a new memory, guard words round them.
+    """A law made ready for a robot: its numbers, a new memory and log, guard words round them.
 
     Parameters
     ----------
@@ -82,30 +93,41 @@ class ReadyLaw:
         The law.
     tree, contacts : Workspace and Contacts, optional
         Those of the simulation, which stock controllers are shown; others see copies.
+    log : Bundle, optional
+        What the log begins with that a controller in Python keeps; by default that of the law.
 
     Attributes
     ----------
     control : Control
         What loops hand along.
-    parameters, memory : Bundle
-        Its numbers, which may be set, and what it remembers.
+    robot : Robot
+        The robot it is shown: that of the law, if it knows another than the one it controls.
+    parameters, memory, log : Bundle
+        Its numbers, which may be set, what it remembers, and what it tells of itself.
 
     Raises
     ------
     ControllerError
-        If parameters or memory do not fit the robot.
+        If parameters or memory do not fit the robot, or the law knows one that is built otherwise.
     """
 
     def __init__(
         self, robot: Robot, law: Law, tree: Workspace | None = None,
-        contacts: Contacts | None = None,
+        contacts: Contacts | None = None, log: Bundle | None = None,
     ) -> None:  # fmt: skip
-        self._robot, self._law = robot, law
+        believes = believes_in_another(law, robot)
+        self.robot = robot = law.robot if believes and law.robot is not None else robot
+        self._law = law
         extents = extents_of(robot)
         numbers, memory = law.numbers(robot)
+        log = law.new_log(robot) if log is None else log
         self.parameters, parameters, between_parameters = in_one_block(numbers)
-        self.memory, kept, between_kept = in_one_block(memory)
-        self._spare, spare, _ = in_one_block(memory)
+        kinds: tuple[Any, Any] = type(memory), type(log)
+        both: Any = _kept(*kinds)(memory=memory, log=log)
+        both, kept, between_kept = in_one_block(both)
+        self._spare, spare, _ = in_one_block(both)
+        self.memory, self.log = both.memory, both.log
+        places = [_places(values, kept) for _, _, values in self.log.views()]
         shown: dict[str, Any] = {
             "state": ControlState.allocate(extents),
             "contacts": Contacts.allocate(extents),
@@ -113,7 +135,8 @@ class ReadyLaw:
         }
         self._shown: dict[str, Bundle] = {}
         if law.function.is_ours and tree is not None and contacts is not None:
-            shown["state"] = ControlState.allocate(extents, kinematics=tree)
+            if not believes:
+                shown["state"] = ControlState.allocate(extents, kinematics=tree)
             shown["contacts"] = contacts
         else:
             shown = self._shown = {name: guarded_bundle(each) for name, each in shown.items()}
@@ -121,7 +144,9 @@ class ReadyLaw:
             parameters=parameters, kept=kept, spare=spare,
             between_parameters=between_parameters, between_kept=between_kept,
             parameters_at=self.parameters.address, kept_at=self.memory.address,
-            spare_at=self._spare.address, conduct=WATCHED if self._shown else TRUSTED, **shown,
+            spare_at=self._spare.memory.address, log_at=self.log.address,
+            spare_log_at=self._spare.log.address, logged=np.concatenate((*places, _NOWHERE)),
+            believes=believes, conduct=WATCHED if self._shown else TRUSTED, **shown,
         )  # fmt: skip
 
     def set_parameters(self, parameters: Bundle) -> None:
@@ -132,7 +157,7 @@ class ReadyLaw:
         ControllerError
             If they are not such as its own.
         """
-        numbers, _ = self._law.with_parameters(parameters).numbers(self._robot)
+        numbers, _ = self._law.with_parameters(parameters).numbers(self.robot)
         try:
             self.parameters.become(numbers)
         except ValueError as error:
@@ -143,7 +168,48 @@ class ReadyLaw:
 
     def arrays(self) -> Iterator[tuple[str, Any]]:
         """Name the arrays with guard words round them."""
-        bundles = {"parameters": self.parameters, "memory": self.memory, **self._shown}
+        bundles = {
+            "parameters": self.parameters, "memory": self.memory, "log": self.log, **self._shown
+        }  # fmt: skip
         for name, bundle in bundles.items():
             yield from bundle.storage(f"{name}.")
-        yield from self._spare.storage("memory.")
+        yield from self._spare.memory.storage("memory.")
+        yield from self._spare.log.storage("log.")
+
+
+_NOWHERE = np.zeros(0, dtype=np.int64)
+
+
+@lru_cache
+def _kept(memory: Any, log: Any) -> Any:
+    """Class of what a law keeps from call to call."""
+    return type("Kept", (Bundle,), {"memory": part(memory), "log": part(log)})
+
+
+def _places(values: Any, block: Integers) -> Integers:
+    """Return where in a block of words those of an array within it are."""
+    first = (values.ctypes.data - block.ctypes.data) // block.itemsize
+    return np.arange(first, first + values.size)
+
+
+def believes_in_another(law: Law, robot: Robot) -> bool:
+    """Whether a law knows another robot than the one it controls, by any of its numbers.
+
+    Raises
+    ------
+    ControllerError
+        If that one has other joints, actuators or contact points.
+    """
+    known = law.robot
+    if known is None or known is robot or known.model is robot.model:
+        return False
+    for what in ("joint_names", "actuator_names", "contact_names", "link_names"):
+        its, ours = getattr(known, what), getattr(robot, what)
+        if its != ours:
+            raise ControllerError(
+                f"controller {law.function.name!r} knows robot {known.name!r}, which is built "
+                f"otherwise than {robot.name!r}: its {what.replace('_', ' ')} are "
+                f"{', '.join(its)}, not {', '.join(ours)}. Only numbers may differ"
+            )
+    mine, its = robot.model.members(), known.model.members()
+    return not all(np.array_equal(mine[name], its[name]) for name in mine)

@@ -14,7 +14,7 @@ from heelstrike.errors import ControllerError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.control import ReadyLaw
-from heelstrike.sim.controller.interface import ARGUMENTS, Contacts
+from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Partaking
 from heelstrike.sim.controller.robot import ControlledRobot
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ class AskedLaw:
     ) -> None:
         ready = ReadyLaw(robot, law)
         control = ready.control
+        self.partner = law.function.partner
         self.name = law.function.name
         self.numbers, self._control = ready, control
         self._torque: NDArray[np.float64] = np.zeros(robot.nu)
@@ -53,6 +54,7 @@ class AskedLaw:
             "robot": control.robot,
             "parameters": ready.parameters,
             "memory": ready.memory,
+            "log": ready.log,
             "torque": self._torque,
         }
         self._names: Iterable[str] = law.function.arguments
@@ -86,21 +88,33 @@ class AskedLaw:
             self._call(*(given[name] for name in self._names))
         return self._torque.copy()
 
+    @property
+    def takes_part(self) -> bool:
+        """Whether it can be kept: an object that it asks in Python has to take part, too."""
+        return self.partner is None or isinstance(self.partner, Partaking)
+
     def snapshot(self) -> NDArray[np.int64]:
-        """Return its parameters and its memory."""
-        return np.concatenate((self._control.parameters, self._control.kept))
+        """Return its parameters and its memory, and those of an object that it asks."""
+        own = self._control.parameters, self._control.kept
+        if self.partner is None:
+            return np.concatenate(own)
+        its = np.ascontiguousarray(self.partner.snapshot(), dtype=np.float64).ravel()
+        return np.concatenate((*own, its.view(np.int64)))
 
     def restore(self, numbers: NDArray[np.int64]) -> None:
         """Take up what :meth:`snapshot` returned."""
         place = self._control.parameters.size
+        end = place + self._control.kept.size
         self._control.parameters[:] = numbers[:place]
-        self._control.kept[:] = numbers[place:]
+        self._control.kept[:] = numbers[place:end]
+        if self.partner is not None:
+            self.partner.restore(numbers[end:].view(np.float64).copy())
 
     def _shown(self, name: str, value: Any) -> Any:
         """Return the same array, or a bundle of the same arrays, each knowing what it is."""
         if not isinstance(value, Bundle):
             return _shown(name, value, self.name, writable=True)
-        free = name in ("robot", "memory")
+        free = name in ("robot", "memory", "log")
         members: dict[str, Any] = value.members()
         kind = type(value)
         if kind is ControlledRobot:

@@ -11,7 +11,7 @@ from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
 
-ARGUMENTS = ("t", "state", "contacts", "robot", "parameters", "memory", "torque")
+ARGUMENTS = ("t", "state", "contacts", "robot", "parameters", "memory", "log", "torque")
 """What functions made controllers may take."""
 
 

@@ -7,7 +7,7 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, update_wrapper
-from typing import Any, overload
+from typing import Any, ClassVar, overload
 
 import numpy as np
 from numba import types
@@ -25,9 +25,9 @@ from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState, extents_of
 
-# Time, then where state, contacts, robot, parameters and memory are, and the torques: the same
-# for all, so that one compiled loop serves every controller.
-CONTROLLER_SIGNATURE = types.void(types.float64, *[types.int64] * 5, types.float64[::1])
+# Time, then where state, contacts, robot, parameters, memory and log are, and the torques: the
+# same for all, so that one compiled loop serves every controller.
+CONTROLLER_SIGNATURE = types.void(types.float64, *[types.int64] * 6, types.float64[::1])
 CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 
 
@@ -51,6 +51,7 @@ class ControllerFunction:
         update_wrapper(self, self.python)
         self.function = function
         self.compiles = compiles
+        self.partner: Any = None
         self.is_ours = is_ours(self.python)
         self.arguments = list(inspect.signature(self.python).parameters)
         strange = [name for name in self.arguments if name not in ARGUMENTS]
@@ -61,9 +62,10 @@ class ControllerFunction:
             )
         self.parameters = self._bundle("parameters", scope)
         self.memory = self._bundle("memory", scope)
+        self.log = self._bundle("log", scope)
 
     def _bundle(self, name: str, scope: Mapping[str, Any]) -> type[Bundle]:
-        """Class of the parameters or of the memory, as the function is annotated."""
+        """Class of parameters, memory or log, as the function is annotated."""
         if name not in self.arguments:
             return Bundle
 
@@ -136,6 +138,7 @@ def _called_by_address(law: ControllerFunction, function: Any) -> Callable[..., 
         "robot": ControlledRobot,
         "parameters": law.parameters.settable(),
         "memory": law.memory.settable(),
+        "log": law.log.settable(),
     }
     given = (f"{name}_at({name})" if name in kinds else name for name in law.arguments)
     text = f"def call({', '.join(ARGUMENTS)}): function({', '.join(given)})"
@@ -162,10 +165,11 @@ def controller(*, compile: bool = True) -> Callable[[Callable[..., None]], Contr
 def controller(function: Callable[..., None] | None = None, /, *, compile: bool = True) -> Any:
     """Make a function a control law that runs inside the compiled loop.
 
-    The function takes ``(t, state, contacts, robot, parameters, memory, torque)``, or those of them
-    that it needs, and writes the joint torques (nu,), in N m, into `torque`. `parameters` and
-    `memory` are bundles of its own, which their annotations name. What the function makes when it
-    is called with parameters is a controller for :func:`heelstrike.simulate`.
+    The function takes ``(t, state, contacts, robot, parameters, memory, log, torque)``, or those of
+    them that it needs, and writes the joint torques (nu,), in N m, into `torque`. `parameters`,
+    `memory` and `log` are bundles of its own, which their annotations name; what it writes into its
+    log is recorded with every row of the run. What the function makes when it is called with
+    parameters is a controller for :func:`heelstrike.simulate`.
 
     Its own indices are checked, those of the functions it calls are not: an index beyond an array
     raises IndexError, which like any exception ends the run; ``simulate(..., checked=True)`` names
@@ -240,7 +244,10 @@ class Law:
         What its memory begins with, by name of the members; what is not named begins as zero.
         Extents of arrays that are not the robot's are given likewise.
     robot : Robot, optional
-        Needed only to call :meth:`torque` oneself.
+        The robot as the law knows it, in the place of the one that is simulated: its numbers may be
+        others, so that the model is wrong. Needed to call :meth:`torque` oneself.
+    period : float, optional
+        Seconds between two calls, unless the simulation is told a `control_period`.
     stiffness, damping : (nu,) float, optional
         Gains −∂Γ/∂q and −∂Γ/∂v of each actuator on its own joint (N m, N m s), for schemes that
         take stiff forces implicitly.
@@ -250,8 +257,11 @@ class Law:
     Raises
     ------
     ControllerError
-        If the parameters are not those that the function takes.
+        If the parameters are not those that the function takes, or the period is none.
     """
+
+    keeps_period: ClassVar[bool] = False
+    """Whether it cannot be called at other times than its own."""
 
     def __init__(
         self,
@@ -260,12 +270,16 @@ class Law:
         *,
         memory: Mapping[str, Any] | None = None,
         robot: Robot | None = None,
+        period: float | None = None,
         stiffness: ArrayLike | None = None,
         damping: ArrayLike | None = None,
         commands_voltage: bool = False,
     ) -> None:
         self.memory = dict(memory or {})
         strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
+        strange -= function.log.extent_names
+        if period is not None and not 0.0 < period < np.inf:
+            raise ControllerError(f"the period of a controller must be positive, got {period}")
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"
@@ -273,6 +287,7 @@ class Law:
         self.function = function
         self.parameters: Any = _fitting(function, Bundle() if parameters is None else parameters)
         self.robot = robot
+        self.period = period
         self.stiffness = None if stiffness is None else np.asarray(stiffness, dtype=np.float64)
         self.damping = None if damping is None else np.asarray(damping, dtype=np.float64)
         self.commands_voltage = commands_voltage
@@ -319,13 +334,46 @@ class Law:
         extents = extents_of(robot)
         try:
             self.parameters.check(extents)
-            memory = self.function.memory.settable().allocate(extents, **self.memory)
+            begin = {k: v for k, v in self.memory.items() if self._is_of(self.function.memory, k)}
+            memory = self.function.memory.settable().allocate(extents, **begin)
             memory.check(extents)
         except TypeError as error:
             raise ControllerError(
                 f"controller {self.function.name!r} does not fit robot {robot.name!r}: {error}"
             ) from error
         return type(self.parameters).settable()(**self.parameters.members()), memory
+
+    @staticmethod
+    def _is_of(bundle: type[Bundle], name: str) -> bool:
+        return name in bundle.declared or name in bundle.extent_names
+
+    def new_log(self, robot: Robot) -> Bundle:
+        """Return a log to begin with, all zeros.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+
+        Returns
+        -------
+        Bundle
+            The log.
+
+        Raises
+        ------
+        ControllerError
+            If an extent of its arrays is neither the robot's nor given with the memory.
+        """
+        log = self.function.log
+        given = {k: v for k, v in self.memory.items() if k in log.extent_names}
+        try:
+            return log.settable().allocate(extents_of(robot), **given)
+        except TypeError as error:
+            raise ControllerError(
+                f"the log of controller {self.function.name!r} does not fit robot "
+                f"{robot.name!r}: {error}"
+            ) from error
 
     def reset(self) -> None:
         """Forget what :meth:`torque` has been asked; runs begin anew by themselves."""

@@ -5,11 +5,17 @@ All positions, velocities and Jacobians are in world axes: x forward, z up, rota
 
 from __future__ import annotations
 
-from heelstrike.compiler.bundle import Bundle, array, number, part
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.frames import into_frame, out_of_frame
+from heelstrike.dynamics.inverse_kinematics import Reaching, leg_joints, reach
 from heelstrike.dynamics.kernels import (
     bias_force,
     center_of_mass,
+    center_of_mass_bias_acceleration,
+    center_of_mass_jacobian,
     composite_inertias,
     first_moments,
     forward_kinematics,
@@ -17,15 +23,19 @@ from heelstrike.dynamics.kernels import (
     link_velocities,
     mass_matrix,
     momentum,
+    momentum_matrix,
     passive_force,
+    point_bias_acceleration,
     point_jacobian,
     point_position,
+    point_velocity,
 )
-from heelstrike.dynamics.places import write_point_rows
+from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.spatial import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.sole import sole
 from heelstrike.sim.controller import stance
 from heelstrike.sim.controller.interface import Contacts
 
@@ -59,18 +69,30 @@ class ControlledRobot(Bundle):
     ----------
     model : Model
         Its numbers; ``robot.model.actuator_joint[i]`` is the coordinate that actuator i drives.
-    nq, nv, nu, nc, nl : int
-        Positions, velocities, actuators, contact points and links.
+    nq, nv, nu, nc, nl, nf : int
+        Positions, velocities, actuators, contact points, links and feet.
+    mass : float
+        Of the whole robot (kg).
+    period : float
+        Seconds between two calls; zero if the controller acts continuously.
+    trial : int
+        Whether the method only tries a state within a step: what is written to memory and log in
+        such a call is forgotten, and a plan is best left as it is.
     foot_link, foot_contact : (nf,) int
         Link of each foot, and the first of its contact points.
+    foot_sole : (nf, 2, 2) float
+        Heel and toe of each foot, the ends of its sole, in the foot's axes (m); twice the same of a
+        point foot.
     contact_foot : (nc,) int
         Foot that each contact point belongs to, -1 for none.
+    leg_joint : (nf, longest) int
+        Actuated joints that move one foot alone, from the hip down; -1 where there are no more.
     unactuated : (n,) int
         Coordinates without an actuator.
     estimate : ControlState
         A second state for controllers that estimate the first, to be filled at each call; see
         :meth:`update`.
-    acceleration, force, passive, other, columns : float
+    acceleration, force, passive, other, columns, reaching
         Scratch of the queries.
     """
 
@@ -80,9 +102,15 @@ class ControlledRobot(Bundle):
     nu: int = number(int)
     nc: int = number(int)
     nl: int = number(int)
+    nf: int = number(int)
+    mass: float = number(float)
+    period: float = cell(float)
+    trial: int = cell(int)
     foot_link: Integers = array("nf", of=int)
     foot_contact: Integers = array("nf", of=int)
+    foot_sole: Floats = array("nf", 2, 2)
     contact_foot: Integers = array("nc", of=int)
+    leg_joint: Integers = array("nf", "longest", of=int)
     unactuated: Integers = array("free", of=int)
     estimate: ControlState = part(ControlState)
     acceleration: Floats = array("nv")
@@ -90,6 +118,7 @@ class ControlledRobot(Bundle):
     passive: Floats = array("nv")
     other: Floats = array("nv")
     columns: Floats = array("nv", 3)
+    reaching: Reaching = part(Reaching)
 
     @kernel
     def update(self, state: ControlState) -> None:
@@ -146,6 +175,20 @@ class ControlledRobot(Bundle):
         point_jacobian(self.model, state.kinematics, link, position, jacobian)
 
     @kernel
+    def point_velocity(
+        self, state: ControlState, link: int, position: Floats, velocity: Floats
+    ) -> None:
+        """Velocity (3,) of a point of a link at a world position: x, z and rotation."""
+        point_velocity(state.kinematics, link, position, velocity)
+
+    @kernel
+    def point_bias_acceleration(
+        self, state: ControlState, link: int, position: Floats, acceleration: Floats
+    ) -> None:
+        """J̇v, (3,), of the Jacobian of a point: its acceleration at v̇ = 0."""
+        point_bias_acceleration(state.kinematics, link, position, acceleration)
+
+    @kernel
     def contact_jacobian(
         self, state: ControlState, contacts: Contacts, contact: int, jacobian: Floats
     ) -> None:
@@ -156,12 +199,98 @@ class ControlledRobot(Bundle):
         )
 
     @kernel
-    def foot_pose(self, state: ControlState, foot: int, pose: Floats) -> None:
-        """Position (x, z) and angle of the frame of a foot, (3,)."""
-        link = self.foot_link[foot]
+    def contact_velocity(
+        self, state: ControlState, contacts: Contacts, contact: int, velocity: Floats
+    ) -> None:
+        """Velocity (2,) of a contact point: along the ground's normal, then its tangent."""
+        work, link = state.kinematics, self.model.contact_link[contact]
+        place = place_of(work, contacts.position[contact])
+        moved = velocity_at(work.velocity, link, place)
+        velocity[0], velocity[1] = into_frame(contacts.normal[contact], moved)
+
+    @kernel
+    def contact_bias_acceleration(
+        self, state: ControlState, contacts: Contacts, contact: int, acceleration: Floats
+    ) -> None:
+        """J̇v, (2,), of the gap and the sliding velocity of a contact point, (normal, tangent).
+
+        That of the centre of its disc, which rolls on the ground.
+        """
+        model, center, found = self.model, self.other, self.columns[0]
+        link, radius = model.contact_link[contact], model.contact_radius[contact]
+        normal = contacts.normal[contact]
+        for i in range(2):
+            center[i] = contacts.position[contact, i] + radius * normal[i]
+        point_bias_acceleration(state.kinematics, link, center, found)
+        acceleration[0], acceleration[1] = into_frame(normal, (found[0], found[1]))
+
+    @kernel
+    def link_pose(self, state: ControlState, link: int, pose: Floats) -> None:
+        """Position (x, z) and angle of the frame of a link, (3,)."""
         pose[0] = state.kinematics.origin[link, 0]
         pose[1] = state.kinematics.origin[link, 1]
         pose[2] = state.kinematics.angle[link]
+
+    @kernel
+    def foot_pose(self, state: ControlState, foot: int, pose: Floats) -> None:
+        """Position (x, z) and angle of the frame of a foot, (3,)."""
+        self.link_pose(state, self.foot_link[foot], pose)
+
+    @kernel
+    def foot_velocity(self, state: ControlState, foot: int, velocity: Floats) -> None:
+        """Velocity of the frame of a foot, (3,): x, z and rotation."""
+        link = self.foot_link[foot]
+        point_velocity(state.kinematics, link, state.kinematics.origin[link], velocity)
+
+    @kernel
+    def foot_bias_acceleration(self, state: ControlState, foot: int, acceleration: Floats) -> None:
+        """J̇v, (3,), of the Jacobian of the frame of a foot."""
+        link = self.foot_link[foot]
+        point_bias_acceleration(state.kinematics, link, state.kinematics.origin[link], acceleration)
+
+    @kernel
+    def foot_gap(self, contacts: Contacts, foot: int) -> float:
+        """Height (m) of the lowest contact point of a foot above the ground."""
+        lowest = np.inf
+        for i in range(self.nc):
+            if self.contact_foot[i] == foot:
+                lowest = min(lowest, contacts.gap[i])
+        return lowest
+
+    @kernel
+    def foot_wrench(
+        self, state: ControlState, contacts: Contacts, foot: int, wrench: Floats
+    ) -> None:
+        """What the ground exerts on a foot, (3,): force (x, z), and moment +y about its frame.
+
+        Times the transpose of :meth:`foot_jacobian` it is the generalised force.
+        """
+        x, z, moment = 0.0, 0.0, 0.0
+        origin = state.kinematics.origin[self.foot_link[foot]]
+        for i in range(self.nc):
+            if self.contact_foot[i] == foot:
+                pressed = (contacts.force[i, 0], contacts.force[i, 1])
+                fx, fz = out_of_frame(contacts.normal[i], pressed)
+                x += fx
+                z += fz
+                moment += (contacts.position[i, 1] - origin[1]) * fx
+                moment -= (contacts.position[i, 0] - origin[0]) * fz
+        wrench[0], wrench[1], wrench[2] = x, z, moment
+
+    @kernel
+    def inverse_kinematics(
+        self, state: ControlState, foot: int, local: Floats, target: Floats, q: Floats
+    ) -> float:
+        """Positions (nq,) with which a point of a foot, in its axes, is at (x, z, angle).
+
+        The search begins at ``state.q`` and moves the joints of the leg within their ranges; an
+        angle that is NaN may be any, as may that of a leg with fewer than three joints. Returns
+        what is missing of the answer, the larger of metres and radians.
+        """
+        for j in range(self.nq):
+            q[j] = state.q[j]
+        link, joints = self.foot_link[foot], self.leg_joint[foot]
+        return reach(self.model, joints, link, local, target, self.reaching, q)
 
     @kernel
     def foot_jacobian(self, state: ControlState, foot: int, jacobian: Floats) -> None:
@@ -183,6 +312,26 @@ class ControlledRobot(Bundle):
         velocity[0] = found[0] / mass
         velocity[1] = found[1] / mass
 
+    @kernel
+    def center_of_mass_jacobian(self, state: ControlState, jacobian: Floats) -> None:
+        """Jacobian (2, nv) of the centre of mass."""
+        center_of_mass_jacobian(self.model, state.kinematics, jacobian)
+
+    @kernel
+    def center_of_mass_bias_acceleration(self, state: ControlState, acceleration: Floats) -> None:
+        """J̇v, (2,), of the Jacobian of the centre of mass."""
+        center_of_mass_bias_acceleration(self.model, state.kinematics, acceleration)
+
+    @kernel
+    def momentum(self, state: ControlState, momentum_now: Floats) -> None:
+        """Momentum (x, z) and moment of momentum about the centre of mass and +y, (3,)."""
+        momentum(self.model, state.kinematics, momentum_now)
+
+    @kernel
+    def momentum_matrix(self, state: ControlState, matrix: Floats) -> None:
+        """Centroidal momentum matrix (3, nv): times v it is :meth:`momentum`."""
+        momentum_matrix(self.model, state.kinematics, matrix)
+
     flat_foot_torque = stance.flat_foot_torque
     point_foot_torque = stance.point_foot_torque
 
@@ -195,13 +344,19 @@ def extents_of(robot: Robot) -> dict[str, int]:
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that a controller has of a robot."""
     driven = set(robot.model.actuator_joint.tolist())
+    legs = leg_joints(robot)
     view = ControlledRobot.allocate(
-        extents_of(robot), model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven)
+        extents_of(robot), model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven),
+        longest=max(map(len, legs), default=0), mass=robot.total_mass,
     )  # fmt: skip
     view.contact_foot[:] = -1
+    view.leg_joint[:] = -1
     for index, foot in enumerate(robot.feet):
         view.foot_link[index] = foot.link
         view.foot_contact[index] = foot.contacts[0] if foot.contacts else -1
+        if foot.contacts:
+            view.foot_sole[index] = sole(robot, foot).ends
         view.contact_foot[list(foot.contacts)] = index
+        view.leg_joint[index, : len(legs[index])] = legs[index]
     view.unactuated[:] = [j for j in range(robot.nv) if j not in driven]
     return view

@@ -21,32 +21,21 @@ import numpy as np
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import inverse_dynamics, passive_force, point_bias_acceleration
-from heelstrike.dynamics.places import place_of, velocity_at
-from heelstrike.dynamics.spatial import Spatial, plus, power, scaled, spatial, write
-from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.dynamics.places import point_columns
+from heelstrike.dynamics.spatial import (
+    Spatial,
+    cross,
+    plus,
+    power,
+    scaled,
+    solve_three,
+    spatial,
+)
+from heelstrike.robot.model import Floats
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.interface import Contacts
     from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-
-
-@kernel
-def cross(a: Spatial, b: Spatial) -> Spatial:
-    """Vector product."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def solve_three(a: Spatial, b: Spatial, c: Spatial, right: Spatial) -> Spatial:
-    """Solve [a b c] s = right, three equations with these columns."""
-    bc = cross(b, c)
-    determinant = power(a, bc)
-    return (
-        power(right, bc) / determinant,
-        power(right, cross(c, a)) / determinant,
-        power(right, cross(a, b)) / determinant,
-    )
 
 
 @kernel
@@ -58,21 +47,6 @@ def solve_three_transposed(a: Spatial, b: Spatial, c: Spatial, right: Spatial) -
         plus(scaled(bc, right[0]), scaled(cross(c, a), right[1])), scaled(cross(a, b), right[2])
     )
     return x / determinant, y / determinant, z / determinant
-
-
-@kernel
-def point_columns(
-    model: Model, work: Workspace, link: int, position: Floats, columns: Floats
-) -> None:
-    """Jacobian (x, z, rotation) of a point of a link, one row a coordinate."""
-    for j in range(model.nv):
-        write(j, (0.0, 0.0, 0.0), columns)
-    place = place_of(work, position)
-    j = link
-    while j >= 0:
-        x, z = velocity_at(work.motion, j, place)
-        write(j, (x, z, work.motion[j, 0]), columns)
-        j = model.parent[j]
 
 
 @kernel

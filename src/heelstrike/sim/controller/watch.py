@@ -18,19 +18,18 @@ class Watch:
 
     Parameters
     ----------
-    robot : Robot
-        The robot, whose numbers are copied.
+    robots : tuple of Robot
+        Those that it could change, whose numbers are copied.
     law : ReadyLaw
         The controller.
     memory : Memory
         Memory of the simulation.
     """
 
-    def __init__(self, robot: Robot, law: ReadyLaw, memory: Memory) -> None:
-        self._robot = robot
+    def __init__(self, robots: tuple[Robot, ...], law: ReadyLaw, memory: Memory) -> None:
         self._control = law.control
         watched = law.control.conduct != TRUSTED or law.control.in_python
-        self._numbers = numbers_of(robot) if watched else {}
+        self._numbers = [(each, numbers_of(each)) for each in robots] if watched else []
         self._arrays = [("torque", memory.command), *law.arrays()]
 
     def misdeed(self) -> str | None:
@@ -38,9 +37,9 @@ class Watch:
         control = self._control
         if control.conduct == TRUSTED and not control.in_python:
             return None
-        changed = restored(self._robot, self._numbers)
-        if changed:
-            return f"changed the robot: {changed}"
+        changed = [restored(robot, numbers) for robot, numbers in self._numbers]
+        if any(changed):
+            return f"changed the robot: {max(changed)}"
         places = [place for name, values in self._arrays for place in trespasses(name, values)]
         if places:
             more = f" (and {len(places) - 1} more)" if len(places) > 1 else ""

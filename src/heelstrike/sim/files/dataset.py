@@ -9,6 +9,7 @@ import numpy as np
 
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.files.logs import DIMENSIONS, log_attribute, log_variables
 from heelstrike.sim.files.settings import settings
 from heelstrike.sim.files.variables import Variable
 from heelstrike.sim.push import numbers_of_pushes
@@ -21,12 +22,6 @@ FORMAT = 1
 """Version of the layout of the files."""
 
 ROBOT_GROUP = "robot"
-
-DIMENSIONS = {
-    "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
-    "axes": "axis", "components": "component", "conditions": "condition",
-}  # fmt: skip
-"""What datasets call the extents of a row. In the plane links and coordinates share one."""
 
 ROWS = {
     name: Variable(
@@ -86,7 +81,8 @@ def to_dataset(run: Run) -> xarray.Dataset:
 
     Dimensions are ``time``, ``coordinate``, ``actuator``, ``contact``, ``axis`` (x, z),
     ``component`` (normal, tangent), ``condition`` and ``event``; every variable has ``units`` and a
-    ``long_name``, and how the run ended is in the attributes.
+    ``long_name``, and how the run ended is in the attributes. What the controller logged is in the
+    variables ``log_<name>``.
 
     Parameters
     ----------
@@ -113,6 +109,7 @@ def to_dataset(run: Run) -> xarray.Dataset:
         flag_values=np.array([kind.value for kind in EventKind]),
         flag_meanings=" ".join(kind.name.lower() for kind in EventKind),
     )
+    variables |= log_variables(run)
     # A dimension of length zero has no labels, and an empty list would pass for numbers.
     coordinates: dict[str, Any] = {dim: names for dim, names in labels(run.robot).items() if names}
     coordinates["time"] = TIME["time"].written(run.time)
@@ -137,6 +134,7 @@ def _attributes(run: Run) -> dict[str, Any]:
         **{f"solver_{name}": getattr(run.solver, name) for name in SOLVED},
         "steps": run.steps,
         "saturations": run.saturations,
+        **{name: _writable(text) for name, text in log_attribute(run).items()},
         "compile_s": run.timing.compile_s,
         "wall_s": run.timing.wall_s,
         "error": _writable(error),

@@ -22,6 +22,7 @@ from heelstrike.sim.files.dataset import (
     labels,
 )
 from heelstrike.sim.files.hdf5_contents import Contents
+from heelstrike.sim.files.logs import stored_log
 from heelstrike.sim.files.robot_dataset import stored_robot
 from heelstrike.sim.files.settings import stored_method
 from heelstrike.sim.files.variables import DamageError, Stored
@@ -134,6 +135,7 @@ def _run(stored: Stored, robot: Robot, classes: Sequence[type]) -> Run:
         saturations=stored.count("saturations"),
         timing=Timing(stored.number("compile_s"), stored.number("wall_s")),
         pushes=_pushes(stored, robot, sizes),
+        log=stored_log(stored, sizes),
     )
 
 

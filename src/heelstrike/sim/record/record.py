@@ -15,13 +15,16 @@ class Record(Bundle):
 
     Forces and torques of a row are those decided at its instant and acting over the step that
     follows. `rows` and `events` are the numbers of rows used. Every recorded quantity of a
-    :class:`~heelstrike.Run` has an array by its name.
+    :class:`~heelstrike.Run` has an array by its name. `log` holds the words of what the controller
+    logged, of the first `logged` rows.
     """
 
     rows: int = cell(int)
     events: int = cell(int)
+    logged: int = cell(int)
     time: Floats = array("nt")
     vars().update({name: array("nt", *each.shape) for name, each in QUANTITIES.items()})
+    log: Integers = array("nt", "words", of=int)
     event_time: Floats = array("ne")
     event_kind: Integers = array("ne", of=int)
     event_contact: Integers = array("ne", of=int)
@@ -32,9 +35,9 @@ class Record(Bundle):
         def __getattr__(self, name: str) -> Floats: ...
 
 
-def allocate_record(robot: Robot, rows: int, events: int) -> Record:
-    """Allocate a record of `rows` instants and `events` events."""
-    extents = robot.model.extents | ROW_EXTENTS
+def allocate_record(robot: Robot, rows: int, events: int, words: int = 0) -> Record:
+    """Allocate a record of `rows` instants, with so many words of a log, and `events` events."""
+    extents = robot.model.extents | ROW_EXTENTS | {"words": words}
     return Record.allocate(extents, nt=rows, ne=events)
 
 

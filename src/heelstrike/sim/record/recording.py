@@ -8,7 +8,7 @@ from typing import Any
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel, ground_height
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.robot.model import Floats, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
@@ -162,6 +162,15 @@ def _row_writer() -> Callable[[float, Memory, Record], None]:
 
 
 note_row = _row_writer()
+
+
+@dissolved_kernel
+def note_log(kept: Integers, logged: Integers, record: Record) -> None:
+    """Write to the rows that have none as yet what the controller logged last."""
+    for row in range(record.logged, record.rows):
+        for i in range(logged.shape[0]):
+            record.log[row, i] = kept[logged[i]]
+    record.logged = record.rows
 
 
 @kernel

@@ -25,12 +25,15 @@ class Sole:
         onto the sole. A foot of one contact point has its reference there.
     heel, toe : float
         Ends of the sole, measured forward along it from the reference point (m).
+    ends : (2, 2) float
+        The same, heel and toe, as points (x, z) in the link frame (m).
     """
 
     foot: Foot
     reference: Floats
     heel: float
     toe: float
+    ends: Floats
 
 
 def sole(robot: Robot, foot: Foot) -> Sole:
@@ -40,7 +43,8 @@ def sole(robot: Robot, foot: Foot) -> Sole:
     radius = robot.model.contact_radius[contacts]
     length = float(np.hypot(*(center[-1] - center[0])))
     if length <= abs(radius[-1] - radius[0]):  # one point, or one disc inside the other
-        return Sole(foot, center[0] - [0.0, radius[0]], 0.0, 0.0)
+        lowest = center[0] - [0.0, radius[0]]
+        return Sole(foot, lowest, 0.0, 0.0, np.array([lowest, lowest]))
     along = (center[-1] - center[0]) / length
     below = np.array([along[1], -along[0]])
     sine = (radius[-1] - radius[0]) / length
@@ -49,7 +53,9 @@ def sole(robot: Robot, foot: Foot) -> Sole:
     bottom = center + radius[:, None] * down
     reference = bottom[0] - (bottom[0] @ forward) * forward
     place = (bottom - reference) @ forward
-    return Sole(foot, reference, float(place.min()), float(place.max()))
+    heel, toe = float(place.min()), float(place.max())
+    ends = reference + np.outer((heel, toe), forward)
+    return Sole(foot, reference, heel, toe, ends)
 
 
 def soles(robot: Robot) -> tuple[Sole, ...]:

@@ -1,0 +1,292 @@
+"""Laws around laws: what stands between a controller and its robot.
+
+A shell is two kernels, one before the controller inside is asked and one after it, with parameters,
+memory and log of its own. Of shell and controller one law is made: compiled, if the controller is,
+and asked in Python, if it is an object. The bundles of both are parts of its own::
+
+    before(t, state, contacts, robot, own parameters, own memory, own log)
+    inside(t, memory.own.state, memory.own.contacts, …)    # what it sees is the shell's to say
+    after(t, state, robot, own parameters, own memory, own log, torque)
+
+The shell keeps time by its own period; a controller inside that is called less often is, and its
+torques are held meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.compiler.compilation import is_ours, kernel, within_bounds
+from heelstrike.errors import ControllerError
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
+from heelstrike.sim.controller.law import ControllerFunction, Law, law_of
+from heelstrike.sim.controller.robot import ControlState, extents_of
+
+PERIOD = 1e-3
+"""Seconds between two calls of a shell around a controller that names no period."""
+
+
+class Turn(Bundle):
+    """When the controller inside is called.
+
+    Attributes
+    ----------
+    every : int
+        Calls of the shell for one of the controller inside.
+    period, inside : float
+        Seconds between two calls of either.
+    """
+
+    every: int = number(int)
+    period: float = number(float)
+    inside: float = number(float)
+
+
+class Held(Bundle):
+    """What the controller inside asked for last.
+
+    Attributes
+    ----------
+    calls : int
+        Calls of the shell.
+    torque : (nu,) float
+    """
+
+    calls: int = cell(int)
+    torque: Floats = array("nu")
+
+
+class Shell(NamedTuple):
+    """What stands between a controller and its robot.
+
+    Attributes
+    ----------
+    name : str
+        What it does, as in ``sensed(stand)``.
+    before, after : kernel
+        As above.
+    parameters, memory, log : type
+        Its bundles; memory has the members `state` and `contacts`, which the controller is shown.
+    """
+
+    name: str
+    before: Any
+    after: Any
+    parameters: type[Bundle]
+    memory: type[Bundle]
+    log: type[Bundle]
+
+
+class Shown(Bundle):
+    """What the controller inside a shell is shown: a base of the memories of shells."""
+
+    state: ControlState = part(ControlState)
+    contacts: Contacts = part(Contacts)
+
+
+def inside(controller: Controller) -> Law:
+    """Return the law that a controller is, or one that asks an object in Python."""
+    law = law_of(controller)
+    if law is not None:
+        return law
+    asked: Any = controller
+
+    def ask(t: float, state: Any, contacts: Any, torque: Floats) -> None:
+        wanted = np.asarray(asked.torque(float(t), State(state.q, state.v), contacts), np.float64)
+        if wanted.shape != torque.shape:
+            raise ControllerError(
+                f"{type(asked).__name__}.torque returned shape {wanted.shape}; the robot needs "
+                f"{torque.shape}"
+            )
+        torque[:] = wanted
+
+    ask.__name__ = ask.__qualname__ = type(asked).__qualname__
+    ask.__module__ = type(asked).__module__
+    function = ControllerFunction(ask, False, {})
+    function.partner = asked
+    return Law(function, commands_voltage=bool(getattr(asked, "commands_voltage", False)))
+
+
+class Around(Law):
+    """A shell with a controller inside: a law like any other.
+
+    Parameters
+    ----------
+    shell : Shell
+    controller : Controller
+        What is inside.
+    own : Bundle
+        Parameters of the shell.
+    period : float, optional
+        Seconds between two calls of the shell.
+    extents : dict of str to int
+        Of the shell's memory.
+
+    Raises
+    ------
+    ControllerError
+        If there is no such controller, or the periods do not fit.
+    """
+
+    keeps_period = True
+
+    def __init__(
+        self, shell: Shell, controller: Controller, own: Bundle, *, period: float | None,
+        extents: dict[str, int],
+    ) -> None:  # fmt: skip
+        law = inside(controller)
+        if period is None:
+            period = min(law.period or PERIOD, PERIOD)
+        if not (0.0 < period < math.inf):
+            raise ControllerError(f"the period of {shell.name!r} must be positive, got {period}")
+        inner = period if law.period is None else law.period
+        every = round(inner / period)
+        if every < 1 or abs(every * period - inner) > 1e-9 * inner:
+            raise ControllerError(
+                f"controller {law.function.name!r} is to be called every {inner} s, which is no "
+                f"whole number of periods of {period} s: give {shell.name!r} another period"
+            )
+        function = composed(shell, law.function)
+        parts: Any = function.parameters.declared
+        numbers = parts["inside"].kind(**law.parameters.members())
+        turn = Turn(every=every, period=period, inside=inner)
+        super().__init__(
+            function, function.parameters(turn=turn, own=own, inside=numbers), robot=law.robot,
+            period=period, stiffness=law.stiffness, damping=law.damping,
+            commands_voltage=law.commands_voltage,
+        )  # fmt: skip
+        self.inside = law
+        self._shell, self._extents = shell, dict(extents)
+
+    def __reduce__(self) -> Any:
+        """Copies are made anew of shell and controller: their bundles have no name."""
+        numbers: Any = self.parameters
+        more = {name: each for name, each in vars(self).items() if name not in _MADE}
+        made_of = self._shell, self.inside, numbers.own, self.period, self._extents
+        return _again, (type(self), made_of, more)
+
+    def with_parameters(self, parameters: Bundle) -> Law:
+        """Return the same law with other parameters."""
+        law: Any = super().with_parameters(parameters)
+        kind: Any = self.inside.function.parameters
+        law.inside = self.inside.with_parameters(kind(**law.parameters.inside.members()))
+        found: Law = law
+        return found
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return parameters and memory of shell and controller."""
+        extents = extents_of(robot) | self._extents
+        _, remembered = self.inside.numbers(robot)
+        kind: Any = self.function.memory.settable()
+        try:
+            self.parameters.check(extents)
+            own = kind.declared["own"].kind.allocate(extents)
+            memory = kind(own=own, held=Held.allocate(extents), inside=remembered)
+        except TypeError as error:
+            raise ControllerError(
+                f"controller {self.function.name!r} does not fit robot {robot.name!r}: {error}"
+            ) from error
+        parameters: Any = type(self.parameters).settable()
+        return parameters(**self.parameters.members()), memory
+
+    def new_log(self, robot: Robot) -> Bundle:
+        """Return logs of shell and controller."""
+        kind: Any = self.function.log.settable()
+        own = kind.declared["own"].kind.allocate(extents_of(robot) | self._extents)
+        log: Bundle = kind(own=own, inside=self.inside.new_log(robot))
+        return log
+
+
+_MADE = (
+    "function", "parameters", "memory", "robot", "period", "stiffness", "damping",
+    "commands_voltage", "inside", "_asked", "_shell", "_extents",
+)  # fmt: skip
+
+
+def _again(kind: type[Around], made_of: tuple[Any, ...], more: dict[str, Any]) -> Around:
+    """Make a shell of what it is made of."""
+    shell, controller, own, period, extents = made_of
+    law = kind.__new__(kind)
+    Around.__init__(law, shell, controller, own, period=period, extents=extents)
+    vars(law).update(more)
+    return law
+
+
+class Composed(ControllerFunction):
+    """The function of a shell and of the controller inside."""
+
+    def __init__(self, shell: Shell, function: ControllerFunction, text: Any, scope: Any) -> None:
+        self._made_of = shell, function
+        super().__init__(text, function.compiles, scope)
+        self.is_ours = function.is_ours
+        self.partner = function.partner
+
+    def __reduce__(self) -> Any:
+        """Copies are made anew of shell and function."""
+        return composed, self._made_of
+
+    def begin(self) -> None:
+        """Do nothing: other processes find no function that is made here."""
+
+
+@lru_cache
+def composed(shell: Shell, function: ControllerFunction) -> Composed:
+    """Return the function of a shell and of the controller inside."""
+    parameters: Any = _bundle(
+        "Parameters", turn=part(Turn), own=part(shell.parameters),
+        inside=part(function.parameters.settable()),
+    )  # fmt: skip
+    memory: Any = _bundle(
+        "Memory", own=part(shell.memory), held=part(Held),
+        inside=part(function.memory.settable()),
+    )  # fmt: skip
+    log: Any = _bundle(
+        "Log", own=part(shell.log, flat=True), inside=part(function.log.settable(), flat=True)
+    )
+    shown = {
+        "state": "memory.own.state", "contacts": "memory.own.contacts",
+        "parameters": "parameters.inside", "memory": "memory.inside", "log": "log.inside",
+        "torque": "held",
+    }  # fmt: skip
+    given = ", ".join(shown.get(name, name) for name in function.arguments)
+    name = f"{shell.name}_{function.name}"
+    text = f"""
+def {name}({", ".join(ARGUMENTS)}):
+    before(t, state, contacts, robot, parameters.own, memory.own, log.own)
+    held = memory.held.torque
+    if memory.held.calls % parameters.turn.every == 0:
+        robot.period = parameters.turn.inside
+        inside({given})
+        robot.period = parameters.turn.period
+    memory.held.calls += 1
+    for i in range(torque.shape[0]):
+        torque[i] = held[i]
+    after(t, state, robot, parameters.own, memory.own, log.own, torque)
+"""
+    python = function.python
+    inner: Any = function.function
+    if function.compiles:
+        inner = kernel(inner) if is_ours(python) else within_bounds(inner)
+    scope: dict[str, Any] = {
+        "before": shell.before, "after": shell.after, "inside": inner,
+        "__name__": python.__module__,
+    }  # fmt: skip
+    # Machine code is kept beside the file of the controller.
+    place = getattr(python, "__code__", None)
+    exec(compile(text, place.co_filename if place else __file__, "exec"), scope)
+    made = scope[name]
+    made.__qualname__ = f"{shell.name}({python.__qualname__})"
+    made.__annotations__ = {"parameters": parameters, "memory": memory, "log": log}
+    return Composed(shell, function, made, {})
+
+
+def _bundle(name: str, **members: Any) -> type[Bundle]:
+    return type(name, (Bundle,), {"__module__": __name__, **members})

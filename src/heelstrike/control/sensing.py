@@ -1,0 +1,464 @@
+"""What a controller sees of its robot: encoders, an inertial unit, sensors in the feet.
+
+What a sensor measures stands in the place of the truth in the state and the contacts that the
+controller is shown; what none measures stays true. Truth is in the run, what was measured in its
+log.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
+from heelstrike.control.noise import normal, seeded
+from heelstrike.errors import ControllerError
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.interface import Contacts, Controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+
+@dataclass(frozen=True, kw_only=True)
+class Encoders:
+    """Encoders of the actuated joints; velocities are filtered differences of their readings.
+
+    Parameters
+    ----------
+    bits : int, optional
+        Counts a turn of the joint, 2 to the power of this; by default angles are not rounded.
+    noise, bias : float
+        Standard deviation of each reading, and of the constant error of each joint, which is drawn
+        once (rad).
+    rate : float, optional
+        Readings a second, at most one a period of the shell; by default one each.
+    cutoff : float, optional
+        Cut-off frequency of the first-order filter of the differences (Hz); none by default.
+    """
+
+    bits: int | None = None
+    noise: float = 0.0
+    bias: float = 0.0
+    rate: float | None = None
+    cutoff: float | None = None
+
+    def __post_init__(self) -> None:
+        _check(self)
+        if self.bits is not None and not (isinstance(self.bits, int) and 1 <= self.bits <= 52):
+            raise ControllerError(f"Encoders: bits is a whole number from 1 on, got {self.bits!r}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class InertialUnit:
+    """Pitch of the trunk and its rate, as an inertial measurement unit tells them.
+
+    Parameters
+    ----------
+    noise, bias : float
+        Standard deviation of each reading of the pitch, and of its constant error (rad).
+    rate_noise, rate_bias : float
+        The same of its rate (rad/s).
+    rate : float, optional
+        Readings a second; by default one a period of the shell.
+    """
+
+    noise: float = 0.0
+    bias: float = 0.0
+    rate_noise: float = 0.0
+    rate_bias: float = 0.0
+    rate: float | None = None
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootSensors:
+    """Forces at the contact points as sensors in the feet tell them, or switches.
+
+    Parameters
+    ----------
+    noise, bias : float
+        Standard deviation of each reading, and of the constant error of each component (N).
+    threshold : float, optional
+        Normal forces that are read as less than this are read as none, and so is what is
+        tangential then (N); by default five times noise and bias together, so that a foot in the
+        air reads none.
+    switches : bool
+        Whether there is only a switch under each point: the normal force reads 1 or 0, the
+        tangential one 0.
+    rate : float, optional
+        Readings a second; by default one a period of the shell.
+    """
+
+    noise: float = 0.0
+    bias: float = 0.0
+    threshold: float | None = None
+    switches: bool = False
+    rate: float | None = None
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+    @property
+    def least(self) -> float:
+        """Least normal force that is read (N)."""
+        return 5.0 * (self.noise + self.bias) if self.threshold is None else self.threshold
+
+
+def _check(sensor: object) -> None:
+    """Refuse numbers that no sensor has."""
+    for each in fields(sensor):  # type: ignore[arg-type]
+        value, positive = getattr(sensor, each.name), each.name in ("rate", "cutoff")
+        if value is None or isinstance(value, bool):
+            continue
+        if not (math.isfinite(value) and (value > 0.0 if positive else value >= 0.0)):
+            least = "positive" if positive else "≥ 0"
+            raise ControllerError(
+                f"{type(sensor).__name__}: {each.name} must be {least}, got {value!r}"
+            )
+
+
+class Parameters(Bundle):
+    """Numbers of the sensors.
+
+    Attributes
+    ----------
+    period : float
+        Seconds between two calls.
+    encoder_every, inertial_every, foot_every : int
+        Calls between two readings; 0 for no sensor.
+    resolution, encoder_noise, encoder_bias, smoothing
+        Of the encoders (rad); share of a new difference in the velocity.
+    pitch : int
+        Coordinate of the trunk's pitch.
+    pitch_noise, pitch_bias, rate_noise, rate_bias : float
+    force_noise, force_bias, threshold : float
+    switches : int
+    late : int
+        Calls by which everything is seen late.
+    """
+
+    period: float = number(float)
+    encoder_every: int = number(int)
+    inertial_every: int = number(int)
+    foot_every: int = number(int)
+    resolution: float = number(float)
+    encoder_noise: float = number(float)
+    encoder_bias: float = number(float)
+    smoothing: float = number(float)
+    pitch: int = number(int)
+    pitch_noise: float = number(float)
+    pitch_bias: float = number(float)
+    rate_noise: float = number(float)
+    rate_bias: float = number(float)
+    force_noise: float = number(float)
+    force_bias: float = number(float)
+    threshold: float = number(float)
+    switches: int = number(int)
+    late: int = number(int)
+    seeds: Integers = array(2, of=int)
+
+
+class Memory(Shown):
+    """What the sensors remember.
+
+    Attributes
+    ----------
+    calls : int
+    seeds : (2,) int
+        The generator of the noise.
+    joint_bias, force_bias, pitch_bias, rate_bias
+        Constant errors.
+    joint, joint_rate : (nu,) float
+        Readings of the encoders and the velocity that follows.
+    pitch, pitch_rate : float
+    force : (nc, 2) float
+    past_q, past_v, past_force
+        Readings of the last calls, a ring.
+    """
+
+    calls: int = cell(int)
+    seeds: Integers = array(2, of=int)
+    joint_bias: Floats = array("nu")
+    force_bias: Floats = array("nc", "components")
+    pitch_bias: float = cell(float)
+    rate_bias: float = cell(float)
+    joint: Floats = array("nu")
+    joint_rate: Floats = array("nu")
+    pitch: float = cell(float)
+    pitch_rate: float = cell(float)
+    force: Floats = array("nc", "components")
+    past_q: Floats = array("late + 1", "nq")
+    past_v: Floats = array("late + 1", "nv")
+    past_force: Floats = array("late + 1", "nc", "components")
+
+
+class Log(Bundle):
+    """What was measured, as the controller saw it, in the run."""
+
+    measured_position: Floats = array(
+        "nq", unit="m or rad", label="generalised positions as the controller saw them"
+    )
+    measured_velocity: Floats = array(
+        "nv", unit="m/s or rad/s", label="generalised velocities as the controller saw them"
+    )
+    measured_force: Floats = array(
+        "nc", "components", unit="N", label="contact forces as the controller saw them"
+    )
+
+
+@kernel
+def begin(parameters: Parameters, memory: Memory) -> None:
+    """Draw the constant errors."""
+    for i in range(2):
+        memory.seeds[i] = parameters.seeds[i]
+    for i in range(memory.joint_bias.shape[0]):
+        memory.joint_bias[i] = parameters.encoder_bias * normal(memory.seeds)
+    memory.pitch_bias = parameters.pitch_bias * normal(memory.seeds)
+    memory.rate_bias = parameters.rate_bias * normal(memory.seeds)
+    for i in range(memory.force_bias.shape[0]):
+        for k in range(2):
+            memory.force_bias[i, k] = parameters.force_bias * normal(memory.seeds)
+
+
+@kernel
+def read_encoders(state: ControlState, parameters: Parameters, memory: Memory) -> None:
+    """Read the joints, and tell their velocities by the differences to the readings before."""
+    step, first = parameters.encoder_every * parameters.period, memory.calls == 0
+    for i in range(memory.joint.shape[0]):
+        reading = state.joint_position[i] + memory.joint_bias[i]
+        if parameters.encoder_noise > 0.0:
+            reading += parameters.encoder_noise * normal(memory.seeds)
+        if parameters.resolution > 0.0:
+            reading = parameters.resolution * np.round(reading / parameters.resolution)
+        if first:
+            memory.joint_rate[i] = state.joint_velocity[i]  # a filter that has been running
+        else:
+            rate = (reading - memory.joint[i]) / step
+            memory.joint_rate[i] += parameters.smoothing * (rate - memory.joint_rate[i])
+        memory.joint[i] = reading
+
+
+@kernel
+def read_feet(contacts: Contacts, parameters: Parameters, memory: Memory) -> None:
+    """Read forces or switches under the contact points."""
+    for i in range(memory.force.shape[0]):
+        for k in range(2):
+            reading = contacts.force[i, k] + memory.force_bias[i, k]
+            if parameters.force_noise > 0.0:
+                reading += parameters.force_noise * normal(memory.seeds)
+            memory.force[i, k] = reading
+        pressed = memory.force[i, 0] > parameters.threshold
+        if parameters.switches == 1:
+            memory.force[i, 0] = 1.0 if pressed else 0.0
+            memory.force[i, 1] = 0.0
+        elif not pressed:
+            memory.force[i, 0] = 0.0
+            memory.force[i, 1] = 0.0
+
+
+@kernel
+def read_all(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Read the sensors that are due, and put what they tell into the ring, over the truth."""
+    if memory.calls == 0:
+        begin(parameters, memory)
+    row = memory.calls % memory.past_q.shape[0]
+    q, v = memory.past_q[row], memory.past_v[row]
+    for j in range(robot.nq):
+        q[j] = state.q[j]
+    for j in range(robot.nv):
+        v[j] = state.v[j]
+    if parameters.encoder_every > 0:
+        if memory.calls % parameters.encoder_every == 0:
+            read_encoders(state, parameters, memory)
+        for i in range(robot.nu):
+            joint = robot.model.actuator_joint[i]
+            q[joint] = memory.joint[i]
+            v[joint] = memory.joint_rate[i]
+    if parameters.inertial_every > 0:
+        pitch = parameters.pitch
+        if memory.calls % parameters.inertial_every == 0:
+            noise = parameters.pitch_noise * normal(memory.seeds)
+            memory.pitch = state.q[pitch] + memory.pitch_bias + noise
+            noise = parameters.rate_noise * normal(memory.seeds)
+            memory.pitch_rate = state.v[pitch] + memory.rate_bias + noise
+        q[pitch] = memory.pitch
+        v[pitch] = memory.pitch_rate
+    if parameters.foot_every == 0:
+        for i in range(robot.nc):
+            for k in range(2):
+                memory.force[i, k] = contacts.force[i, k]
+    elif memory.calls % parameters.foot_every == 0:
+        read_feet(contacts, parameters, memory)
+    for i in range(robot.nc):
+        for k in range(2):
+            memory.past_force[row, i, k] = memory.force[i, k]
+
+
+@kernel
+def sense(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,  # noqa: ARG001
+    parameters: Parameters, memory: Memory, log: Log,
+) -> None:  # fmt: skip
+    """Show the controller inside what was measured, some calls ago."""
+    read_all(state, contacts, robot, parameters, memory)
+    seen, told = memory.state, memory.contacts
+    row = max(memory.calls - parameters.late, 0) % memory.past_q.shape[0]
+    for j in range(robot.nq):
+        seen.q[j] = memory.past_q[row, j]
+        log.measured_position[j] = seen.q[j]
+    for j in range(robot.nv):
+        seen.v[j] = memory.past_v[row, j]
+        log.measured_velocity[j] = seen.v[j]
+    robot.update(seen)
+    for i in range(robot.nc):
+        told.gap[i] = contacts.gap[i]
+        for k in range(2):
+            told.position[i, k] = contacts.position[i, k]
+            told.normal[i, k] = contacts.normal[i, k]
+            told.force[i, k] = memory.past_force[row, i, k]
+            log.measured_force[i, k] = told.force[i, k]
+    memory.calls += 1
+
+
+@kernel
+def leave(
+    t: float, state: ControlState, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory, log: Log, torque: Floats,
+) -> None:  # fmt: skip
+    """Leave the torques as they are."""
+
+
+SENSED = Shell("sensed", sense, leave, Parameters, Memory, Log)
+
+
+class Sensed(Around):
+    """A controller that sees its robot by sensors: any controller, compiled or in Python.
+
+    Positions, normals and gaps of contact points, and what no sensor measures of the state, are
+    true, but as late as the rest.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    controller : Controller
+        What decides the torques.
+    encoders : Encoders, optional
+        Of the actuated joints.
+    inertial : InertialUnit, optional
+        Of the trunk's pitch.
+    feet : FootSensors, optional
+        Under the contact points.
+    delay : float
+        By how much later everything is seen, in s; a whole number of periods.
+    period : float, optional
+        Seconds between two looks at the sensors; by default that of the controller, 1 ms at most.
+    seed : int
+        Of noise and constant errors: the same seed, the same run.
+
+    Raises
+    ------
+    ControllerError
+        If a number cannot be, or the robot has no pitch to measure.
+
+    Notes
+    -----
+    The run's log holds ``measured_position``, ``measured_velocity`` and ``measured_force``, beside
+    ``run.position``, ``run.velocity`` and ``run.contact_force``, which are true.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("bravo7")
+    >>> class Relaxed:
+    ...     def torque(self, t, state, contacts):
+    ...         return -2.0 * state.v[3:]
+    >>> seeing = hs.Sensed(robot, Relaxed(), encoders=hs.Encoders(bits=14, noise=1e-4), seed=3)
+    >>> run = hs.simulate(robot, seeing, state=robot.reference_state(), duration=0.01)
+    >>> bool(abs(run.log["measured_position"].values - run.position).max() < 1e-3)
+    True
+    """
+
+    def __init__(
+        self, robot: Robot, controller: Controller, *, encoders: Encoders | None = None,
+        inertial: InertialUnit | None = None, feet: FootSensors | None = None,
+        delay: float = 0.0, period: float | None = None, seed: int = 0,
+    ) -> None:  # fmt: skip
+        period = min(inside(controller).period or PERIOD, PERIOD) if period is None else period
+        late = periods("delay", delay, period)
+        seen, unit, under = (
+            encoders or Encoders(),
+            inertial or InertialUnit(),
+            feet or FootSensors(),
+        )
+        each = [
+            0 if sensor is None else _calls(sensor.rate, period)
+            for sensor in (encoders, inertial, feet)
+        ]
+        smoothing = 1.0
+        if seen.cutoff is not None:
+            turned = 2.0 * math.pi * seen.cutoff * max(each[0], 1) * period
+            smoothing = turned / (1.0 + turned)
+        own = Parameters(
+            period=period, encoder_every=each[0], inertial_every=each[1], foot_every=each[2],
+            resolution=0.0 if seen.bits is None else 2.0 * math.pi / 2**seen.bits,
+            encoder_noise=seen.noise, encoder_bias=seen.bias, smoothing=smoothing,
+            pitch=-1 if inertial is None else _pitch_of(robot), pitch_noise=unit.noise,
+            pitch_bias=unit.bias, rate_noise=unit.rate_noise, rate_bias=unit.rate_bias,
+            force_noise=under.noise, force_bias=under.bias, threshold=under.least,
+            switches=int(under.switches), late=late, seeds=np.array(seeded(seed)),
+        )  # fmt: skip
+        super().__init__(SENSED, controller, own, period=period, extents={"late": late})
+        self.encoders, self.inertial, self.feet, self.delay = encoders, inertial, feet, delay
+
+
+def periods(name: str, time: float, period: float) -> int:
+    """Return how many periods a time is.
+
+    Raises
+    ------
+    ControllerError
+        If it is no whole number of them.
+    """
+    if not (math.isfinite(time) and time >= 0.0):
+        raise ControllerError(f"the {name} must be a number ≥ 0 (s), got {time!r}")
+    count = round(time / period)
+    if abs(count * period - time) > 1e-6 * period:
+        raise ControllerError(
+            f"the {name} of {time} s must be a whole number of periods of {period} s"
+        )
+    return count
+
+
+def _calls(rate: float | None, period: float) -> int:
+    """Return the calls between two readings."""
+    if rate is None:
+        return 1
+    calls = round(1.0 / (rate * period))
+    if calls < 1 or abs(calls * rate * period - 1.0) > 1e-6:
+        raise ControllerError(
+            f"a sensor of {rate} readings a second reads every {1.0 / rate:.6g} s, which is no "
+            f"whole number of periods of {period} s: give another rate or period"
+        )
+    return calls
+
+
+def _pitch_of(robot: Robot) -> int:
+    """Return the coordinate of the trunk's pitch."""
+    model = robot.model
+    driven = set(model.actuator_joint.tolist())
+    turning = [j for j in range(robot.nv) if model.axis[j, 0] != 0.0 and j not in driven]
+    if not turning:
+        raise ControllerError(
+            f"robot {robot.name!r} has no trunk that turns freely: there is no pitch to measure"
+        )
+    return turning[0]
