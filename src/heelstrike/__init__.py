@@ -49,10 +49,15 @@ if TYPE_CHECKING:
     from heelstrike.control import Encoder as Encoder
     from heelstrike.control import Encoders as Encoders
     from heelstrike.control import Estimated as Estimated
+    from heelstrike.control import Feedforward as Feedforward
     from heelstrike.control import FootSensors as FootSensors
+    from heelstrike.control import FootstepFeedback as FootstepFeedback
     from heelstrike.control import InertialUnit as InertialUnit
+    from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import WholeBody as WholeBody
     from heelstrike.control import controller as controller
+    from heelstrike.control import solve_quadratic_program as solve_quadratic_program
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -109,7 +114,9 @@ _HOME = {
     "Encoders": "heelstrike.control",
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
+    "Feedforward": "heelstrike.control",
     "FootSensors": "heelstrike.control",
+    "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
@@ -118,6 +125,7 @@ _HOME = {
     "HuntCrossley": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
     "InfeasibleGaitError": "heelstrike.errors",
+    "JointPD": "heelstrike.control",
     "KelvinVoigt": "heelstrike.sim",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
@@ -137,6 +145,7 @@ _HOME = {
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "ViewError": "heelstrike.errors",
+    "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
@@ -159,6 +168,7 @@ _HOME = {
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
+    "solve_quadratic_program": "heelstrike.control",
 }
 
 

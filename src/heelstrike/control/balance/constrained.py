@@ -10,12 +10,17 @@ from __future__ import annotations
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
-from heelstrike.dynamics.kernels import bias_force, mass_matrix, passive_force
-from heelstrike.dynamics.kernels import point_bias_acceleration
-from heelstrike.dynamics.spatial import power, scaled, spatial
+from heelstrike.dynamics.kernels import (
+    bias_force,
+    mass_matrix,
+    passive_force,
+    point_bias_acceleration,
+)
+from heelstrike.dynamics.places import point_columns
+from heelstrike.dynamics.spatial import power, scaled, solve_three, spatial
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import point_columns, solve_three, solve_three_transposed
+from heelstrike.sim.controller.stance import solve_three_transposed
 
 
 class Constrained(Bundle):

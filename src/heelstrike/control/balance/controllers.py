@@ -25,7 +25,7 @@ LINKS = 3
 """Links of a leg: thigh, shank and foot."""
 
 
-def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, dict[str, float]], ...]:
+def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, float], ...]:
     """All numbers that may be chosen: those of bravo7, by the height and the weight of a robot.
 
     Lengths go with the height, times with its root, forces with the weight.
@@ -72,7 +72,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, dict
         "least_force": 0.15 * weight,
         "weight": weight,
         "touchdown": 0.4,
-        "settling": 0.02 * duration,
+        "landing": 0.02 * duration,
         "calm": 0.02 * size,
         "alarmed": 0.08 * size,
         "calming": pace,
@@ -128,10 +128,8 @@ class WholeBody(Law):
     >>> import heelstrike as hs
     >>> robot = hs.load_robot("bravo7")
     >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
-    >>> law = hs.FootstepFeedback(robot, gait)
-    >>> push = hs.Push("trunk", force=(400.0, 0.0), start=0.3, duration=0.1)  # 40 N s
-    >>> run = hs.simulate(robot, law, state=gait.initial_state, duration=2.1, pushes=push)
-    >>> run.completed
+    >>> law = hs.WholeBody(robot, gait)
+    >>> hs.simulate(robot, law, state=gait.initial_state, duration=1.4).completed
     True
     """
 
@@ -191,6 +189,36 @@ class FootstepFeedback(WholeBody):
     at every call; the gait is then left for a lower body and a higher swing foot, and taken up
     again as the disturbance dies away. A foot that meets the ground early stands at once, one that
     meets it late goes on looking for it, and the slope is estimated from the footholds.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot with two mirrored feet that can stand flat, and legs of thigh, shank and
+        foot; all joints but the trunk's actuated.
+    gait : Gait
+        The gait that is followed as long as nothing disturbs, on flat feet, of this robot.
+    speed : float, optional
+        Speed that is wanted (m/s); the gait's own by default, zero to stop and stand.
+    friction : float
+        Coefficient of friction that it reckons with.
+    numbers : mapping of str to float, optional
+        Any other number of the law by its name, as for :class:`WholeBody`.
+
+    Raises
+    ------
+    ControllerError
+        If the robot cannot be controlled this way, or the gait or a number does not fit it.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("bravo7")
+    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
+    >>> law = hs.FootstepFeedback(robot, gait)
+    >>> push = hs.Push("trunk", force=(400.0, 0.0), start=0.3, duration=0.1)  # 40 N s
+    >>> run = hs.simulate(robot, law, state=gait.initial_state, duration=2.1, pushes=push)
+    >>> run.completed
+    True
     """
 
     adapts = True

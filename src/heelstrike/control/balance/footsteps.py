@@ -4,8 +4,8 @@ The capture point of a body that keeps its height over a foot pressed at p runs 
 ξ(t) = p + (ξ₀ − p) e^{ωt} (T. Koolen et al., *Capturability-based analysis and control of legged
 locomotion*, 2012). A gait needs it at a certain place before the foot that lands. The plan is the
 landing that costs least, as in M. Khadiv et al., *Walking control based on step timing adaptation*
-(2020): for every time that it may take, the centre of pressure that brings the capture point nearest
-to where it belongs, then the foothold, each within its limits.
+(2020): for every time that it may take, the centre of pressure that brings the capture point
+nearest to where it belongs, then the foothold, each within its limits.
 """
 
 from __future__ import annotations

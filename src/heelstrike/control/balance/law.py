@@ -7,7 +7,7 @@ from math import atan, exp, sqrt
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import constrain, point_task
 from heelstrike.control.balance.footsteps import make_plan
-from heelstrike.control.balance.numbers import Memory, Parameters
+from heelstrike.control.balance.numbers import Log, Memory, Parameters
 from heelstrike.control.balance.reference import (
     Reference,
     curvature_at,
@@ -23,14 +23,13 @@ from heelstrike.control.balance.tasks import (
     clear,
     solve_torques,
 )
-from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
+from heelstrike.control.computed_torque import has_landed
 from heelstrike.dynamics.kernels import center_of_mass, point_position
 from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-
 
 JUST_BEGUN = 0.05
 """A step has just begun up to this phase."""
@@ -55,24 +54,6 @@ def exchange_at_touchdown(
             memory.steps += 1
             begin_step(t, parameters.reference, memory)
             return
-
-
-@kernel
-def has_landed(
-    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot, settling: float,
-    memory: Memory,
-) -> bool:  # fmt: skip
-    """Whether the stance foot is past the impact that made it the stance foot."""
-    landed = memory.landed == 1 or t - memory.start > settling
-    if not landed:
-        landed = True
-        for i in range(robot.nc):
-            if robot.contact_foot[i] == memory.stance:
-                link = robot.foot_link[memory.stance]
-                speed = approaching_speed(state.kinematics, contacts, link, i)
-                landed = landed and speed < LANDED_SPEED
-    memory.landed = 1 if landed else 0
-    return landed
 
 
 @kernel
@@ -198,7 +179,12 @@ def want_trunk(
     memory: Memory,
 ) -> None:  # fmt: skip
     """Add the task of the trunk's rotation."""
-    pitch, phase, rate, work = parameters.reference.pitch, memory.phase, memory.rate, state.kinematics
+    pitch, phase, rate, work = (
+        parameters.reference.pitch,
+        memory.phase,
+        memory.rate,
+        state.kinematics,
+    )
     on, calm = memory.on, 1.0 - memory.alarm
     point_task(robot, state, 2, work.origin[2], on)
     missing = calm * curvature_at(pitch, phase) * rate * rate - on.shift[2]
@@ -302,7 +288,9 @@ def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory)
     A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v.
     """
     legs, program, stiffness = parameters.legs, memory.program, parameters.knee_kp
-    least = parameters.straight_knee + memory.alarm * (parameters.bent_knee - parameters.straight_knee)
+    least = parameters.straight_knee + memory.alarm * (
+        parameters.bent_knee - parameters.straight_knee
+    )
     for foot in range(2):
         knee, sign = legs.knee[foot], legs.bend[foot]
         bent = sign * (state.joint_position[knee] - legs.straight[foot])
@@ -316,15 +304,29 @@ def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory)
         program.count = row + 1
 
 
+@kernel
+def tell(memory: Memory, log: Log) -> None:
+    """Fill in the log."""
+    plan = memory.plan
+    log.phase = memory.phase
+    log.alarm = memory.alarm
+    log.capture_point = plan.capture
+    log.foothold = plan.foothold
+    log.pressure = plan.pressure
+    log.remaining = plan.remaining
+    log.slope = memory.slope
+    log.relaxed = memory.program.relaxed
+
+
 @controller
 def keep_balance(
     t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
-    parameters: Parameters, memory: Memory, torque: Floats,
+    parameters: Parameters, memory: Memory, log: Log, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that walk, by the gait or by where the next foot has to land."""
     exchange_at_touchdown(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
-    landed = has_landed(t, state, contacts, robot, parameters.settling, memory)
+    landed = has_landed(t, state, contacts, robot, parameters, memory)
     stand_or_walk(t, parameters, memory)
     if memory.stands == 1:
         stay(t, parameters, memory)
@@ -349,3 +351,4 @@ def keep_balance(
     add_motors(robot, state, on, program)
     keep_knees_bent(state, parameters, memory)
     solve_torques(robot, state, memory, torque)
+    tell(memory, log)

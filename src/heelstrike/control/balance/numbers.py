@@ -6,6 +6,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.control.balance.constrained import Constrained
 from heelstrike.control.balance.footsteps import Plan, Planning
 from heelstrike.control.balance.reference import Reference
+from heelstrike.control.computed_torque import Landing, Stance
 from heelstrike.control.quadratic.program import Program
 from heelstrike.robot.model import Floats, Integers
 
@@ -62,7 +63,7 @@ class Legs(Bundle):
     length: float = number(float)
 
 
-class Parameters(Bundle):
+class Parameters(Landing):
     """Numbers of the law.
 
     Attributes
@@ -92,8 +93,6 @@ class Parameters(Bundle):
         Of the robot (N).
     touchdown : float
         Phase from which on a contact of the swing foot is a touchdown.
-    settling : float
-        A foot that touches without coming flat counts as landed after this time (s).
     calm, alarmed : float
         Errors of the capture point at the end of the step (m) up to which the gait is followed,
         and from which on balance is all that counts.
@@ -131,7 +130,6 @@ class Parameters(Bundle):
     least_force: float = number(float)
     weight: float = number(float)
     touchdown: float = number(float)
-    settling: float = number(float)
     calm: float = number(float)
     alarmed: float = number(float)
     calming: float = number(float)
@@ -147,17 +145,13 @@ class Parameters(Bundle):
     hold: float = number(float)
 
 
-class Memory(Bundle):
+class Memory(Stance):
     """What the law remembers.
 
     Attributes
     ----------
-    stance : int
-        The foot that stands.
-    start, time : float
-        When its step began, and the last call (s).
-    landed : int
-        Whether it is past the impact that made it the stance foot.
+    time : float
+        Of the last call (s).
     stands : int
         Whether the robot stands on both feet.
     phase, rate : float
@@ -182,10 +176,7 @@ class Memory(Bundle):
         Programmes that gave up rows, and those that were not solved.
     """
 
-    stance: int = cell(int)
-    start: float = cell(float)
     time: float = cell(float)
-    landed: int = cell(int)
     stands: int = cell(int)
     phase: float = cell(float)
     rate: float = cell(float)
@@ -202,3 +193,32 @@ class Memory(Bundle):
     program: Program = part(Program)
     relaxed: int = cell(int)
     unsolved: int = cell(int)
+
+
+class Log(Bundle):
+    """What the law tells of itself.
+
+    Attributes
+    ----------
+    phase : float
+        Where in the step the reference is.
+    alarm : float
+        From 0, the gait is followed, to 1, balance is all that counts.
+    capture_point, foothold, pressure : float
+        Capture point, planned foothold and wanted centre of pressure from the stance sole (m).
+    remaining : float
+        Time until the landing that is planned (s).
+    slope : float
+        Of the ground, as estimated.
+    relaxed : int
+        Levels of rows that the quadratic programme had to give up.
+    """
+
+    phase: float = cell(float, label="Phase of the step")
+    alarm: float = cell(float, label="Alarm")
+    capture_point: float = cell(float, unit="m", label="Capture point before the stance sole")
+    foothold: float = cell(float, unit="m", label="Planned foothold before the stance sole")
+    pressure: float = cell(float, unit="m", label="Wanted centre of pressure")
+    remaining: float = cell(float, unit="s", label="Time until the landing")
+    slope: float = cell(float, label="Estimated slope")
+    relaxed: int = cell(int, label="Levels of rows given up")

@@ -74,9 +74,7 @@ def add_contact(parameters: Parameters, tilt: float, on: Constrained, program: P
 
 
 @kernel
-def torque_range(
-    robot: ControlledRobot, state: ControlState, actuator: int
-) -> tuple[float, float]:
+def torque_range(robot: ControlledRobot, state: ControlState, actuator: int) -> tuple[float, float]:
     """Least and greatest torque of a motor at its present speed."""
     model = robot.model
     joint = model.actuator_joint[actuator]
