@@ -161,6 +161,8 @@ class WholeBody(Law):
         if friction <= 0.0:
             raise ControllerError(f"friction must be positive, got {friction}")
         planning, weights, rest = groups
+        if not self.adapts:
+            planning["capture_weight"] = 0.0  # the foot lands where the gait's does
         parameters = Parameters(
             reference=reference_of(robot, gait),
             planning=Planning(**planning),
