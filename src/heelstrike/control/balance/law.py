@@ -288,12 +288,17 @@ def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory)
     A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v.
     """
     legs, program, stiffness = parameters.legs, memory.program, parameters.knee_kp
-    least = parameters.straight_knee + memory.alarm * (
-        parameters.bent_knee - parameters.straight_knee
-    )
+    range_of = parameters.bent_knee - parameters.straight_knee
     for foot in range(2):
         knee, sign = legs.knee[foot], legs.bend[foot]
         bent = sign * (state.joint_position[knee] - legs.straight[foot])
+        part = memory.alarm
+        if foot != memory.stance:
+            # A swing leg that is bent the wrong way could not be lifted.
+            table = parameters.reference.joints[memory.stance, :, knee]
+            gait = sign * (value_at(table, memory.phase) - legs.straight[foot])
+            part = max(min(4.0 * part, 1.0), min(2.5 * gait - 0.5, 1.0))
+        least = parameters.straight_knee + max(part, 0.0) * range_of
         row = program.count
         for i in range(program.x.shape[0]):
             program.rows[row, i] = 0.0
