@@ -78,6 +78,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "calming": pace,
         "crouch": 0.03 * size,
         "lift": 0.03 * size,
+        "most_raised": 0.08 * size,
         "bent_knee": 0.1,
         "straight_knee": -0.25,
         "slow": 0.15 * pace,

@@ -34,26 +34,68 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 JUST_BEGUN = 0.05
 """A step has just begun up to this phase."""
 
+STEEP = 0.6
+"""Ground whose normal rises less cannot be stood upon."""
+
+STEEPEST = 0.35
+"""No slope is believed to be steeper."""
+
+
+@kernel
+def begin_step(t: float, reference: Reference, memory: Memory) -> None:
+    """Set the reference to the beginning of a step."""
+    memory.start = t
+    memory.phase = 0.0
+    memory.late = 0.0
+    memory.raised = 0.0
+    memory.rate = 1.0 / reference.duration
+    memory.plan.remaining = reference.duration
+
+
+@kernel
+def touched(contacts: Contacts, robot: ControlledRobot, foot: int, upright: bool) -> bool:
+    """Whether a foot touches ground that it could stand on, or else what it cannot."""
+    for i in range(robot.nc):
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0:
+            if (contacts.normal[i, 1] > STEEP) == upright:
+                return True
+    return False
+
 
 @kernel
 def exchange_at_touchdown(
     t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
     """Exchange stance and swing when the swing foot has met the ground."""
-    if memory.phase < parameters.touchdown or t - memory.start < 0.3 * parameters.planning.earliest:
+    early = memory.phase < parameters.touchdown
+    if early or t - memory.start < 0.3 * parameters.planning.earliest:
         return
     swing = 1 - memory.stance
-    for i in range(robot.nc):
-        if robot.contact_foot[i] == swing and contacts.force[i, 0] > 0.0:
-            length = memory.swing[0] - memory.sole[0]
-            rise = memory.swing[1] - memory.sole[1]
-            if abs(length) > 0.1 * parameters.reference.length:
-                memory.slope = 0.4 * memory.slope + 0.6 * rise / length
-            memory.stance = swing
-            memory.landed = 0
-            memory.steps += 1
-            begin_step(t, parameters.reference, memory)
-            return
+    if touched(contacts, robot, swing, True):
+        length = memory.swing[0] - memory.sole[0]
+        rise = memory.swing[1] - memory.sole[1]
+        if abs(length) > 0.1 * parameters.reference.length:
+            slope = min(max(rise / length, -STEEPEST), STEEPEST)
+            memory.slope = 0.4 * memory.slope + 0.6 * slope
+        memory.stance = swing
+        memory.landed = 0
+        memory.steps += 1
+        begin_step(t, parameters.reference, memory)
+
+
+@kernel
+def lift_over(
+    t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Lift a swing foot that has hit a wall, such as the riser of a step, over it."""
+    if memory.stands == 1 or not touched(contacts, robot, 1 - memory.stance, False):
+        return
+    memory.alarm = 1.0
+    memory.phase = min(memory.phase, 0.5)
+    memory.late = 0.0
+    memory.plan.remaining = max(memory.plan.remaining, 0.3 * parameters.reference.duration)
+    more = parameters.fast * max(t - memory.time, 0.0)
+    memory.raised = min(memory.raised + more, parameters.most_raised)
 
 
 @kernel
@@ -72,16 +114,6 @@ def locate(
     plan.capture = memory.mass[0] - memory.sole[0] + robot.other[0] / parameters.reference.rate
     plan.swing = memory.swing[0] - memory.sole[0]
     plan.speed = memory.speed[0]
-
-
-@kernel
-def begin_step(t: float, reference: Reference, memory: Memory) -> None:
-    """Set the reference to the beginning of a step."""
-    memory.start = t
-    memory.phase = 0.0
-    memory.late = 0.0
-    memory.rate = 1.0 / reference.duration
-    memory.plan.remaining = reference.duration
 
 
 @kernel
@@ -219,7 +251,7 @@ def want_foothold(
     add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
 
     # Over the ground: the gait's way, higher when alarmed; a late foot looks for the ground.
-    up = memory.slope * plan.swing + value_at(reference.swing_z, phase)
+    up = memory.slope * plan.swing + value_at(reference.swing_z, phase) + memory.raised
     speed = memory.slope * plan.speed + slope_at(reference.swing_z, phase) * rate
     bend = curvature_at(reference.swing_z, phase) * squared
     s, r = phase, 1.0 - phase
@@ -330,6 +362,7 @@ def keep_balance(
 ) -> None:  # fmt: skip
     """Joint torques that walk, by the gait or by where the next foot has to land."""
     exchange_at_touchdown(t, contacts, robot, parameters, memory)
+    lift_over(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
     landed = has_landed(t, state, contacts, robot, parameters, memory)
     stand_or_walk(t, parameters, memory)

@@ -100,6 +100,8 @@ class Parameters(Landing):
         Time constant in which an alarm fades (s).
     crouch, lift : float
         How much lower the hip, how much higher the swing foot is when alarmed (m).
+    most_raised : float
+        How much higher a swing foot that has hit something is lifted at most (m).
     bent_knee, straight_knee : float
         How far a knee stays bent when alarmed, and otherwise (rad).
     slow, fast : float
@@ -135,6 +137,7 @@ class Parameters(Landing):
     calming: float = number(float)
     crouch: float = number(float)
     lift: float = number(float)
+    most_raised: float = number(float)
     bent_knee: float = number(float)
     straight_knee: float = number(float)
     slow: float = number(float)
@@ -156,6 +159,8 @@ class Memory(Stance):
         Whether the robot stands on both feet.
     phase, rate : float
         Where in the step the reference is, and how fast it moves (1/s).
+    raised : float
+        How much higher the swing foot is held, because it has hit something (m).
     late : float
         For how long the swing foot has looked for the ground (s).
     alarm : float
@@ -180,6 +185,7 @@ class Memory(Stance):
     stands: int = cell(int)
     phase: float = cell(float)
     rate: float = cell(float)
+    raised: float = cell(float)
     late: float = cell(float)
     alarm: float = cell(float)
     slope: float = cell(float)
