@@ -164,6 +164,8 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     if landed and parameters.adapts == 1:
         span = parameters.alarmed - parameters.calm
         alarm = min(max((sqrt(plan.cost) - parameters.calm) / span, 0.0), 1.0)
+        # A foot that is late has found the ground lower than it should be.
+        alarm = max(alarm, min(2.0 * memory.late / parameters.search - 0.2, 1.0))
         memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
 
 
@@ -192,6 +194,8 @@ def want_height(
     fallen += 0.5 * (2.0 * x - plan.capture - plan.pressure) * (shrunk - 1.0)
     across = plan.foothold - (hip[0] - memory.sole[0]) - fallen
     limit = under + sqrt(max(reach * reach - across * across, 0.25 * reach * reach))
+    if memory.late > 0.0:
+        limit += min(memory.swing[1] - memory.sole[1] - memory.slope * plan.swing, 0.0)
     low = min(min(own - parameters.crouch, room), limit)
     height = own + alarm * (low - own)
     point_task(robot, state, legs.hip[memory.stance], hip, on)

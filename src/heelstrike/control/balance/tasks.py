@@ -17,8 +17,8 @@ CONTACT_ROWS = 5
 # In which order rows are given up if not all can be kept: the margins of the centre of pressure
 # first, then the least normal force, then the friction cone. Motors cannot be overruled.
 KNEE_LEVEL = 4
-PRESSURE_LEVEL = 3
-FORCE_LEVEL = 2
+PRESSURE_LEVEL = 2
+FORCE_LEVEL = 3
 CONE_LEVEL = 1
 MOTOR_LEVEL = 0
 
