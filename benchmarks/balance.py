@@ -1,11 +1,11 @@
 """How much footstep feedback withstands, and what it costs.
 
-One controller with one set of gains. For pushes of 0.1 s on the trunk's centre of mass, at phases of
-a step, the impulse is raised until the robot does not recover strictly
+One controller with one set of gains. For pushes of 0.1 s on the trunk's centre of mass, at phases
+of a step, the impulse is raised until the robot does not recover strictly
 (:func:`heelstrike.analysis.recovery.recovery`): what is told is the last one of which it and all
 smaller ones recovered. Everything else is 100 steps from a seed: where the ground changes, its
-random heights, noise. A run counts if it completes, the hip stays above 0.65 of its height above the
-ground, the trunk within 0.6 rad, and the robot comes at least 0.7 of the way that its steps should
+random heights, noise. A run counts if it completes, the hip stays above 0.65 of its height above
+the ground, the trunk within 0.6 rad, and the robot comes at least 0.7 of the way that its steps should
 take it. Seeds below 1000 were used while the controller was made.
 
 Run: python benchmarks/balance.py [price push hard command] [--robot bravo7] [--phases 20]
@@ -80,8 +80,8 @@ def price(walker: Walker) -> None:
     usual = walker.walk(duration, hs.ComputedTorque(walker.robot, gait), record_every=1)
     way = feedback.position[-1, 0] - feedback.position[len(feedback.time) // 2, 0]
     print(
-        f"mean torque² {effort(feedback):.1f} N²m², computed torque {effort(usual):.1f}, of the gait "
-        f"{gait.cost / gait.step_duration:.1f}; step {way / 10.0:.4f} m, of the gait "
+        f"mean torque² {effort(feedback):.1f} N²m², computed torque {effort(usual):.1f}, of the "
+        f"gait {gait.cost / gait.step_duration:.1f}; step {way / 10.0:.4f} m, of the gait "
         f"{gait.step_length} m"
     )
 

@@ -76,6 +76,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "calm": 0.02 * size,
         "alarmed": 0.08 * size,
         "calming": 3.0 * pace,
+        "flat": 2e-3 * size,
         "crouch": 0.03 * size,
         "lift": 0.05 * size,
         "most_raised": 0.08 * size,

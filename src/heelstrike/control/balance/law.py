@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, exp, sqrt
+from math import atan, cos, exp, inf, sin, sqrt
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import constrain, point_task
@@ -33,6 +33,9 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 JUST_BEGUN = 0.05
 """A step has just begun up to this phase."""
+
+TURNING = 0.15
+"""How far within the sole a foot presses that touches at one end, as a part of its length."""
 
 STEEP = 0.6
 """Ground whose normal rises less cannot be stood upon."""
@@ -167,6 +170,30 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
         # A foot that is late has found the ground lower than it should be.
         alarm = max(alarm, min(2.0 * memory.late / parameters.search - 0.2, 1.0))
         memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
+
+
+@kernel
+def press_where_it_touches(
+    contacts: Contacts, robot: ControlledRobot, parameters: Parameters, tilt: float, memory: Memory
+) -> None:
+    """Want the centre of pressure near what touches of a foot that does not lie flat.
+
+    A foot on its heel alone is turned down gently by a pressure a little before the heel; torques
+    that are right for a sole that lies flat would throw it about.
+    """
+    planning, plan = parameters.planning, memory.plan
+    least, most = inf, -inf
+    for i in range(robot.nc):
+        if robot.contact_foot[i] == memory.stance and contacts.gap[i] < parameters.flat:
+            x = contacts.position[i, 0] - memory.sole[0]
+            z = contacts.position[i, 1] - memory.sole[1]
+            along = x * cos(tilt) - z * sin(tilt)
+            least, most = min(least, along), max(most, along)
+    if most != least or memory.stands == 1:
+        return
+    span = TURNING * (planning.toe - planning.heel)
+    plan.pressure = min(max(plan.pressure, most - span), least + span)
+    plan.pressure = min(max(plan.pressure, planning.heel), planning.toe)
 
 
 @kernel
@@ -377,6 +404,7 @@ def keep_balance(
     stance, on, program = memory.stance, memory.on, memory.program
     link = robot.foot_link[stance]
     tilt = state.kinematics.angle[link] - parameters.legs.angle[stance]
+    press_where_it_touches(contacts, robot, parameters, tilt, memory)
     constrain(robot, state, link, memory.sole, on)
     clear(program)
     weights = parameters.weights

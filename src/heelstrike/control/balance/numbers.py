@@ -98,6 +98,8 @@ class Parameters(Landing):
         and from which on balance is all that counts.
     calming : float
         Time constant in which an alarm fades (s).
+    flat : float
+        Points of the stance foot less than this above the ground touch it (m).
     crouch, lift : float
         How much lower the hip, how much higher the swing foot is when alarmed (m).
     most_raised : float
@@ -135,6 +137,7 @@ class Parameters(Landing):
     calm: float = number(float)
     alarmed: float = number(float)
     calming: float = number(float)
+    flat: float = number(float)
     crouch: float = number(float)
     lift: float = number(float)
     most_raised: float = number(float)
