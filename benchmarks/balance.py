@@ -5,8 +5,8 @@ of a step, the impulse is raised until the robot does not recover strictly
 (:func:`heelstrike.analysis.recovery.recovery`): what is told is the last one of which it and all
 smaller ones recovered. Everything else is 100 steps from a seed: where the ground changes, its
 random heights, noise. A run counts if it completes, the hip stays above 0.65 of its height above
-the ground, the trunk within 0.6 rad, and the robot comes at least 0.7 of the way that its steps should
-take it. Seeds below 1000 were used while the controller was made.
+the ground, the trunk within 0.6 rad, and the robot comes at least 0.7 of the way that its steps
+should take it. Seeds below 1000 were used while the controller was made.
 
 Run: python benchmarks/balance.py [price push hard command] [--robot bravo7] [--phases 20]
      [--rise 5] [--seeds 100] [--first 1000] [--method stepping]

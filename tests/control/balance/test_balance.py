@@ -128,15 +128,28 @@ def test_it_stands_starts_and_stops_on_command() -> None:
 
 def test_it_finds_the_ground_where_it_is_not_expected() -> None:
     """A step down, a step up and a slope that nobody told it of."""
-    for rise, ends in ((-0.04, 1.05), (0.02, 1.05)):
+    for rise, ends in ((-0.06, 1.05), (0.04, 1.05)):
         profile = [[-1.0, 0.0], [ends, 0.0], [ends, rise], [4.0, rise]]
         run = walked(law(), 5.6, ground=hs.Ground(profile=profile), record_every=10)
         assert run.completed, run.message
         assert run.position[-1, 0] > 1.8
+        assert run.position[:, 1].min() > 0.65 * run.position[0, 1]
     slope = hs.Ground(profile=[[-1.0, 0.0], [0.6, 0.0], [3.6, 0.3]])
     run = walked(law(), 5.6, ground=slope, record_every=10)
     assert run.completed
     assert run.log["slope"].values[-1] == pytest.approx(0.1, abs=0.02)
+
+
+def test_feet_that_do_not_lie_flat_are_not_thrown_about() -> None:
+    """Ground with corners at random heights of ±30 mm: feet stand on one end before they turn."""
+    rng = np.random.default_rng(5)
+    x = 0.6 + 0.15 * np.arange(40)
+    z = rng.uniform(-0.03, 0.03, len(x))
+    profile = np.column_stack(([-9.0, 0.6, *x, 9.0], [0.0, 0.0, *z, 0.0]))
+    run = walked(law(), 12.0 * 0.7, ground=hs.Ground(profile=profile), record_every=10)
+    assert run.completed, run.message
+    assert np.abs(run.position[:, 2]).max() < 0.6
+    assert run.position[-1, 0] > 2.5
 
 
 def test_it_logs_what_it_plans() -> None:

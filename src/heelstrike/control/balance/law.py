@@ -59,9 +59,9 @@ def begin_step(t: float, reference: Reference, memory: Memory) -> None:
 def touched(contacts: Contacts, robot: ControlledRobot, foot: int, upright: bool) -> bool:
     """Whether a foot touches ground that it could stand on, or else what it cannot."""
     for i in range(robot.nc):
-        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0:
-            if (contacts.normal[i, 1] > STEEP) == upright:
-                return True
+        steep = contacts.normal[i, 1] <= STEEP
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and steep != upright:
+            return True
     return False
 
 
