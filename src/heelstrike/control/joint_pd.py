@@ -149,12 +149,17 @@ class JointPD(Law):
     ControllerError
         If the robot cannot be controlled this way, or gait or gains do not fit it.
 
+    Notes
+    -----
+    Torques are held over a step of time stepping: the damping of a joint that moves little inertia,
+    an ankle in swing, must stay below inertia over step, or the linearly implicit scheme be used.
+
     Examples
     --------
     >>> import heelstrike as hs
     >>> robot = hs.load_robot("bravo7")
     >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
-    >>> law = hs.JointPD(robot, gait, kp=1000.0, kd=50.0, feedforward="full")
+    >>> law = hs.JointPD(robot, gait, kp=1000.0, kd=20.0, feedforward="full")
     >>> hs.simulate(robot, law, state=gait.initial_state, duration=1.4).completed
     True
     """
@@ -203,5 +208,5 @@ class JointPD(Law):
             motion=int(known is Feedforward.FULL),
         )
         begin = {"stance": gait.stance_foot, "landed": 1}
-        super().__init__(joint_pd, parameters, memory=begin, robot=robot)
+        super().__init__(joint_pd, parameters, memory=begin, robot=robot, stiffness=kp, damping=kd)
         self.gait = gait
