@@ -1,7 +1,7 @@
 # Every target sets up what it needs: a fresh machine with Python 3.11 or newer and make is enough.
 #
 #   make walk    bravo7 designs a gait and walks it; results in walk/
-#   make test    all tests
+#   make test    all tests; those in a browser if there is a chromium
 #   make bench   speed beside other engines; table, JSON and figures in bench/
 #   make check   formatting, lint, types, layers
 #   make check-all   these and all tests, on every kind of machine that this one can play; long

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from heelstrike.robot import Robot
+from heelstrike.robot import Robot, RobotBuilder
 from heelstrike.robot.files.mjcf import read_mjcf
 
 PLANAR = """
@@ -138,3 +138,56 @@ def compass_gait(gravity: float = 9.8) -> Robot:
         </body>""",
         gravity,
     )
+
+
+def four_bar(damping: float = 0.0) -> Robot:
+    """Crank, coupler and rocker; the loop is closed between the last two."""
+    build = RobotBuilder("four_bar")
+    crank = build.hinge(
+        "crank", None, mass=1.0, inertia=0.02, center_of_mass=(0, 0.1), damping=damping
+    )
+    coupler = build.hinge(
+        "coupler", crank, at=(0, 0.2), mass=1.5, inertia=0.08, center_of_mass=(0.3, 0.15)
+    )
+    rocker = build.hinge(
+        "rocker", None, at=(0.5, 0), mass=1.2, inertia=0.05, center_of_mass=(0, 0.2)
+    )
+    build.loop(coupler, rocker, at=(0.5, 0.3))
+    return build.build()
+
+
+def geared(polynomial: tuple[float, ...] = (0.0, 2.0)) -> Robot:
+    """Two pendulums side by side, the rear of which follows the front."""
+    build = RobotBuilder("geared")
+    for name, x in (("front", 0.5), ("rear", 0.0)):
+        build.hinge(name, None, at=(x, 0), mass=1.0, inertia=0.01, center_of_mass=(0, -0.3))
+    build.couple("rear", "front", polynomial)
+    return build.build()
+
+
+def parallel_ankles(sides: tuple[str, ...] = ("right", "left"), dry_friction: float = 0.0) -> Robot:
+    """Biped whose ankles are driven from the shank, by a lever and a rod."""
+    build = RobotBuilder("parallel_ankles")
+    trunk = build.floating_base("trunk", (0, 0.85), mass=20, inertia=1, center_of_mass=(0, 0.2))
+    for side in sides:
+        thigh = build.hinge(
+            f"{side}_hip", trunk, mass=5, inertia=0.07, center_of_mass=(0, -0.2), torque=200,
+            dry_friction=dry_friction,
+        )  # fmt: skip
+        shank = build.hinge(
+            f"{side}_knee", thigh, at=(0, -0.4), mass=3, inertia=0.04, center_of_mass=(0, -0.2),
+            torque=200, limits=(0.0, 2.0),
+        )  # fmt: skip
+        foot = build.hinge(
+            f"{side}_ankle", shank, at=(0, -0.4), mass=1, inertia=5e-3, center_of_mass=(0.02, -0.03)
+        )
+        lever = build.hinge(
+            f"{side}_motor", shank, at=(0, -0.15), mass=0.3, inertia=1e-3,
+            center_of_mass=(-0.02, 0), torque=80,
+        )  # fmt: skip
+        rod = build.hinge(
+            f"{side}_rod", lever, at=(-0.05, 0), mass=0.2, inertia=1e-3, center_of_mass=(0, -0.12)
+        )
+        build.loop(rod, foot, at=(0, -0.25))
+        build.sole(foot, heel=(-0.07, -0.05), toe=(0.15, -0.05))
+    return build.build()

@@ -192,6 +192,8 @@ def calls() -> dict[str, Callable[..., Any]]:
         "heelstrike.Bundle.replaced": robot.model.replaced,
         "heelstrike.Run.plot": partial(run.plot, "torque"),
         "heelstrike.Run.animate": partial(run.animate, "film.gif"),
+        "heelstrike.Run.save_html": partial(run.save_html, "run.html"),
+        "heelstrike.Run.save_report": partial(run.save_report, "run.html"),
         "heelstrike.Run.summary": run.summary,
         "heelstrike.RobotBuilder.floating_base": partial(bare.floating_base, "trunk"),
         "heelstrike.RobotBuilder.hinge": partial(based.hinge, "hip", trunk),

@@ -6,6 +6,7 @@ import ast
 import importlib
 import inspect
 import pkgutil
+import re
 import subprocess
 import sys
 import tomllib
@@ -48,6 +49,7 @@ HEAVY = {
     "pandas",
     "scipy",
     "viser",
+    "websockets",
     "xarray",
 }
 
@@ -126,3 +128,17 @@ def test_every_package_has_its_layer() -> None:
     assert set(names) == {module.name for module in pkgutil.iter_modules([str(PACKAGE)])}
     above = names[: names.index("compiler")]
     assert room["source_modules"] == [f"heelstrike.{name}" for name in above]
+
+
+def test_the_source_package_carries_what_readme_and_docs_name() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    carried = project["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        for target in re.findall(r"\]\((?!https?:|#|mailto:)([^)#]+)", text):
+            named = (page.parent / target).resolve()
+            assert named.exists(), f"{page.name}: {target}"
+            assert named.relative_to(ROOT).parts[0] in carried, f"{page.name}: {target}"
+    if "make " in (ROOT / "README.md").read_text(encoding="utf-8"):
+        assert {"Makefile", "constraints.txt"} <= set(carried)

@@ -36,7 +36,7 @@ KNOWN: tuple[tuple[str, str, str], ...] = (
     ("sim/time_stepping/method.py", "reaction.slip[contact] = answer.velocity[2 * place + 1]",
      "reaction.slip[contact] = -answer.velocity[2 * place + 1]"),
     ("sim/run.py", 'of="contacts.gap"', 'of="reaction.slip"'),
-    ("sim/event_driven/method.py", "_, record.slip_velocity[row, contact] = contact_velocity(",
+    ("sim/event_driven/rows.py", "_, record.slip_velocity[row, contact] = contact_velocity(",
      "record.slip_velocity[row, contact], _ = contact_velocity("),
     ("sim/compliant/dynamics.py", "memory.reaction.slip[contact] = row_product(",
      "memory.reaction.slip[contact] = -row_product("),

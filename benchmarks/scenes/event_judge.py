@@ -13,6 +13,10 @@ jump between two rows of one time, by impulses that stand in the events. Promise
   it, and none that sticks breaks loose below the limit of its friction. Stops and dry joints alike.
 - impact law at each jump: Newton's restitution on the normal velocity, Coulomb's cone on the
   impulses, friction against the sliding that is left.
+- bridge law: over the time of a bridge the robot moves freely, its impulses act at its beginning.
+  At its end no contact on the ground approaches it, those that were pressed do not leave but by
+  restitution, cone and opposition hold with the velocities there, and it has made no energy. How
+  far it says that it may be wrong is allowed for. Bridges are counted, and their time.
 - energy: the work of motors, dampers, pushes, friction and stops explains its change; an impact
   never makes any, except by Newton's restitution with friction, where the run has to say so.
 
@@ -105,12 +109,22 @@ class _Events:
         self.instant = time[self.first]
         self.settled = np.isin(np.arange(len(time)), self.last)
         """Rows that show what follows their instant, not what went before."""
+        self.bridges: dict[int, tuple[float, float]] = {}
+        """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
+        for event in run.events:
+            if event.kind is EventKind.BRIDGE:
+                self.bridges[int(np.argmin(np.abs(self.instant - event.time)))] = event.impulse
+        self.smooth = ~np.isin(np.arange(len(time)), self.last[list(self.bridges)])
+        """Rows of smooth phases: those at the beginning of bridges have no contact forces."""
+        self.settled &= self.smooth
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
         self.forces(found)
         self.impacts(found)
         self.intervals(found)
+        found.figures["bridges"] = len(self.bridges)
+        found.figures["time on bridges"] = sum(length for length, _ in self.bridges.values())
 
     def rows_in_order(self, found: Findings) -> None:
         back = np.maximum(-np.diff(self.rows.time), 0.0)
@@ -191,7 +205,8 @@ class _Events:
         over = (np.abs(dry) - most) * weight / size
         found.look("dry friction: limit", over, LAW, time, names)
         lacks = np.abs(dry + most * np.sign(rows.v)) * weight / size
-        lacks = np.where(np.abs(rows.v) > MOVING, lacks, 0.0)
+        # Over a bridge the mean of it is recorded.
+        lacks = np.where((np.abs(rows.v) > MOVING) & self.smooth[:, None], lacks, 0.0)
         found.look("dry friction: opposes", np.minimum(lacks, speed), LAW, time, names)
         slack = (most - np.abs(dry)) * weight / size
         loose = np.minimum(np.abs(self.acceleration) / (weight * size), slack)
@@ -261,11 +276,56 @@ class _Events:
             left = matrix @ (after - before) - kicked
             unexplained = rows.metric_of(one).of_force(left[None]) / size
             found.look("balance of an impact", unexplained, JUMP, time)
+            if k in self.bridges:
+                self.bridge_law(found, k, one, p, size)
+                continue
             gained = 0.5 * (after @ matrix @ after - before @ matrix @ before)
             if k not in gains:
                 found.look("impact makes energy", np.array([gained / size**2]), GAIN, time)
             if most.get(k, 0) == 1 and b - a <= 1:
                 self.impact_law(found, one, p, s, before, after, size)
+
+    def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
+        """What holds at the end of the bridge that begins at instant k."""
+        rows, (length, wrong) = self.rows, self.bridges[k]
+        end = int(np.argmin(np.abs(self.instant - self.instant[k] - length)))
+        time = rows.time[one]
+        apart = abs(self.instant[end] - self.instant[k] - length)
+        found.look("bridge: row at its end", np.array([apart]), INSTANT, time)
+        begin, last, after = self.first[k], self.last[k], self.first[end]
+        kinetic, potential = rows.energy()
+        gained = kinetic[after] + potential[after] - kinetic[begin] - potential[begin]
+        force = self.pushed[last] - rows.model.damping * rows.v[last]
+        force[rows.model.actuator_joint] += rows.run.torque[last]
+        work = length * float(force @ rows.v[last])
+        # Forces go on to act for the length; what they do in it is small of second order.
+        slack = 0.5 * size * (length * self.force_size[last]) + size * wrong
+        found.look("bridge makes energy", np.array([(gained - work - slack) / size**2]), GAIN, time)
+        if not rows.contacts:
+            return
+        weight = np.maximum(rows.metric_of(one).weight(rows.jacobian[one]), 1e-300)
+        unit, names = size / weight, rows.contacts
+        came = rates(rows.jacobian[one], rows.v[begin][None])
+        went = rates(rows.jacobian[after : after + 1], rows.v[after][None])
+        pressed = p[None, :, 0] / unit[..., 0]
+        high, low = rows.high[one], rows.low[one]
+        # The ground turns under the robot, and gaps close at leisure, in this time.
+        slow = wrong + length * self.force_size[last]
+        loose = weight * (size * LAW + slow)
+        on = (rows.gap[one] <= TOGETHER) & (rows.gap[after : after + 1] <= TOGETHER)
+        into = np.where(on, -went[..., 0] / loose[..., 0], 0.0)
+        found.look("bridge: speed into the ground", into, 1.0, time, names)
+        bounce = rows.measured.restitution[one] * np.maximum(-came[..., 0], 0.0)
+        off = np.maximum(went[..., 0] - bounce, 0.0) / loose[..., 0]
+        off = np.where(on & (pressed > LAW), off, 0.0)
+        found.look("bridge: pressed and leaves", off, 1.0, time, names)
+        cone = excess_over_cone(p[None], high) / unit[..., 1]
+        found.look("bridge: cone", cone, LAW, time, names)
+        slides = np.where(np.abs(went[..., 1]) > loose[..., 1], went[..., 1], 0.0)
+        wrong_way = friction_that_does_not_oppose(
+            p[None], slides, low, high, unit[..., 1], weight[..., 1] * size
+        )
+        found.look("bridge: friction opposes", wrong_way, LAW, time, names)
 
     def impact_law(
         self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array,
@@ -379,6 +439,8 @@ class _Events:
         """Whether contact modes may have changed at each instant."""
         changes = np.zeros(len(self.instant), dtype=bool)
         changes |= self.first != self.last
+        for k, (length, _) in self.bridges.items():
+            changes |= np.abs(self.instant - self.instant[k] - length) <= INSTANT
         for event in self.rows.run.events:
             near = np.abs(self.instant - event.time) <= INSTANT
             if np.any(near):

@@ -27,15 +27,20 @@ class Rows:
     ----------
     run : heelstrike.sim.Run
         The record. Of the robot only its numbers are read.
-    pull : (T, n) float, optional
-        Generalised forces of the pushes at the rows; a judge knows how its method applies them.
+    corners : float
+        How near (m) a point has to come to a second face by the next row, for its force to be that
+        of both.
 
     Attributes
     ----------
     q, v, time, gap, normal, force : arrays
         As recorded.
+    cornered : (T, nc) bool
+        Where the force of a contact point may be that of two faces of a concave corner.
     jacobian : (T, nc, 2, n) float
         Rows (normal, tangent) of the contact points under the recorded normals.
+    acting : (T, nc, 2, n) float
+        The same of where the recorded forces are said to act: in corners elsewhere on the disc.
     measured : Measurement
         Distances from the centres of the contact discs to the ground.
     metric : Metric
@@ -44,7 +49,7 @@ class Rows:
         Generalised force of motors, springs and dampers, less H; pushes are not in it.
     """
 
-    def __init__(self, run: Any) -> None:
+    def __init__(self, run: Any, corners: float = -np.inf) -> None:
         model = run.robot.model
         self.run, self.model = run, model
         self.time, self.q, self.v = run.time, run.position, run.velocity
@@ -55,9 +60,13 @@ class Rows:
         self.terrain = Terrain(ground.vertices, ground.friction, ground.restitution)
         self.center = self.poses.points(model.contact_link, model.contact_position)
         self.measured = self.terrain.measure(self.center)
+        self.cornered = self.terrain.to_corner(self.center) - model.contact_radius <= corners
         self.point = self.center - model.contact_radius[:, None] * self.normal
         world = self.poses.jacobian(model.contact_link, self.point)
-        self.jacobian = self.along(world)
+        self.jacobian = self.acting = self.along(world)
+        if self.cornered.any():
+            acts = np.where(self.cornered[..., None], run.contact_point, self.point)
+            self.acting = self.along(self.poses.jacobian(model.contact_link, acts))
         self.matrix = self.poses.mass_matrix()
         self.metric = Metric(self.matrix)
         self.speed = rates(self.jacobian, self.v)
@@ -120,8 +129,11 @@ class Rows:
         found.look("recorded gap", differs, SAME_PLACE, self.time, self.contacts)
         turned = np.where(near, self.measured.disagreement(self.normal), 0.0)
         found.look("recorded normal", turned, 1e-5, self.time, self.contacts)
-        away = np.linalg.norm(self.point - self.run.contact_point, axis=-1) / size
-        found.look("recorded place", away, SAME_PLACE, self.time, self.contacts)
+        away = np.linalg.norm(self.point - self.run.contact_point, axis=-1)
+        beyond = np.linalg.norm(self.center - self.run.contact_point, axis=-1)
+        beyond -= self.model.contact_radius
+        off = np.where(self.cornered, beyond, away) / size
+        found.look("recorded place", off, SAME_PLACE, self.time, self.contacts)
 
     def energy(self) -> tuple[Array, Array]:
         """Kinetic and potential energy (T,)."""

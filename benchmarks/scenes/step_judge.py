@@ -15,6 +15,8 @@ One row a step is needed (``record_every=1``). With the recorded state (q, v), t
   ground, if they touch already, touched a step ago, or would close freely; elsewhere λ = 0. The
   friction cone, and friction of μ λ_n against what slides. Stops are contacts without friction,
   dry friction of joints a contact with a known normal force.
+  In a concave corner a point may be pushed by both faces, and the record has the resultant: there
+  it is held against balance and energy only.
 - energy: the contact solve takes kinetic energy, but for what b > 0 asks for: λ_n b.
 
 All is measured in kinetic sizes (:class:`scenes.mechanics.Metric`) relative to the size of the
@@ -47,6 +49,11 @@ SINK = 1e-6
 """Depth (m) in the ground that neither the linearised gap nor the turning of the robot explains."""
 TOUCHING = 1e-9
 """A contact touches when its gap is no more than this (m)."""
+BOUND = (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT, Scheme.IMPACT_RESOLVED)
+"""Schemes that bound the gap at the end of the step."""
+IN_CORNER, DEEP_IN_CORNER = 1e-3, 5e-2
+"""A point that comes this near (m) to a second face of a concave corner may be pushed by both;
+schemes that do not bound the gap sink."""
 UNDECIDED = 1e-12
 """A gap (m) this near the edge of a scheme's activation may count either way."""
 
@@ -62,7 +69,7 @@ def judge_steps(run: Any, controller: Any = None) -> Findings:
         What controlled it: the linearly implicit scheme takes its gains at the end of the step.
     """
     found = Findings()
-    rows = Rows(run)
+    rows = Rows(run, corners=IN_CORNER if run.method.scheme in BOUND else DEEP_IN_CORNER)
     rows.geometry(found)
     depth = np.max(-rows.gap, initial=0.0)
     found.figures["penetration"] = float(max(depth, 0.0))
@@ -85,17 +92,18 @@ class _Steps:
         known = rows.smooth[:-1] + self.pushed
         matrix = rows.matrix[:-1]
         self.before, self.after = rows.v[:-1], rows.v[1:]
-        if self.scheme is Scheme.LINEARLY_IMPLICIT:
+        if self.scheme in (Scheme.LINEARLY_IMPLICIT, Scheme.MOREAU_JEAN):
             stiffness, damping = model.stiffness.copy(), model.damping.copy()
-            if controller is not None:
+            ahead = self.h if self.scheme is Scheme.LINEARLY_IMPLICIT else 0.5 * self.h
+            if controller is not None and self.scheme is Scheme.LINEARLY_IMPLICIT:
                 stiffness[model.actuator_joint] += controller.parameters.kp
                 damping[model.actuator_joint] += controller.parameters.kd
-            matrix = matrix + np.diag(self.h * damping + self.h**2 * stiffness)
-            known = known - self.h * stiffness * self.before
+            matrix = matrix + np.diag(ahead * damping + ahead**2 * stiffness)
+            known = known - ahead * stiffness * self.before
         self.metric = Metric(matrix)
         self.matrix = matrix
         self.free = self.before + self.h * self.metric.accelerated(known)
-        self.jacobian = rows.jacobian[:-1]
+        self.jacobian, self.acting = rows.jacobian[:-1], rows.acting[:-1]
         self.impulse = self.h * rows.force[:-1]
         self.stop, self.dry = self.h * run.stop_torque[:-1], self.h * run.friction_torque[:-1]
         self.known = known
@@ -103,6 +111,7 @@ class _Steps:
         self.size = size(self.before) + size(self.after) + self.h * self.metric.of_force(known)
         self.size = np.maximum(self.size, 1e-100)
         self.gap = rows.gap[:-1]
+        self.cornered = rows.cornered[:-1]
         self.moved = np.diff(rows.q, axis=0) / self.h
         self.split = np.zeros(len(self.time), dtype=bool)
         """Steps whose positions move with another velocity than the one behind them."""
@@ -122,7 +131,7 @@ class _Steps:
 
     def balance(self, found: Findings) -> None:
         momentum = np.einsum("tij,tj->ti", self.matrix, self.after - self.before)
-        acted = generalised(self.jacobian, self.impulse) + self.stop + self.dry
+        acted = generalised(self.acting, self.impulse) + self.stop + self.dry
         left = momentum - self.h * self.known - acted
         unexplained = self.metric.of_force(left) / self.size
         found.look("balance", unexplained, BALANCE, self.time)
@@ -164,7 +173,7 @@ class _Steps:
             least = np.where(self.split[:, None], whole, -gap / self.h)
             near = self.split[:, None] & (np.abs(gap) < 2.0 * TOUCHING)
             return least, near
-        if self.scheme in (Scheme.GAP_LINEARISED, Scheme.LINEARLY_IMPLICIT, Scheme.IMPACT_RESOLVED):
+        if self.scheme in BOUND:
             return -gap / self.h, np.zeros(gap.shape, dtype=bool)
         foreseen, least = gap, np.zeros_like(gap)
         if self.scheme is Scheme.MOREAU_JEAN:
@@ -203,10 +212,13 @@ class _Steps:
             moved, free = (rates(self.jacobian, v)[..., 0] for v in (self.moved, self.free))
             mine = self.arrives(found, "contact", self.gap, moved, free)
         least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
+        # Of the force of two faces only where it acts is known, and what it does.
+        impulse = np.where(self.cornered[..., None], 0.0, self.impulse)
+        near = near | self.cornered
         self.normals(
             "contact",
             found,
-            self.impulse[..., 0],
+            impulse[..., 0],
             speed[..., 0],
             weight[..., 0],
             least,
@@ -216,32 +228,31 @@ class _Steps:
         size = self.size[:, None]
         unit = size / np.maximum(weight[..., 1], 1e-300)
         low, high = rows.low[:-1], rows.high[:-1]
-        cone = excess_over_cone(self.impulse, high) / unit
+        cone = excess_over_cone(impulse, high) / unit
         found.look("friction cone", cone, LAW, self.time, names)
         speed_unit = np.maximum(weight[..., 1] * size, 1e-300)
-        wrong = friction_that_does_not_oppose(
-            self.impulse, speed[..., 1], low, high, unit, speed_unit
-        )
+        wrong = friction_that_does_not_oppose(impulse, speed[..., 1], low, high, unit, speed_unit)
         found.look("friction opposes", wrong, LAW, self.time, names)
         slip = np.abs(rows.run.slip_velocity[:-1] - speed[..., 1]) / speed_unit
-        pressed = self.impulse[..., 0] > 0.0
+        pressed = impulse[..., 0] > 0.0
         found.look("recorded slip", np.where(pressed, slip, 0.0), LAW, self.time, names)
         self.sink(found, speed[..., 0])
 
     def sink(self, found: Findings, speed: Array) -> None:
         """Penetration that the schemes which bound the gap itself do not allow."""
-        if self.scheme not in (
-            Scheme.GAP_LINEARISED,
-            Scheme.LINEARLY_IMPLICIT,
-            Scheme.IMPACT_RESOLVED,
-        ):
+        if self.scheme not in BOUND:
             return
         rows = self.rows
         moved = np.einsum("tpc,tpc->tp", np.diff(rows.center, axis=0), rows.normal[:-1])
         turning = moved - self.h * (
             rates(self.jacobian, self.moved)[..., 0] if self.split.any() else speed
         )
-        deep = -rows.gap[1:] - np.maximum(-turning, 0.0)
+        explained = np.maximum(-turning, 0.0)
+        if self.cornered.any():  # the nearest face afterwards may be the other one
+            world = rows.poses.jacobian(rows.model.contact_link, rows.center)[:-1]
+            left = np.diff(rows.center, axis=0) - self.h * rates(world, self.moved)
+            explained = np.where(self.cornered, np.linalg.norm(left, axis=-1), explained)
+        deep = -rows.gap[1:] - explained
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 
     def stops(self, found: Findings) -> None:
@@ -282,7 +293,7 @@ class _Steps:
         # Work over a step: impulses times the mean velocity, as for an exact jump.
         mean = 0.5 * (self.before + self.after)
         model, run = self.rows.model, self.rows.run
-        acted = generalised(self.jacobian, self.impulse) + self.stop + self.dry
+        acted = generalised(self.acting, self.impulse) + self.stop + self.dry
         motors = np.zeros_like(mean)
         motors[:, model.actuator_joint] = run.torque[:-1]
         forces = motors + self.pushed - model.damping * self.before

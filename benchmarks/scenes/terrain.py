@@ -52,6 +52,32 @@ class Terrain:
         foot = self.corner[:-1] + held[..., None] * self.tangent
         return np.linalg.norm(point[..., None, :] - foot, axis=-1), foot, held != along
 
+    def to_corner(self, point: Array) -> Array:
+        """How near points (T, n, 2) come, by the next row, to a second face of a concave corner.
+
+        Infinite where there is none. The last row is as near as it is.
+        """
+        distance, _, _ = self._feet(point)
+        beside = self._beside(point, distance)
+        second = np.argmin(beside, axis=-1)[..., None]
+        now = np.take_along_axis(beside, second, -1)[..., 0]
+        then = np.take_along_axis(np.concatenate((distance[1:], distance[-1:])), second, -1)[..., 0]
+        return np.where(np.isfinite(now), then, np.inf)
+
+    def _beside(self, point: Array, distance: Array) -> Array:
+        """Distances (..., s) to what makes a concave corner with the nearest segment, or infinity.
+
+        Its neighbours do where the ground turns upwards between them, others if they face it.
+        """
+        nearest = np.argmin(distance, axis=-1)
+        place = np.arange(len(self.length))
+        away = place - nearest[..., None]
+        own = self.normal[nearest]
+        turn = own[..., None, 0] * self.normal[:, 1] - own[..., None, 1] * self.normal[:, 0]
+        height = np.einsum("...sc,sc->...s", point[..., None, :] - self.corner[:-1], self.normal)
+        faces = np.where(np.abs(away) == 1, turn * away > 1e-9, height >= 0.0) & (away != 0)
+        return np.where(faces, distance, np.inf)
+
     def measure(self, point: Array) -> Measurement:
         """Measure points (..., 2)."""
         distance, foot, on_corner = self._feet(point)

@@ -33,6 +33,14 @@ if _plain_code.is_asked_for():  # before anything else is imported
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.analysis.stability.largest import Largest as Largest
+    from heelstrike.analysis.stability.largest import largest_ground_step as largest_ground_step
+    from heelstrike.analysis.stability.largest import largest_push as largest_push
+    from heelstrike.analysis.stability.largest import largest_roughness as largest_roughness
+    from heelstrike.analysis.stability.largest import largest_slope as largest_slope
+    from heelstrike.analysis.stability.trial import Trial as Trial
+    from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
+    from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
     from heelstrike.compiler.bundle import Bundle as Bundle
     from heelstrike.compiler.bundle import array as array
     from heelstrike.compiler.bundle import cell as cell
@@ -55,6 +63,7 @@ if TYPE_CHECKING:
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
@@ -71,7 +80,9 @@ if TYPE_CHECKING:
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
+    from heelstrike.gait import PhasedGait as PhasedGait
     from heelstrike.gait import load_gait as load_gait
+    from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
     from heelstrike.robot import Robot as Robot
     from heelstrike.robot import RobotBuilder as RobotBuilder
@@ -97,6 +108,8 @@ if TYPE_CHECKING:
     from heelstrike.sim import load_snapshot as load_snapshot
     from heelstrike.sim import simulate as simulate
     from heelstrike.sim import simulate_batch as simulate_batch
+    from heelstrike.view.live import watch as watch
+    from heelstrike.view.report import report as report
 
 __version__ = "0.1.0"
 
@@ -127,8 +140,10 @@ _HOME = {
     "InfeasibleGaitError": "heelstrike.errors",
     "JointPD": "heelstrike.control",
     "KelvinVoigt": "heelstrike.sim",
+    "Largest": "heelstrike.analysis.stability.largest",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
+    "PhasedGait": "heelstrike.gait",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
     "RobotBuilder": "heelstrike.robot",
@@ -144,9 +159,12 @@ _HOME = {
     "Snapshot": "heelstrike.sim",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
+    "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",
+    "VirtualConstraints": "heelstrike.control",
     "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
+    "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
@@ -158,17 +176,25 @@ _HOME = {
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
+    "largest_ground_step": "heelstrike.analysis.stability.largest",
+    "largest_push": "heelstrike.analysis.stability.largest",
+    "largest_roughness": "heelstrike.analysis.stability.largest",
+    "largest_slope": "heelstrike.analysis.stability.largest",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
+    "make_invariant": "heelstrike.gait",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
+    "report": "heelstrike.view.report",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
     "solve_quadratic_program": "heelstrike.control",
+    "watch": "heelstrike.view.live",
+    "zero_dynamics": "heelstrike.analysis.stability.zero_dynamics",
 }
 
 

@@ -7,7 +7,6 @@ accuracy of central differences of a map known to 1e-11.
 from __future__ import annotations
 
 from functools import cache
-from types import SimpleNamespace
 from typing import Any
 
 import mechanisms
@@ -176,11 +175,13 @@ def test_a_robot_that_does_not_walk() -> None:
 
 
 def test_no_solver_certifies_the_first_instant() -> None:
-    """A run without rows is a step that is not completed, told in words.
+    """A run that ends after some bridges is a step that is not completed, told in words.
 
     The mass matrix of a wheel with next to no inertia is singular to working precision.
     """
-    with pytest.raises(hs.LimitCycleError, match=r"did not complete a step \(no contact solver"):
+    with pytest.raises(
+        hs.LimitCycleError, match=r"did not complete a step in [\d.e-]+ s \(no contact solver"
+    ):
         hs.find_limit_cycle(
             mechanisms.rimless_wheel(inertia=1e-12),
             wheel_state(0.15, 1.5),
@@ -216,19 +217,71 @@ def test_a_newton_step_is_halved_until_the_walk_goes_on() -> None:
     """From 0.8 by halves: 0.4 still falls, 0.2 walks; what never walks is left at its shortest."""
     tried: list[float] = []
 
-    def step(state: float) -> SimpleNamespace:
-        tried.append(state)
-        if state > limit:
-            raise hs.LimitCycleError("fell")
-        return SimpleNamespace(state=state)
+    class Image:
+        def at(self, newton: Any) -> float:
+            return float(newton[0])
 
-    chart: Any = SimpleNamespace(state=lambda x: float(x[0]), coordinates=lambda state: state)
+        def __call__(self, newton: Any) -> None:
+            tried.append(self.at(newton))
+            if self.at(newton) > limit:
+                raise hs.LimitCycleError("fell")
+
+    image: Any = Image()
     limit = 0.3
-    assert _moved_on(step, chart, np.array([0.8])) == pytest.approx(0.2)  # type: ignore[arg-type]
+    assert _moved_on(image, np.array([0.8])) == pytest.approx(0.2)
     np.testing.assert_allclose(tried, [0.8, 0.4, 0.2])
     limit = 0.0
     shortest = 0.8 * 0.5**HALVINGS
-    assert _moved_on(step, chart, np.array([0.8])) == pytest.approx(shortest)  # type: ignore[arg-type]
+    assert _moved_on(image, np.array([0.8])) == pytest.approx(shortest)
+
+
+class Filtered(hs.Bundle):
+    """The speed of a wheel, filtered, and a number that nobody asks about."""
+
+    unused: float = hs.cell(float)
+    speed: float = hs.cell(float)
+
+
+@hs.controller
+def listens(state, memory: Filtered, torque):
+    """Follow the speed of the wheel by a tenth a call."""
+    memory.speed += 0.1 * (state.v[2] - memory.speed)
+
+
+def test_what_a_sampled_controller_remembers_has_multipliers() -> None:
+    """A filter that does not act: its multiplier is what it forgets in the calls of a step.
+
+    The step takes 1.035 s, so that a call every 0.1 s makes eleven of them. The multiplier of the
+    wheel itself stays as it is.
+    """
+    gravity, slope, inertia = 9.81, 0.08, 0.5
+    speed, multiplier = wheel_cycle(gravity, slope, inertia)
+    forgotten: list[float] = []
+
+    def relabelled(memory: Any, time: float) -> None:
+        forgotten.append(time)
+
+    cycle = hs.find_limit_cycle(
+        mechanisms.rimless_wheel(inertia=inertia, gravity=gravity),
+        wheel_state(slope, 1.02 * speed),
+        listens(),
+        ground=hs.Ground(friction=3.0, slope=-slope),
+        control_period=0.1,
+        memory=["speed"],
+        relabelled=relabelled,
+    )
+    calls = np.ceil(cycle.period / 0.1)
+    assert min(cycle.period % 0.1, 0.1 - cycle.period % 0.1) > 1e-3
+    wanted = sorted([multiplier, 0.9**calls], reverse=True)
+    np.testing.assert_allclose(cycle.multipliers, wanted, atol=1e-5)
+    assert cycle.residual <= 1e-10
+    assert 0.3 * speed < cycle.memory[0] < speed
+    assert forgotten[-1] == pytest.approx(cycle.period, abs=1e-3)
+    with pytest.raises(hs.SimulationError, match="has no sped; it has unused, speed"):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=inertia, gravity=gravity), wheel_state(slope, speed),
+            listens(), ground=hs.Ground(friction=3.0, slope=-slope), memory=["sped"],
+        )  # fmt: skip
 
 
 def test_ctrl_c_ends_the_search() -> None:

@@ -78,6 +78,26 @@ def test_chatter_and_scuffing_are_no_steps() -> None:
     assert [(s.foot, s.touchdown) for s in walking_steps(run)] == [(1, 0.3)]
 
 
+def test_a_landing_that_does_not_last_is_no_step() -> None:
+    """The left foot taps the ground for 10 ms; later it lands, bounces twice, and stays."""
+    robot = walking.bravo7()
+    events = [
+        liftoff(0.15, RIGHT[0]),
+        liftoff(0.15, RIGHT[1]),
+        touchdown(0.2, LEFT[0]),
+        liftoff(0.21, LEFT[0]),
+        touchdown(0.3, RIGHT[0]),
+        touchdown(0.4, LEFT[0]),
+        liftoff(0.405, LEFT[0]),
+        touchdown(0.415, LEFT[0]),
+        liftoff(0.418, LEFT[0]),
+        touchdown(0.43, LEFT[0]),
+        liftoff(0.5, LEFT[0]),
+    ]
+    run = make_run(robot, ROWS, force=pushes(robot, [[0]] * 11), events=events)
+    assert [(s.foot, s.touchdown, s.liftoff) for s in walking_steps(run)] == [(1, 0.4, 0.5)]
+
+
 def test_feet_that_chatter_in_turn_make_no_steps() -> None:
     """Both feet stand and lose the ground for a few milliseconds, one after the other."""
     robot = walking.bravo7()

@@ -367,3 +367,22 @@ def test_schemes_are_those_of_the_library() -> None:
     for scheme in walk_module.Scheme:
         assert method_called(scheme, 1e-4) == hs.TimeStepping(step=1e-4, scheme=Scheme[scheme.name])
         assert Scheme[scheme.name].label == scheme.value
+
+
+def test_page_of_a_walk(walk: Callable[..., Any], tmp_path: Path) -> None:
+    page = tmp_path / "walk.html"
+    result = walk("--steps", "1", "--html", str(page))
+    assert result.exit_code == 0, result.stderr
+    assert "walk.html" in result.stderr
+    text = page.read_text(encoding="utf-8")
+    assert "bravo7 walks: 1 step," in text
+    assert '<th scope="row">command</th>' in text
+
+
+def test_a_page_that_cannot_be_written_is_refused_first(
+    walk: Callable[..., Any], tmp_path: Path
+) -> None:
+    result = walk("--html", str(tmp_path / "walk.png"))
+    assert result.exit_code == 2
+    assert "ends in .html" in result.stderr
+    assert not (tmp_path / "out" / "run.nc").exists()

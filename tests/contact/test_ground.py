@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from heelstrike.compiler.compilation import uncompiled
-from heelstrike.contact.ground import Ground, ground_contact
+from heelstrike.contact.ground import Ground, ground_contact, second_contact
 from heelstrike.errors import SimulationError
 
 contact = uncompiled(ground_contact)
@@ -113,3 +113,43 @@ def test_refusals_say_what_is_wrong(arguments: dict[str, object], words: str) ->
 def test_unknown_keyword_raises() -> None:
     with pytest.raises(TypeError):
         Ground(mu=0.3)  # type: ignore[call-arg]
+
+
+second = uncompiled(second_contact)
+
+FLOOR_AND_CURB = Ground(
+    friction=(0.1, 0.2, 0.3), profile=[[-1.0, 0.0], [0.0, 0.0], [0.0, 0.2], [1.0, 0.2]]
+)
+
+
+def other_face(ground: Ground, x: float, z: float, radius: float = 0.0) -> tuple[float, float]:
+    """Gap to the second face, and its friction; checks that the normal is a unit vector."""
+    normal = np.zeros(2)
+    gap, friction, _ = second(ground.model(), x, z, radius, normal)
+    if np.isfinite(gap):
+        assert np.hypot(*normal) == pytest.approx(1.0)
+    return gap, friction
+
+
+def test_second_face_of_a_corner_is_the_one_that_is_not_nearest() -> None:
+    assert other_face(FLOOR_AND_CURB, -0.05, 0.02) == pytest.approx((0.05, 0.2))
+    assert other_face(FLOOR_AND_CURB, -0.02, 0.05) == pytest.approx((0.05, 0.1))
+    gap, friction = other_face(FLOOR_AND_CURB, -0.15, 0.1, 0.1)
+    assert (gap, friction) == pytest.approx((0.05, 0.2))
+
+
+def test_second_face_ends_at_its_far_corner() -> None:
+    """A disc higher than the curb meets its edge, 3-4-5 away."""
+    gap, friction = other_face(FLOOR_AND_CURB, -0.3, 0.2 + 0.04, 0.24)
+    assert gap == pytest.approx(np.hypot(0.3, 0.04) - 0.24)
+    assert friction == pytest.approx(0.2)
+
+
+def test_convex_ground_has_no_second_face() -> None:
+    roof = Ground(profile=[[-1.0, 0.0], [0.0, 0.5], [1.0, 0.0]])
+    assert other_face(roof, -0.01, 0.6)[0] == np.inf
+    assert other_face(FLOOR_AND_CURB, 0.1, 0.25)[0] == np.inf
+    concave = [
+        ground.model().concave for ground in (Ground(), Ground(slope=0.2), roof, FLOOR_AND_CURB)
+    ]
+    assert concave == [0, 0, 0, 1]

@@ -80,13 +80,12 @@ def run_of(controller: Any, duration: float = 0.02, **options: Any) -> hs.Run:
 
 def wrapped(controller: Any, **options: Any) -> Any:
     sensors = {"encoders": hs.Encoders(bits=12, noise=1e-3), "seed": 7} | options
-    return hs.Sensed(walking.bravo7(), controller, **sensors)
+    return hs.Sensed(controller, **sensors)
 
 
 def test_shells_that_do_nothing_change_nothing() -> None:
-    robot = walking.bravo7()
     plain = run_of(law(), control_period=1e-3)
-    for shell in (hs.Sensed(robot, law()), hs.Actuated(law())):
+    for shell in (hs.Sensed(law()), hs.Actuated(law())):
         run = run_of(shell)
         np.testing.assert_allclose(run.torque, plain.torque, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(run.position, plain.position, rtol=0.0, atol=1e-12)
@@ -145,7 +144,7 @@ def test_encoders_round_wander_and_differ() -> None:
 def test_pitch_forces_and_switches() -> None:
     unit = hs.InertialUnit(noise=1e-3, rate_bias=0.1)
     feet = hs.FootSensors(switches=True, threshold=1.0)
-    run = run_of(wrapped(law(), encoders=None, inertial=unit, feet=feet), duration=0.05)
+    run = run_of(wrapped(law(), encoders=None, imu=unit, feet=feet), duration=0.05)
     position, velocity = (run.log[f"measured_{name}"].values for name in ("position", "velocity"))
     error = position - run.position
     assert 2e-4 < error[:, 2].std() < 3e-3
@@ -207,9 +206,8 @@ def test_a_slower_controller_is_held() -> None:
 
 
 def test_shells_in_shells() -> None:
-    robot = walking.bravo7()
-    inner = hs.Estimated(robot, law())
-    both = hs.Actuated(hs.Sensed(robot, inner, encoders=hs.Encoders(bits=14)), delay=1e-3)
+    inner = hs.Estimated(law())
+    both = hs.Actuated(hs.Sensed(inner, encoders=hs.Encoders(bits=14)), delay=1e-3)
     run = run_of(both)
     names = {"measured_position", "estimated_position", "asked_torque", "seen"}
     assert names <= set(run.log)
@@ -253,15 +251,15 @@ def test_a_shell_is_copied_by_pickle() -> None:
 def test_what_cannot_be() -> None:
     robot = walking.bravo7()
     with pytest.raises(hs.ControllerError, match="whole number of periods"):
-        hs.Sensed(robot, law(), delay=1.5e-3)
+        hs.Sensed(law(), delay=1.5e-3)
     with pytest.raises(hs.ControllerError, match=r"300\.0 readings a second"):
-        hs.Sensed(robot, law(), encoders=hs.Encoders(rate=300.0))
+        hs.Sensed(law(), encoders=hs.Encoders(rate=300.0))
     with pytest.raises(hs.ControllerError, match="noise must be ≥ 0"):
         hs.Encoders(noise=-1.0)
     with pytest.raises(hs.ControllerError, match="bits"):
         hs.Encoders(bits=0)
     with pytest.raises(hs.ControllerError, match="seed"):
-        hs.Sensed(robot, law(), seed=-1)
+        hs.Sensed(law(), seed=-1)
     with pytest.raises(hs.ControllerError, match="bandwidth"):
         hs.Actuated(law(), bandwidth=0.0)
     with pytest.raises(hs.ControllerError, match="efficiency"):
@@ -271,9 +269,27 @@ def test_what_cannot_be() -> None:
             robot, wrapped(law()), state=robot.reference_state(), duration=0.1, control_period=2e-3
         )
     with pytest.raises(hs.ControllerError, match="no whole number of periods"):
-        hs.Sensed(robot, law(period=1e-3), period=7e-4)
+        hs.Sensed(law(period=1e-3), period=7e-4)
     with pytest.raises(hs.ControllerError, match="parameters yet"):
-        hs.Sensed(robot, stand)  # type: ignore[arg-type]
+        hs.Sensed(stand)  # type: ignore[arg-type]
+
+
+def test_a_robot_without_pitch_has_no_imu() -> None:
+    build = hs.RobotBuilder("wheel")
+    build.hinge("axle", None, inertia=0.5, torque=10.0)
+    wheel = build.build()
+
+    class Still:
+        def torque(self, t: float, state: Any, contacts: Any) -> Any:
+            return np.zeros(1)
+
+    shell = hs.Sensed(Still(), imu=hs.InertialUnit(noise=1e-3))
+    with pytest.raises(hs.ControllerError, match="no pitch for an imu"):
+        hs.simulate(wheel, shell, state=wheel.reference_state(), duration=0.01)
+    estimated = hs.Sensed(hs.Estimated(Still()), encoders=hs.Encoders(noise=1e-3))
+    run = hs.simulate(wheel, estimated, state=wheel.reference_state(), duration=0.01)
+    assert run.completed, run.message
+    assert np.abs(run.log["estimated_velocity"].values).max() < 0.1
 
 
 def test_noise_is_normal_and_the_same_uncompiled() -> None:

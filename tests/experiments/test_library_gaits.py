@@ -133,7 +133,7 @@ def test_robots_on_points_track_the_first_step_and_say_that_it_does_not_last(nam
     assert fallen.summary(gait=gait).steps < 20
 
 
-@pytest.mark.parametrize("name", ["compass_gait", "rimless_wheel"])
+@pytest.mark.parametrize("name", ["compass_gait", "kneed_walker", "rimless_wheel"])
 def test_passive_walkers_are_refused_in_words(name: str) -> None:
     with pytest.raises(GaitError, match=name):
         design(hs.load_robot(name))

@@ -432,6 +432,22 @@ def compass_step(
     return np.array([q[3], q[2], v[3], v[2]]), impact.time, float(np.hypot(*stride))
 
 
+@pytest.mark.parametrize("angles", [(0.1, 0.3, -0.2, -1.0), (-0.1, -0.3, 0.5, 2.0)])
+def test_legs_of_one_length_pass_wherever_they_are(angles: tuple[float, ...]) -> None:
+    """The swing foot reaches the ground beside the stance foot, to rounding ahead or behind it.
+
+    What rounding says is another thing at every place, and in the mirror.
+    """
+    for place in range(8):
+        for side in (1.0, -1.0):
+            state = compass_state(side * np.array(angles))
+            run = simulate(
+                mechanisms.compass_gait(), state.q + 0.37 * place * np.eye(4)[0], state.v, 0.4,
+                hs.Ground(friction=3.0), swing_feet_pass=True,
+            )  # fmt: skip
+            assert not [e for e in run.events if e.time > 0.0], (place, side)
+
+
 @pytest.mark.parametrize(
     ("gravity", "rates", "period"),
     [

@@ -63,6 +63,44 @@ def test_bounces_converge_to_e_squared_at_first_order() -> None:
     assert slope >= 0.9, errors
 
 
+def sprung(*, stiffness: float, damping: float) -> hs.Robot:
+    """A mass of 2 kg on a rail, held by a spring and a damper."""
+    builder = hs.RobotBuilder("sprung", gravity=G)
+    builder.slide("x", None, direction=(1, 0), mass=2.0, stiffness=stiffness, damping=damping)
+    return builder.build()
+
+
+def test_spring_keeps_its_energy_under_moreau_jean() -> None:
+    """Ten periods at h ω = 0.063: the work of a spring in a step is that of its mean length.
+
+    With forces of the beginning it would gain (ω h)²/2 a step, 22 % in a period.
+    """
+    omega, mass = 2.0 * np.pi, 2.0
+    run = hs.simulate(
+        sprung(stiffness=mass * omega**2, damping=0.0),
+        state=hs.State(np.array([0.1]), np.zeros(1)),
+        duration=10.0,
+        method=hs.TimeStepping(step=1e-2, scheme=Scheme.MOREAU_JEAN),
+    )
+    energy = 0.5 * mass * (run.velocity[:, 0] ** 2 + (omega * run.position[:, 0]) ** 2)
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-11)
+    # The period is longer by (ω h)²/12: tan(ω' h/2) = ω h/2.
+    slower = 2.0 * np.arctan(0.5 * omega * 1e-2) / 1e-2
+    np.testing.assert_allclose(run.position[:, 0], 0.1 * np.cos(slower * run.time), atol=1e-11)
+
+
+def test_damper_under_moreau_jean_has_second_order() -> None:
+    """A speed falls by (1 − θ h d/m) / (1 + θ h d/m), θ = 1/2, in every step."""
+    run = hs.simulate(
+        sprung(stiffness=0.0, damping=3.0),
+        state=hs.State(np.zeros(1), np.ones(1)),
+        duration=1.0,
+        method=hs.TimeStepping(step=1e-2, scheme=Scheme.MOREAU_JEAN),
+    )
+    factor = (1.0 - 0.0075) / (1.0 + 0.0075)
+    np.testing.assert_allclose(run.velocity[:, 0], factor ** np.arange(101), rtol=1e-12)
+
+
 def slide(mu: float, angle: float, *, step: float = 1e-3, duration: float = 1.0) -> hs.Run:
     """Return a cube that starts at rest, flat on a slope."""
     normal = np.array([-np.sin(angle), np.cos(angle)])

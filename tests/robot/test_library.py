@@ -32,7 +32,7 @@ PENDULUM = (
 )
 
 
-PASSIVE = ("compass_gait", "rimless_wheel")
+PASSIVE = ("compass_gait", "kneed_walker", "rimless_wheel")
 POINT_FEET = ("rabbit", "rabbit_optimtraj")
 ACTUATED = tuple(name for name in builtin_robots() if name not in PASSIVE)
 
@@ -200,6 +200,18 @@ def test_compass_gait_has_the_numbers_of_its_source() -> None:
     np.testing.assert_array_equal(robot.model.center_of_mass[2:], [[0, -0.5]] * 2)
     np.testing.assert_array_equal(robot.model.contact_position, [[0, -1]] * 2)
     assert robot.model.inertia.max() <= 1e-12
+
+
+def test_kneed_walker_has_the_numbers_of_its_source() -> None:
+    """Chen 2007: m_h = m_t = 0.5 kg, m_s = 0.05 kg; a_1 = 0.375, b_1 = 0.125, a_2 = 0.175 m …"""
+    model = load_robot("kneed_walker").model
+    np.testing.assert_array_equal(model.mass, [0, 0.5, 0.5, 0.05, 0.5, 0.05])
+    below = [-0.325, -0.125, -0.325, -0.125]  # b_2 = 0.325 m, and b_1
+    np.testing.assert_allclose(model.center_of_mass[2:, 1], below, rtol=1e-15)
+    np.testing.assert_allclose(model.offset[[3, 5], 1], -0.5, rtol=1e-15)
+    np.testing.assert_allclose(model.contact_position, [[0, -0.5]] * 2, rtol=1e-15)
+    assert model.inertia.max() <= 1e-12
+    assert (model.latch_joint.tolist(), model.latch_release.tolist()) == ([3, 5], [5, 3])
 
 
 def test_rimless_wheel_is_a_point_mass_on_eight_spokes() -> None:

@@ -8,7 +8,7 @@ import pytest
 import heelstrike as hs
 from heelstrike.contact.solvers import certified_solve
 from heelstrike.robot import read_mjcf
-from heelstrike.sim import RunStatus
+from heelstrike.sim import EventKind, RunStatus, Scheme
 
 SOLVERS = ("lemke", "fischer_burmeister", "gauss_seidel")
 
@@ -16,10 +16,10 @@ SOLVERS = ("lemke", "fischer_burmeister", "gauss_seidel")
 # modes again and again. They are found by drawing; within 1e-3 of them it happens as well.
 CIRCLING = [-1.0, -0.6, -1.3, -2.3, -10.0, -10.0, 5.9, -3.9, -3.2]
 
-# A ball on the ground whose joint wants it five centimetres deeper.
+# A ball on the ground whose joint ends below where the ground begins.
 PRESSED = """
 <mujoco><worldbody><body name="ball" pos="0 0 0.1">
-  <joint name="shaft" type="slide" axis="0 0 1" range="-1 -0.05"/><geom size="0.1" mass="2"/>
+  <joint name="shaft" type="slide" axis="0 0 1" range="-1 LIMIT"/><geom size="0.1" mass="2"/>
 </body></worldbody></mujoco>
 """
 
@@ -52,10 +52,10 @@ def test_what_one_solver_cannot_another_does_and_the_run_counts_it(
 
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_without_a_solution_the_run_ends_and_says_so(solver: str) -> None:
-    """The ground pushes up, the stop down; no impulse satisfies both. It moves at 50 m/s or not."""
+    """The ground pushes up, the stop 5 cm further down; no impulse satisfies both."""
     start = hs.State(np.zeros(1), np.zeros(1))
     run = hs.simulate(
-        read_mjcf(PRESSED, name="pressed"),
+        read_mjcf(PRESSED.replace("LIMIT", "-0.05"), name="pressed"),
         state=start,
         duration=0.1,
         method=hs.TimeStepping(step=1e-3, solver=solver),
@@ -71,3 +71,33 @@ def test_without_a_solution_the_run_ends_and_says_so(solver: str) -> None:
     assert worst > 1e-2
     assert f"{worst:g}" in run.message
     assert run.certificates.non_penetration == worst
+
+
+@pytest.mark.parametrize("scheme", [Scheme.GAP_LINEARISED, Scheme.IMPACT_RESOLVED])
+def test_wedge_without_a_way_out_is_left_where_it_is(scheme: Scheme) -> None:
+    """The stop is 1e-10 m below the ground: out of the one the ball only gets into the other.
+
+    Left there it stays there, and the ground carries its weight.
+    """
+    run = hs.simulate(
+        read_mjcf(PRESSED.replace("LIMIT", "-1e-10"), name="wedge"),
+        state=hs.State(np.zeros(1), np.zeros(1)),
+        duration=0.01,
+        method=hs.TimeStepping(step=1e-3, scheme=scheme),
+    )
+    assert run.completed, run.message
+    np.testing.assert_array_equal(run.position, np.zeros((11, 1)))
+    np.testing.assert_allclose(run.contact_force[:, 0, 0], 2.0 * 9.81, rtol=1e-9)
+    told = [(event.kind, event.time) for event in run.events]
+    assert told == [(EventKind.WEDGED, 0.0)]
+    assert run.solver.failures == run.solver.solves // 2
+
+
+def test_wedge_deeper_than_turning_explains_is_no_wedge() -> None:
+    run = hs.simulate(
+        read_mjcf(PRESSED.replace("LIMIT", "-2e-4"), name="deep"),
+        state=hs.State(np.zeros(1), np.zeros(1)),
+        duration=0.01,
+        method=hs.TimeStepping(step=1e-3),
+    )
+    assert run.status is RunStatus.SOLVER_FAILED

@@ -107,6 +107,27 @@ def test_looking_at_the_record_changes_nothing(method: str, controller: str) -> 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("method", METHODS)
+def test_forgetting_the_record_changes_nothing(method: str, controller: str) -> None:
+    pushes = [
+        hs.Push("trunk", force=(9.0, 0.0), start=start, duration=0.004)
+        for start in (0.002, 0.0105, 0.018)
+    ]
+    looked, left = (simulation(method, controller, pushes=pushes) for _ in range(2))
+    for time in (0.005, 0.012, 0.02):
+        looked.advance(time)
+        left.advance(time)
+        looked.forget()
+        assert (looked.record.time >= looked.time - 1e-9).all()
+        # Only what is over is forgotten.
+        assert looked.record.pushes == tuple(push for push in pushes if push.end >= looked.time)
+    looked.advance(0.03)
+    left.advance(0.03)
+    assert_same(left.record, looked.record, since=0.02)
+    assert looked.record.time[0] >= 0.02 - 1e-9
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("steps", [0, 1, 23])
 def test_a_snapshot_goes_on_to_the_last_bit(method: str, controller: str, steps: int) -> None:
     """In a simulation that has done something else meanwhile, through a push and an impact."""
@@ -284,6 +305,7 @@ def test_a_python_controller_that_cannot_be_kept_is_refused_in_words() -> None:
             return np.zeros(6)
 
     some = hs.Simulation(walking.bravo7(), Forgetful(), state=walking.gait().initial_state)
+    assert len(some.record.time) == 0  # of a simulation that has not begun, either
     some.advance(0.01)
     with pytest.raises(hs.ControllerError, match=r"Forgetful.torque takes no part .*snapshot\(\)"):
         some.snapshot()

@@ -15,7 +15,7 @@ from heelstrike.dynamics import contact_positions, link_poses
 from heelstrike.errors import ViewError
 from heelstrike.robot import Robot, builtin_robots, load_robot
 from heelstrike.view import robot_picture
-from heelstrike.view.drawing import Side, extent, legs_apart, skeleton
+from heelstrike.view.drawing import Side, body, extent, legs_apart, skeleton
 from heelstrike.view.style import BLUE, INK, VERMILION
 
 
@@ -126,3 +126,14 @@ def test_robots_without_legs(tmp_path: Path) -> None:
 def test_where_a_portrait_cannot_go(tmp_path: Path) -> None:
     with pytest.raises(ViewError, match="no folder"):
         robot_picture(walking.bravo7(), tmp_path / "nowhere" / "robot.png")
+
+
+def test_a_foot_hangs_on_its_leg() -> None:
+    """bravo7's feet are plates 5 cm under their ankles: bones lead there; walker2d's reach up."""
+    for name, hangs in (("bravo7", True), ("walker2d", False)):
+        robot = load_robot(name)
+        shape = body(robot)
+        for foot in robot.feet:
+            own = (shape.link == foot.link).all(axis=1)
+            at_ankle = (np.abs(shape.local[own]) < 1e-12).all(axis=-1).any()
+            assert at_ankle == hangs

@@ -286,3 +286,30 @@ def test_no_window_and_no_global_list_of_figures() -> None:
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
     assert result.stdout.strip() == "False"
+
+
+def test_a_long_legend_stays_on_the_sheet_and_tells_all_curves_apart() -> None:
+    """Nine coordinates: more than colours, more than fit side by side."""
+    figure = plot(walking.walk(steps=1), "position")
+    (axes,) = figure.axes
+    figure.draw_without_rendering()
+    legend = axes.get_legend()
+    assert legend is not None
+    box = legend.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+    looks = {(line.get_color(), line.get_linestyle()) for line in axes.get_lines()}
+    assert len(looks) == len(axes.get_lines()) == 9
+    assert axes.get_position().x1 > 0.95  # the legend does not press the curves together
+
+
+def test_point_feet_and_walkers_without_motors() -> None:
+    """Feet of one point called by a number; nothing of actuators that there are not."""
+    robot = hs.load_robot("compass_gait")
+    run = make_run(robot, [0.0, 0.1], force=pushes(robot, [[0], [0]]))
+    (zmp,) = plot(run, "zmp").axes
+    assert zmp.get_ylim() == (-0.05, 0.05)
+    assert "points" in zmp.get_title(loc="right")
+    labels = [line.get_label() for line in plot(run, "gaps").axes[0].get_lines()]
+    assert labels == ["point 0"]
+    works = panel(plot(run, "energy"), "work since the start")
+    assert "actuators" not in [line.get_label() for line in works.get_lines()]

@@ -14,6 +14,7 @@ from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
 from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.analysis.slip import max_slip, slip_distance
+from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics, zero_dynamics
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
     Stance,
@@ -52,6 +53,7 @@ __all__ = [
     "Summary",
     "SupportPhase",
     "TrackingError",
+    "ZeroDynamics",
     "ZeroMomentPoint",
     "actuator_power",
     "cost_of_transport",
@@ -76,6 +78,7 @@ __all__ = [
     "torque_cost",
     "tracking_error",
     "walking_steps",
+    "zero_dynamics",
     "zero_moment_point",
     "zero_moment_point_limits",
 ]

@@ -8,13 +8,13 @@ to step (Goswami, Thuilot, Espiau 1998; Strogatz, *Nonlinear Dynamics and Chaos*
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.poincare_map import Chart, PoincareMap, Section, derivative
+from heelstrike.analysis.poincare_map import Carried, Chart, PoincareMap, Section, derivative
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
@@ -25,8 +25,10 @@ from heelstrike.sim.event_driven.method import EventDriven
 Floats = NDArray[np.float64]
 
 # Disturbance (m, rad, m/s, rad/s) of the central differences. The derivative's error is its square
-# times a third derivative of the map, plus the error of the map itself, some 1e-11, over it.
+# times a third derivative of the map, plus the error of the map itself, some 1e-13, over it.
 DISTURBANCE = 1e-4
+# The same of the multipliers, whose differences have an error of the fourth power of it.
+SHARP_DISTURBANCE = 3e-4
 # How often a Newton step is halved when the walk does not go on after it.
 HALVINGS = 6
 
@@ -49,9 +51,12 @@ class LimitCycle:
         state grow from one touchdown to the next. m is the number of disturbances that the feet
         on the ground allow; shifts along the ground are not among them.
     residual : float
-        Largest difference between `state` and its image one step later (m, rad, m/s, rad/s).
+        Largest difference between `state` and its image one step later (m, rad, m/s, rad/s), and
+        between what the controller remembers then.
     iterations : int
         Newton steps taken.
+    memory : (k,) float
+        What the controller remembers just after touchdown, of what is carried from step to step.
     """
 
     state: State
@@ -60,11 +65,17 @@ class LimitCycle:
     multipliers: NDArray[np.complex128]
     residual: float
     iterations: int
+    memory: Floats = field(default_factory=lambda: np.zeros(0))
 
     @property
     def stable(self) -> bool:
         """Whether every small disturbance dies out."""
         return bool(np.all(np.abs(self.multipliers) < 1.0))
+
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import limit_cycle_card
+
+        return limit_cycle_card(self)
 
     def __repr__(self) -> str:
         largest = np.abs(self.multipliers).max(initial=0.0)
@@ -83,6 +94,8 @@ def find_limit_cycle(
     ground: Ground | None = None,
     method: EventDriven | None = None,
     control_period: float | None = None,
+    memory: Sequence[str] = (),
+    relabelled: Callable[[Any, float], None] | None = None,
     landing: Sequence[int] | None = None,
     symmetry: Callable[[State], State] | None = None,
     longest_step: float = 3.0,
@@ -91,7 +104,8 @@ def find_limit_cycle(
 ) -> LimitCycle:
     """Find a limit cycle of a walking robot near a state, and its Floquet multipliers.
 
-    Newton's method on the map from touchdown to touchdown, differentiated by central differences.
+    Newton's method on the map from touchdown to touchdown, differentiated by central differences;
+    for the multipliers by those of fourth order, which leave some 1e-10 of them.
 
     Parameters
     ----------
@@ -101,8 +115,8 @@ def find_limit_cycle(
         Where to begin, anywhere in a step; the search starts at the first touchdown after it. A
         state up to 0.1 mm in the ground, such as time stepping leaves, is lifted out of it.
     controller : object with ``torque(t, state, contacts)``, or None
-        Begins afresh at every touchdown: at time 0, with the memory it starts with. What it
-        remembers from one step to the next is no part of the map.
+        Begins afresh at every touchdown: at time 0, with the memory it starts with but for the
+        members that `memory` names.
     ground : Ground
         Flat or sloping ground; ``Ground()`` by default.
     method : EventDriven
@@ -111,6 +125,13 @@ def find_limit_cycle(
     control_period : float, optional
         Seconds between two calls of the controller, whose torques are held between them; counted
         from every touchdown. By default that of the controller, or it acts continuously.
+    memory : sequence of str, optional
+        Members of the controller's memory that are carried from step to step: part of what repeats,
+        and of what is disturbed. In a shell they are named as in ``inside.filtered``,
+        ``own.joint_rate``.
+    relabelled : callable, optional
+        ``relabelled(memory, time)`` changes the memory at the end of a step, which took a time, to
+        that at the beginning of the next: legs exchanged, times counted from the touchdown.
     landing : sequence of int, optional
         Contact points all of which must have come down to complete a step. By default those of
         either foot if the robot has a mirror image, else any point.
@@ -144,6 +165,44 @@ def find_limit_cycle(
     """
     ground = Ground() if ground is None else ground
     method = EventDriven(rtol=1e-12, atol=1e-13) if method is None else method
+    _check(robot, ground, method)
+    section = Section(robot, ground)
+    step = PoincareMap(
+        section, controller, method, landing, symmetry, longest_step, control_period,
+        Carried(tuple(memory), relabelled),
+    )  # fmt: skip
+    start = state if method.swing_feet_pass else section.lifted(state)
+    landed = step(start, step.begin(start))
+    state, kept = landed.state, landed.memory
+    residual = np.inf
+    for iteration in range(max_iterations + 1):
+        chart = Chart(section, state)
+        end = step(state, kept)
+        change = np.concatenate((chart.coordinates(end.state), end.memory - kept))
+        residual = float(np.abs(change).max(initial=0.0))
+        image = _Image(step, chart, kept)
+        slope = derivative(image, len(change), DISTURBANCE)
+        if residual <= tolerance:
+            multipliers = np.linalg.eigvals(_sharper(image, slope)).astype(np.complex128)
+            return LimitCycle(
+                state=state,
+                period=end.time,
+                step_length=end.length,
+                multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
+                residual=residual,
+                iterations=iteration,
+                memory=kept,
+            )
+        newton = np.asarray(np.linalg.lstsq(np.eye(len(change)) - slope, change)[0], np.float64)
+        state, kept = _moved_on(image, newton)
+    raise LimitCycleError(
+        f"no limit cycle of robot {robot.name!r} in {max_iterations} iterations: its state still "
+        f"changes by {residual:.3g} from step to step; begin nearer to the cycle"
+    )
+
+
+def _check(robot: Robot, ground: Ground, method: Any) -> None:
+    """Refuse what has no limit cycles that are found here."""
     if not isinstance(method, EventDriven):
         raise SimulationError(
             f"limit cycles need the event-driven method, got {type(method).__name__}: no other "
@@ -156,45 +215,42 @@ def find_limit_cycle(
             f"limit cycles need a robot that is free to move along the ground; the first two "
             f"coordinates of {robot.name!r} are not its position x, z"
         )
-    section = Section(robot, ground)
-    step = PoincareMap(section, controller, method, landing, symmetry, longest_step, control_period)
-    state = step(state if method.swing_feet_pass else section.lifted(state)).state
-    residual = np.inf
-    for iteration in range(max_iterations + 1):
-        chart = Chart(section, state)
-        end = step(state)
-        change = chart.coordinates(end.state)
-        residual = float(np.abs(change).max(initial=0.0))
-        slope = derivative(partial(_image, step, chart), chart.size, DISTURBANCE)
-        if residual <= tolerance:
-            multipliers = np.linalg.eigvals(slope).astype(np.complex128)
-            return LimitCycle(
-                state=state,
-                period=end.time,
-                step_length=end.length,
-                multipliers=multipliers[np.argsort(-np.abs(multipliers), kind="stable")],
-                residual=residual,
-                iterations=iteration,
-            )
-        newton = np.asarray(np.linalg.lstsq(np.eye(chart.size) - slope, change)[0], np.float64)
-        state = _moved_on(step, chart, newton)
-    raise LimitCycleError(
-        f"no limit cycle of robot {robot.name!r} in {max_iterations} iterations: its state still "
-        f"changes by {residual:.3g} from step to step; begin nearer to the cycle"
-    )
 
 
-def _image(step: PoincareMap, chart: Chart, coordinates: Floats) -> Floats:
-    return chart.coordinates(step(chart.state(coordinates)).state)
+@dataclass(frozen=True)
+class _Image:
+    """The map in coordinates about a state and a memory: those of a chart, then the memory's."""
+
+    step: PoincareMap
+    chart: Chart
+    memory: Floats
+
+    def at(self, coordinates: Floats) -> tuple[State, Floats]:
+        """Return the state and the memory at some coordinates."""
+        place = self.chart.size
+        return self.chart.state(coordinates[:place]), self.memory + coordinates[place:]
+
+    def __call__(self, coordinates: Floats) -> Floats:
+        end = self.step(*self.at(coordinates))
+        return np.concatenate((self.chart.coordinates(end.state), end.memory - self.memory))
 
 
-def _moved_on(step: PoincareMap, chart: Chart, newton: Floats) -> State:
-    """Return the state after a Newton step, shortened until the walk goes on from there."""
+def _sharper(image: _Image, slope: Floats) -> Floats:
+    """Return the derivative of the map by differences of fourth order; its slope where none are."""
+    size = slope.shape[1]
+    try:
+        near, far = (derivative(image, size, k * SHARP_DISTURBANCE) for k in (1, 2))
+    except LimitCycleError:  # so far from the cycle, the walk does not go on
+        return slope
+    return (4.0 * near - far) / 3.0
+
+
+def _moved_on(image: _Image, newton: Floats) -> tuple[State, Floats]:
+    """Return state and memory after a Newton step, shortened until the walk goes on from there."""
     for halving in range(HALVINGS):
         try:
-            state = chart.state(0.5**halving * newton)
-            chart.coordinates(step(state).state)
+            image(0.5**halving * newton)
         except LimitCycleError:
             continue
-        return state
-    return chart.state(0.5**HALVINGS * newton)
+        return image.at(0.5**halving * newton)
+    return image.at(0.5**HALVINGS * newton)

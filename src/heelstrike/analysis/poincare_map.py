@@ -5,20 +5,22 @@ state after touchdown is relabelled - left and right exchanged, a wheel turned b
 moved back along the ground.
 
 On this section the feet obey equations: points on the ground have no gap, those that stand have no
-velocity, and where along the ground they are does not matter. A :class:`Chart` numbers what these
-leave free.
+velocity, and where along the ground they are does not matter; closed loops hold, and
+joints are where latches have them. A :class:`Chart` numbers what these leave free.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -26,7 +28,7 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
 from heelstrike.sim.run import Run
-from heelstrike.sim.simulation import simulate
+from heelstrike.sim.simulation import Simulation, simulate
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
@@ -77,6 +79,18 @@ class Section:
         at_rest[:, 1] &= at_rest[:, 0]
         return touching, at_rest
 
+    def to_latches(self, state: State) -> Floats:
+        """How far joints are from the ends of their ranges at which latches hold them."""
+        model = self.robot.model
+        joint, above = model.latch_joint, model.latch_side > 0
+        end: Floats = np.where(above, model.upper[joint], model.lower[joint])
+        return end - state.q[joint]
+
+    def latched(self, state: State) -> Flags:
+        """Which latches have their joints, at rest, where they hold them or have just let go."""
+        there: Flags = np.abs(self.to_latches(state)) <= ON_THE_GROUND
+        return there & (np.abs(state.v[self.robot.model.latch_joint]) <= AT_REST)
+
     def foothold(self, state: State) -> int:
         """First contact point that stands, or else the lowest."""
         _, gap, _ = self.contacts(state)
@@ -122,6 +136,7 @@ class Chart:
         self._origin = np.concatenate((origin.q, origin.v))
         self._touching, self._at_rest = section.standing(origin)
         self._foothold = section.foothold(origin)
+        self._latched = section.latched(origin)
         gradient = derivative(
             lambda change: self._equations(self._origin + change), len(self._origin), DISTURBANCE
         )
@@ -140,9 +155,14 @@ class Chart:
 
     def _equations(self, x: Floats) -> Floats:
         """What vanishes on the section."""
-        place, gap, velocity = self._section.contacts(State(x[: self._nq], x[self._nq :]))
+        robot, q, v = self._section.robot, x[: self._nq], x[self._nq :]
+        place, gap, velocity = self._section.contacts(State(q, v))
+        way, joint = self._section.to_latches(State(q, v)), robot.model.latch_joint
+        held = way[self._latched], v[joint[self._latched]]
+        loops = loop_displacement(robot, q), loop_jacobian(robot, q) @ v
+        foothold = [place[self._foothold]]
         return np.concatenate(
-            (gap[self._touching], velocity[self._at_rest], [place[self._foothold]])
+            (gap[self._touching], velocity[self._at_rest], foothold, *loops, *held)
         )
 
     def state(self, coordinates: Floats) -> State:
@@ -172,11 +192,53 @@ class Chart:
 
 @dataclass(frozen=True)
 class Landing:
-    """The end of a step: the state on the section, the time it took (s), its length (m)."""
+    """The end of a step: the state on the section, the time it took (s), its length (m).
+
+    And what the controller remembers of it, as far as that is carried on.
+    """
 
     state: State
     time: float
     length: float
+    memory: Floats
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What a controller remembers from step to step.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Members of its memory.
+    relabelled : callable, optional
+        ``relabelled(memory, time)`` makes of the memory at the end of a step, which took a time,
+        that at the beginning of the next: legs exchanged, times counted anew.
+    """
+
+    names: tuple[str, ...] = ()
+    relabelled: Callable[[Any, float], None] | None = None
+
+    def of(self, simulation: Simulation) -> Floats:
+        """Return the numbers that are carried, (m,)."""
+        views = {name: values for name, _, values in simulation.memory.views()}
+        unknown = [name for name in self.names if name not in views]
+        if unknown:
+            raise SimulationError(
+                f"the controller's memory has no {', '.join(unknown)}; it has "
+                f"{', '.join(views) or 'no members'}"
+            )
+        taken = [np.ravel(views[name]).astype(np.float64) for name in self.names]
+        return np.concatenate((*taken, np.zeros(0)))
+
+    def put(self, numbers: Floats, simulation: Simulation) -> None:
+        """Write numbers that :meth:`of` returned."""
+        begin = 0
+        views = {name: values for name, _, values in simulation.memory.views()}
+        for name in self.names:
+            values = views[name]
+            values[...] = numbers[begin : begin + values.size].reshape(values.shape)
+            begin += values.size
 
 
 class PoincareMap:
@@ -195,6 +257,8 @@ class PoincareMap:
         Seconds after which a step has failed.
     control_period : float, optional
         Seconds between two calls of the controller, counted from the beginning of the step.
+    carried : Carried
+        What the controller remembers from step to step; of the rest it begins afresh.
 
     Raises
     ------
@@ -211,11 +275,13 @@ class PoincareMap:
         symmetry: Callable[[State], State] | None,
         longest: float,
         control_period: float | None = None,
+        carried: Carried = Carried(),
     ) -> None:
         robot = section.robot
         self._section = section
         self._controller = controller
         self._control_period = control_period
+        self._carried = carried
         # Only the rows of events are looked at.
         self._method = replace(method, output_period=longest)
         self._longest = longest
@@ -245,38 +311,66 @@ class PoincareMap:
                 "step (landing) and, if legs change their parts, how (symmetry)"
             )
 
-    def __call__(self, state: State) -> Landing:
-        """Take one step.
+    def begin(self, state: State) -> Floats:
+        """Return what the controller remembers at first, of what is carried."""
+        if not self._carried.names:
+            return np.zeros(0)
+        return self._carried.of(self._simulation(state, None))
+
+    def __call__(self, state: State, memory: Floats | None = None) -> Landing:
+        """Take one step, with what the controller remembers.
 
         Raises
         ------
         LimitCycleError
             If it is not completed.
         """
-        run, time, contact = self._walk(state)
+        run, time, contact = self._walk(state, memory)
         row = np.flatnonzero(run.time <= time + SAME_INSTANT)[-1]
         after = self._relabelled(State(run.position[row], run.velocity[row]), contact)
         after, end = self._section.moved_back(after)
         _, begin = self._section.moved_back(state)
-        return Landing(after, time, abs(end - begin))
+        left = np.zeros(0)
+        if self._carried.names:
+            again = self._simulation(state, memory)
+            again.advance(time)
+            if self._carried.relabelled is not None:
+                self._carried.relabelled(again.memory, time)
+            left = self._carried.of(again)
+        return Landing(after, time, abs(end - begin), left)
 
-    def _walk(self, state: State) -> tuple[Run, float, int]:
+    def _simulation(self, state: State, memory: Floats | None) -> Simulation:
+        """Begin a step."""
+        simulation = Simulation(
+            self._section.robot, self._controller, state=state, method=self._method,
+            ground=self._section.ground, control_period=self._control_period,
+        )  # fmt: skip
+        if memory is not None:
+            self._carried.put(memory, simulation)
+        return simulation
+
+    def _walk(self, state: State, memory: Floats | None = None) -> tuple[Run, float, int]:
         """Simulate beyond the end of a step; return the run, that time and the point that landed.
 
         Steps take about as long as the one before; where that is too short, they get the longest.
         """
         for duration in (min(SLACK * self._expected, self._longest), self._longest):
-            run = whole(
-                simulate(
-                    self._section.robot,
-                    self._controller,
-                    state=state,
-                    duration=duration,
-                    method=self._method,
-                    ground=self._section.ground,
-                    control_period=self._control_period,
+            if self._carried.names:
+                simulation = self._simulation(state, memory)
+                simulation.advance(duration)
+                run = whole(simulation.record)
+            else:
+                run = whole(
+                    simulate(
+                        self._section.robot,
+                        self._controller,
+                        state=state,
+                        duration=duration,
+                        method=self._method,
+                        ground=self._section.ground,
+                        control_period=self._control_period,
+                    )
                 )
-            )
             down: set[int] = set()
             for event in run.events:
                 if event.kind is EventKind.TOUCHDOWN and event.time > 0.0:

@@ -147,10 +147,9 @@ class Summary:
         return json.dumps(self.to_dict(), indent=indent, allow_nan=False, ensure_ascii=False)
 
     def __str__(self) -> str:
-        rows = _rows(self)
+        rows = lines(self)
         width = max(len(label) for label, _ in rows)
-        lines = [f"{label:<{width}}  {value}" for label, value in rows]
-        return "\n".join([self._title(), *lines])
+        return "\n".join([self._title(), *(f"{label:<{width}}  {value}" for label, value in rows)])
 
     def __rich__(self) -> Table:
         from rich.table import Table
@@ -161,9 +160,14 @@ class Summary:
         )
         table.add_column(style="cyan", no_wrap=True)
         table.add_column()
-        for label, value in _rows(self):
+        for label, value in lines(self):
             table.add_row(label, value)
         return table
+
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import summary_card
+
+        return summary_card(self)
 
     def _title(self) -> str:
         return f"{self.robot}: {self.message}"
@@ -268,7 +272,7 @@ LINES = {
 OF_A_GAIT = ("gait", "joint tracking error")
 
 
-def _rows(s: Summary) -> list[tuple[str, str]]:
+def lines(s: Summary) -> list[tuple[str, str]]:
     """Label and value of every line of the table a person reads."""
     write = _Words().format
     return [

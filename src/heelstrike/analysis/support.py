@@ -17,7 +17,8 @@ NOTHING = 1e-9
 """Normal forces below this fraction of the robot's weight are no force."""
 
 CHATTER = 0.02
-"""A foot that lands again within this time (s) has not stepped: it chatters, or scuffs."""
+"""A foot that lands again within this time (s) has not stepped, nor one that leaves again within
+it: they chatter, or scuff."""
 
 
 def pushing(run: Run) -> NDArray[np.bool_]:
@@ -205,7 +206,8 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
 
     The contact the robot starts with is no step, nor is the first landing of a robot dropped from
     the air, nor a foot that lands again without the other one having landed in between, nor one
-    that was in the air for less than `CHATTER`.
+    that was in the air for less than `CHATTER`, nor one that stayed for less, however often it
+    bounced.
 
     Parameters
     ----------
@@ -219,17 +221,28 @@ def walking_steps(run: Run) -> tuple[Stance, ...]:
     """
     taken: list[Stance] = []
     last: set[int] = set()
-    left: dict[int, float] = {}
-    for stance in stances(run):
-        chatters = stance.touchdown - left.get(stance.foot, -np.inf) < CHATTER
-        left[stance.foot] = stance.liftoff
+    for stance in _without_chatter(stances(run)):
         if stance.touchdown == run.time[0]:
             last.add(stance.foot)
-        elif not chatters:
+        elif stance.liftoff - stance.touchdown >= CHATTER:
             if last and last != {stance.foot}:
                 taken.append(stance)
             last = {stance.foot}
     return tuple(taken)
+
+
+def _without_chatter(found: tuple[Stance, ...]) -> list[Stance]:
+    """Join stances of a foot between which it was in the air for less than `CHATTER`."""
+    joined: list[Stance] = []
+    current: dict[int, int] = {}
+    for stance in found:
+        place = current.get(stance.foot, -1)
+        if place >= 0 and stance.touchdown - joined[place].liftoff < CHATTER:
+            joined[place] = replace(joined[place], liftoff=stance.liftoff)
+        else:
+            current[stance.foot] = len(joined)
+            joined.append(stance)
+    return joined
 
 
 def phase_time(run: Run, step: int, phase: float) -> float:

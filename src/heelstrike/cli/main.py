@@ -10,8 +10,10 @@ from heelstrike import __version__
 from heelstrike.cli.compare import compare
 from heelstrike.cli.inspect import inspect
 from heelstrike.cli.paper import paper
+from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.walk import walk
+from heelstrike.cli.watch import watch
 
 app = typer.Typer(
     name="heelstrike",
@@ -21,7 +23,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-for command in (walk, paper, compare, robots, inspect):
+for command in (walk, watch, report, paper, compare, robots, inspect):
     app.command()(command)
 
 

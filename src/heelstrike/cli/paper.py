@@ -1,4 +1,4 @@
-"""``heelstrike paper``: the paper's figures, and its claims beside what is measured here."""
+"""``heelstrike paper``: the paper's figures, and its claims beside what is computed here."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def paper(
     ),
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
-    """Reproduce the paper's Figures 3 to 6 and set its claims beside measured figures.
+    """Reproduce the paper's Figures 3 to 6 and set its claims beside computed figures.
 
     Writes report.md, figure3.png to figure6.png, gait.json and run.nc.
     """
@@ -27,7 +27,7 @@ def paper(
         from heelstrike.experiments.paper import reproduce_paper
 
         report = reproduce_paper(out, progress=current.doing)
-    table = Table("where", "the paper", "measured here", "verdict", show_lines=True)
+    table = Table("where", "the paper", "computed here", "verdict", show_lines=True)
     for claim in report.claims:
         table.add_row(claim.source, claim.statement, claim.measured, claim.verdict.value)
     output().print(table)

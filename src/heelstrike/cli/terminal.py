@@ -114,6 +114,13 @@ def wrote(*files: Path) -> None:
     _written.extend(files)
 
 
+def this_command() -> str:
+    """Return the command that is being carried out, as the shell takes it."""
+    from heelstrike.view.page.provenance import command_line
+
+    return command_line(["heelstrike", *sys.argv[1:]])
+
+
 def tell_interruption(doing: str = "") -> None:
     """Say what Ctrl-C ended and what is kept."""
     names = ", ".join(str(path) for path in _written)

@@ -36,6 +36,7 @@ from heelstrike.cli.terminal import (
     stage,
     tell,
     tell_interruption,
+    this_command,
     wrote,
 )
 from heelstrike.cli.values import ground_called, pushes_called
@@ -124,6 +125,12 @@ def walk(
         typer.Option(file_okay=False, help="For the results; those of an earlier walk go."),
     ] = Path("walk"),
     animation: Annotated[Animation, typer.Option(help="Kind of animation.")] = Animation.MP4,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            dir_okay=False, help="Also write the walk as one page with animation and curves."
+        ),
+    ] = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
@@ -139,6 +146,7 @@ def walk(
         from heelstrike.experiments.walk import walk
         from heelstrike.gait import Gait
         from heelstrike.robot import load_robot
+        from heelstrike.view.page.page import check_page, save_html
 
         # All that is cheap to refuse is refused before anything that takes long.
         surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
@@ -149,6 +157,8 @@ def walk(
             each.place(machine)
         through = _through_time(method, scheme, step, passive=not machine.nu)
         results = Results(out)
+        if html is not None:
+            check_page(html)
     planned = planned_walk(
         machine, gait, surface, length=step_length, duration=step_duration, clearance=clearance
     )
@@ -165,6 +175,9 @@ def walk(
             progress=walking.reached,
         )
     saved = _save(results, run, followed, animation)
+    if html is not None and len(run.time):
+        wrote(save_html(run, html, gait=followed, command=this_command()))
+        tell(f"{html}: the walk as one page, for any browser")
     _tell_outcome(run, planned, steps, saved, as_json=as_json)
 
 

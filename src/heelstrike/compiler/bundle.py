@@ -527,7 +527,7 @@ class Bundle:
         Parameters
         ----------
         contents : mapping of str to array
-            What :meth:`contents` of that one returned.
+            What :meth:`contents` of that one returned. Arrays without entries may be missing.
         prefix : str
             What the names begin with.
 
@@ -536,7 +536,9 @@ class Bundle:
         ValueError
             If something is missing, or of another shape or kind; nothing has changed then.
         """
-        storage = {name: mine for name, mine in self.storage(prefix) if mine.flags.writeable}
+        storage = {
+            n: mine for n, mine in self.storage(prefix) if mine.flags.writeable and mine.size
+        }
         for name, mine in storage.items():
             its = contents.get(name)
             if its is None or its.shape != mine.shape or its.dtype != mine.dtype:

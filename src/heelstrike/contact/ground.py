@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.compiler.bundle import Bundle, array
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.bundle import Bundle, array, number
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
 
 Floats = NDArray[np.float64]
@@ -17,6 +17,9 @@ Floats = NDArray[np.float64]
 # Features further from a disc's centre than this (m) are not looked for: a robot that far from
 # every one of them is in free flight, and the distance to the ground below it will do.
 REACH = 0.25
+
+# Two faces whose normals turn by less (rad) are as good as one.
+FLAT = 1e-9
 
 
 class GroundModel(Bundle):
@@ -31,12 +34,15 @@ class GroundModel(Bundle):
         Upward unit normal of each segment.
     friction, restitution : (ns,) float
         Coefficients of each segment.
+    concave : int
+        Whether there is a corner in which a point can touch two faces.
     """
 
     vertices: Floats = array("ns + 1", "axes")
     normal: Floats = array("ns", "axes")
     friction: Floats = array("ns")
     restitution: Floats = array("ns")
+    concave: int = number(int)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +91,11 @@ class Ground:
         segments = len(vertices) - 1
         friction = _coefficients("friction coefficient", self.friction, segments, np.inf)
         restitution = _coefficients("restitution", self.restitution, segments, 1.0)
+        normal = _normals(vertices)
         model = GroundModel(
             vertices=vertices,
-            normal=_normals(vertices),
+            normal=normal,
+            concave=int(np.any(_turn(normal[:-1].T, normal[1:].T) > FLAT)),
             friction=friction,
             restitution=restitution,
         )
@@ -186,6 +194,11 @@ class Ground:
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import ground_card
+
+        return ground_card(self)
+
     def numbers(self) -> dict[str, Floats]:
         """Return the ground as arrays that :meth:`of_numbers` makes it of."""
         return {
@@ -276,6 +289,12 @@ def _normals(vertices: Floats) -> Floats:
     return np.ascontiguousarray(np.column_stack((-rise, run)) / np.hypot(run, rise)[:, None])
 
 
+def _turn(first: Floats, second: Floats) -> Floats:
+    """Sine of the angle from one direction to another, positive where the ground turns upwards."""
+    turn: Floats = first[0] * second[1] - first[1] * second[0]
+    return turn
+
+
 def _coefficients(name: str, value: ArrayLike, segments: int, highest: float) -> Floats:
     coefficients = np.asarray(value, dtype=np.float64)
     if coefficients.ndim > 1 or coefficients.size not in (1, segments):
@@ -321,7 +340,7 @@ def line_contact(ground: GroundModel, segment: int, x: float, z: float, normal: 
     ) * normal[1]
 
 
-@kernel
+@dissolved_kernel
 def ground_contact(
     ground: GroundModel, x: float, z: float, radius: float, normal: Floats
 ) -> tuple[float, float, float]:
@@ -336,12 +355,29 @@ def ground_contact(
     normal : (2,) float
         Receives the ground's outward normal; the tangent is (normal z, −normal x).
     """
+    if ground.friction.shape[0] == 1:
+        distance = line_contact(ground, 0, x, z, normal)
+        return distance - radius, ground.friction[0], ground.restitution[0]
+    return profile_contact(ground, x, z, radius, normal)
+
+
+@kernel
+def profile_contact(
+    ground: GroundModel, x: float, z: float, radius: float, normal: Floats
+) -> tuple[float, float, float]:
+    """Like :func:`ground_contact`, of ground with corners."""
+    gap, owner = nearest_segment(ground, x, z, radius, normal)
+    return gap, ground.friction[owner], ground.restitution[owner]
+
+
+@kernel
+def nearest_segment(
+    ground: GroundModel, x: float, z: float, radius: float, normal: Floats
+) -> tuple[float, int]:
+    """Gap between a disc and the nearest feature of the ground, and the segment it is of."""
     below = segment_below(ground, x)
     distance = line_contact(ground, below, x, z, normal)
     segments = ground.friction.shape[0]
-    if segments == 1:
-        return distance - radius, ground.friction[0], ground.restitution[0]
-
     # Nothing nearer than the ground straight below or above can lie further away in x.
     inside = distance < 0.0
     reach = min(abs(distance) / max(normal[1], 1e-3), REACH + radius)
@@ -375,5 +411,62 @@ def ground_contact(
             else:
                 line_contact(ground, segment, x, z, normal)
     separation = np.sqrt(nearest)
-    gap = (-separation if inside else separation) - radius
-    return gap, ground.friction[owner], ground.restitution[owner]
+    return (-separation if inside else separation) - radius, owner
+
+
+@kernel
+def turn_at(ground: GroundModel, corner: int) -> float:
+    """Sine of the angle that the ground turns upwards by at an inner corner."""
+    before, after = ground.normal[corner - 1], ground.normal[corner]
+    return before[0] * after[1] - before[1] * after[0]
+
+
+@kernel
+def faces_it(ground: GroundModel, own: int, segment: int, x: float, z: float) -> bool:
+    """Whether a segment may be the other face of a concave corner about a place on its own face.
+
+    The neighbour of its own face may if the corner between them is concave; the line through it is
+    below the own face, then. Others may from outside only, and within reach.
+    """
+    if abs(segment - own) == 1:
+        return turn_at(ground, max(own, segment)) > FLAT
+    begin, normal = ground.vertices[segment], ground.normal[segment]
+    outside = (x - begin[0]) * normal[0] + (z - begin[1]) * normal[1] >= 0.0
+    return outside and begin[0] <= x + REACH and ground.vertices[segment + 1, 0] >= x - REACH
+
+
+@kernel
+def second_contact(
+    ground: GroundModel, x: float, z: float, radius: float, normal: Floats
+) -> tuple[float, float, float]:
+    """Gap, friction and restitution between a disc and the second face of a concave corner.
+
+    The first is the one that :func:`ground_contact` finds. The gap is infinite where there is no
+    second. Arguments are those of that kernel.
+    """
+    _, own = nearest_segment(ground, x, z, radius, normal)
+    segments = ground.friction.shape[0]
+    nearest = np.inf
+    owner = own
+    for segment in range(segments):
+        if segment == own or not faces_it(ground, own, segment, x, z):
+            continue
+        begin, end = ground.vertices[segment], ground.vertices[segment + 1]
+        run, rise = end[0] - begin[0], end[1] - begin[1]
+        along = ((x - begin[0]) * run + (z - begin[1]) * rise) / (run * run + rise * rise)
+        before = along < 0.0 and segment > 0 and segment != own + 1
+        behind = along > 1.0 and segment < segments - 1 and segment != own - 1
+        if before or behind:
+            corner = segment + 1 if behind else segment
+            dx, dz = x - ground.vertices[corner, 0], z - ground.vertices[corner, 1]
+            distance = np.sqrt(dx * dx + dz * dz)
+            if 1e-12 < distance < nearest and turn_at(ground, corner) < 0.0:
+                nearest, owner = distance, segment
+                normal[0], normal[1] = dx / distance, dz / distance
+        else:
+            face = ground.normal[segment]
+            distance = (x - begin[0]) * face[0] + (z - begin[1]) * face[1]
+            if distance < nearest:
+                nearest, owner = distance, segment
+                normal[0], normal[1] = face[0], face[1]
+    return nearest - radius, ground.friction[owner], ground.restitution[owner]

@@ -17,7 +17,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
 from heelstrike.contact.modes import OPEN, SOLVED, WARM_START, ContactMode, Solver, SolveStatus
-from heelstrike.contact.sets import INTERVAL, press
+from heelstrike.contact.sets import CONE, INTERVAL, press
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.solvers.known_modes import repeat
 from heelstrike.contact.workspace import (
@@ -207,11 +207,12 @@ def run_solvers(
     tolerance: float,
     floor: float = 0.0,
     semidefinite: bool = True,
+    sets: Integers | None = None,
 ) -> tuple[Floats, Floats, Certificate]:
     """Call the kernel on checked data with fresh memory; return impulse, velocity, certificate.
 
     ``semidefinite`` tells that the matrix is symmetric and no entry exceeds the root of the product
-    of its diagonal entries.
+    of its diagonal entries, ``sets`` where the impulse of each contact may lie (cones by default).
     """
     count = friction.size
     matrix, matrix_shift = _near_one(delassus, even=True)
@@ -222,8 +223,9 @@ def run_solvers(
     work.settings.amendments = 0  # nobody has guessed the modes
     work.settings.skewed = 0 if semidefinite else 1
     problem = ContactProblem.allocate(
-        nc=count, count=count, delassus=matrix, free=offset, friction=friction
-    )
+        nc=count, count=count, delassus=matrix, free=offset, friction=friction,
+        set=np.full(count, CONE, np.int64) if sets is None else sets,
+    )  # fmt: skip
     answer = ContactAnswer.allocate(nc=count, mode=mode)
     status = SolveStatus(solve_contact_kernel(order, problem, work, answer))
     # The solvers leave in the workspace what belongs to the last candidate, not to the best one.

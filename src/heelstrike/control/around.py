@@ -15,6 +15,7 @@ torques are held meanwhile.
 from __future__ import annotations
 
 import math
+import re
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -108,8 +109,10 @@ def inside(controller: Controller) -> Law:
             )
         torque[:] = wanted
 
-    ask.__name__ = ask.__qualname__ = type(asked).__qualname__
-    ask.__module__ = type(asked).__module__
+    kind = type(asked)
+    ask.__name__, ask.__qualname__, ask.__module__ = (
+        kind.__name__, kind.__qualname__, kind.__module__,
+    )  # fmt: skip
     function = ControllerFunction(ask, False, {})
     function.partner = asked
     return Law(function, commands_voltage=bool(getattr(asked, "commands_voltage", False)))
@@ -257,7 +260,7 @@ def composed(shell: Shell, function: ControllerFunction) -> Composed:
         "torque": "held",
     }  # fmt: skip
     given = ", ".join(shown.get(name, name) for name in function.arguments)
-    name = f"{shell.name}_{function.name}"
+    name = re.sub(r"\W", "_", f"{shell.name}_{function.name}")  # a lambda has none
     text = f"""
 def {name}({", ".join(ARGUMENTS)}):
     before(t, state, contacts, robot, parameters.own, memory.own, log.own)

@@ -20,6 +20,7 @@ from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
@@ -365,6 +366,7 @@ class ComputedTorque(Law):
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
+        refuse_loops(robot, "computed torque", ControllerError)
         pitch = pitch_of(robot)
         try:
             gait.check_joints(robot)

@@ -17,6 +17,7 @@ the idea of contact-aided filters (M. Bloesch et al., *State estimation for legg
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,8 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 # gets this part of its trace added. Velocities hardly depend on it.
 SOFTNESS = 1e-9
 UP = np.array([0.0, 1.0])
+# Coordinate of a floating trunk's pitch.
+PITCH = 2
 
 
 class Parameters(Bundle):
@@ -56,10 +59,8 @@ class Parameters(Bundle):
     position_gain, velocity_gain : float
         Parts of an error of a joint by which its position, and its speed times the period, are
         corrected.
-    pitch : int
-        Coordinate of the pitch, -1 for none.
     threshold : float
-        Normal force from which a contact point counts as standing (N).
+        Normal force from which a contact point counts as standing, as a part of the weight.
     up : (2,) float
         Direction along which feet stand on discs.
     """
@@ -67,7 +68,6 @@ class Parameters(Bundle):
     period: float = number(float)
     position_gain: float = number(float)
     velocity_gain: float = number(float)
-    pitch: int = number(int)
     threshold: float = number(float)
     up: Floats = array(2)
 
@@ -78,6 +78,8 @@ class Memory(Shown):
     Attributes
     ----------
     calls : int
+    floating : int
+        Whether the first coordinates are x, z and pitch of a trunk.
     torque : (nu,) float
         Asked for at the last call.
     standing : (nc,) int
@@ -89,6 +91,7 @@ class Memory(Shown):
     """
 
     calls: int = cell(int)
+    floating: int = cell(int)
     torque: Floats = array("nu")
     standing: Integers = array("nc", of=int)
     anchor: Floats = array("nc", "axes")
@@ -166,10 +169,28 @@ def stop_standing(robot: ControlledRobot, count: int, memory: Memory, v: Floats)
 
 
 @kernel
-def note_standing(contacts: Contacts, parameters: Parameters, memory: Memory) -> None:
+def carry_trunk(robot: ControlledRobot, count: int, memory: Memory, change: Floats) -> None:
+    """Move the trunk along with corrected joints, so that the standing points stay in the mean.
+
+    The trunk is heavy: the least change of the velocities would rather undo the corrections.
+    """
+    z, x = 0.0, 0.0
+    for row in range(0, count, 2):
+        for j in range(robot.nv):
+            z += memory.rows[row, j] * change[j]
+            x += memory.rows[row + 1, j] * change[j]
+    change[0] -= 2.0 * x / count
+    change[1] -= 2.0 * z / count
+
+
+@kernel
+def note_standing(
+    contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
     """Look which points stand, and keep where they came to do so."""
+    least = parameters.threshold * robot.mass * abs(robot.model.gravity[1])
     for i in range(memory.standing.shape[0]):
-        stands = 1 if contacts.force[i, 0] > parameters.threshold else 0
+        stands = 1 if contacts.force[i, 0] > least else 0
         if stands == 1 and memory.standing[i] == 0:
             memory.anchor[i, 0], memory.anchor[i, 1] = memory.point[i, 0], memory.point[i, 1]
         memory.standing[i] = stands
@@ -199,18 +220,20 @@ def correct(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
     """Bring joints and pitch nearer to what was measured, standing points to their place."""
-    seen = memory.state
+    seen, change = memory.state, memory.force
+    for j in range(robot.nv):
+        change[j] = 0.0
     position, speed = parameters.position_gain, parameters.velocity_gain / parameters.period
     for i in range(robot.nu):
         joint = robot.model.actuator_joint[i]
         error = state.q[joint] - seen.q[joint]
         seen.q[joint] += position * error
-        seen.v[joint] += speed * error
-    pitch = parameters.pitch
+        change[joint] = speed * error
+    pitch = PITCH if memory.floating == 1 else -1
     if pitch >= 0:
         error = state.q[pitch] - seen.q[pitch]
         seen.q[pitch] += position * error
-        seen.v[pitch] += speed * error
+        change[pitch] = speed * error
     robot.update(seen)
     find_points(robot, parameters, memory)
     x, z, count = 0.0, 0.0, 0
@@ -225,6 +248,10 @@ def correct(
         robot.update(seen)
         find_points(robot, parameters, memory)
     rows = find_rows(robot, parameters, memory)
+    if rows > 0 and pitch >= 0:
+        carry_trunk(robot, rows, memory, change)
+    for j in range(robot.nv):
+        seen.v[j] += change[j]
     if rows > 0:
         stop_standing(robot, rows, memory, seen.v)
     robot.update(seen)
@@ -244,9 +271,9 @@ def estimate(
             seen.v[j] = state.v[j]
         robot.update(seen)
         find_points(robot, parameters, memory)
-        note_standing(contacts, parameters, memory)
+        note_standing(contacts, robot, parameters, memory)
     else:
-        note_standing(contacts, parameters, memory)
+        note_standing(contacts, robot, parameters, memory)
         predict(robot, parameters, memory)
         correct(state, robot, parameters, memory)
     memory.calls += 1
@@ -282,14 +309,12 @@ class Estimated(Around):
     The estimate is made of the positions of the actuated joints and of the trunk's pitch, and of
     which contact points carry force, as these are shown to it; of the robot's equations of motion;
     and of the torques asked for. Velocities that it is shown are not looked at. It stands between
-    sensors and controller: ``Sensed(robot, Estimated(robot, law), encoders=...)``.
+    sensors and controller: ``Sensed(Estimated(law), encoders=...)``. The equations of motion are
+    those of the robot that the controller knows, or of the one that is simulated; its first
+    coordinates are x, z and pitch of the trunk, or it is fixed to the world.
 
     Parameters
     ----------
-    robot : Robot
-        The robot: a floating trunk whose first coordinates are x, z and its pitch, or a robot that
-        is fixed to the world. The equations of motion are those of the robot that the controller
-        knows, or of the one that is simulated.
     controller : Controller
         What decides the torques.
     bandwidth : float
@@ -304,7 +329,7 @@ class Estimated(Around):
     Raises
     ------
     ControllerError
-        If a number cannot be, or the robot is another.
+        If a number cannot be; when it is simulated, if the robot's trunk has other coordinates.
 
     Notes
     -----
@@ -313,16 +338,9 @@ class Estimated(Around):
     """
 
     def __init__(
-        self, robot: Robot, controller: Controller, *, bandwidth: float = 16.0,
+        self, controller: Controller, *, bandwidth: float = 8.0,
         threshold: float = 0.05, period: float | None = None,
     ) -> None:  # fmt: skip
-        model = robot.model
-        upright = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
-        if robot.floating and abs(model.axis[:3]).tolist() != upright:
-            raise ControllerError(
-                f"robot {robot.name!r}: the estimator needs a trunk whose first coordinates are x, "
-                f"z and pitch; they are {', '.join(robot.joint_names[:3])}"
-            )
         for name, value in (("bandwidth", bandwidth), ("threshold", threshold)):
             if not (math.isfinite(value) and value > 0.0):
                 raise ControllerError(f"the {name} of an estimator must be positive, got {value!r}")
@@ -330,7 +348,20 @@ class Estimated(Around):
         kept = math.exp(-2.0 * math.pi * bandwidth * period)
         own = Parameters(
             period=period, position_gain=1.0 - kept**2, velocity_gain=(1.0 - kept) ** 2,
-            pitch=2 if robot.floating else -1, threshold=threshold * robot.weight, up=UP,
+            threshold=threshold, up=UP,
         )  # fmt: skip
         super().__init__(ESTIMATED, controller, own, period=period, extents={})
         self.bandwidth = bandwidth
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return parameters and memory, if the robot's trunk is one that is known."""
+        upright = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
+        if robot.floating and abs(robot.model.axis[:3]).tolist() != upright:
+            raise ControllerError(
+                f"robot {robot.name!r}: the estimator needs a trunk whose first coordinates are x, "
+                f"z and pitch; they are {', '.join(robot.joint_names[:3])}"
+            )
+        parameters, memory = super().numbers(robot)
+        begun: Any = memory
+        begun.own.floating = int(robot.floating)
+        return parameters, memory

@@ -1,4 +1,4 @@
-"""What a controller sees of its robot: encoders, an inertial unit, sensors in the feet.
+"""What a controller sees of its robot: encoders, an imu unit, sensors in the feet.
 
 What a sensor measures stands in the place of the truth in the state and the contacts that the
 controller is shown; what none measures stays true. Truth is in the run, what was measured in its
@@ -20,7 +20,7 @@ from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts, Controller
-from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState, controlled_robot
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +54,7 @@ class Encoders:
 
 @dataclass(frozen=True, kw_only=True)
 class InertialUnit:
-    """Pitch of the trunk and its rate, as an inertial measurement unit tells them.
+    """Pitch of the trunk and its rate, as an imu measurement unit tells them.
 
     Parameters
     ----------
@@ -134,8 +134,6 @@ class Parameters(Bundle):
         Calls between two readings; 0 for no sensor.
     resolution, encoder_noise, encoder_bias, smoothing
         Of the encoders (rad); share of a new difference in the velocity.
-    pitch : int
-        Coordinate of the trunk's pitch.
     pitch_noise, pitch_bias, rate_noise, rate_bias : float
     force_noise, force_bias, threshold : float
     switches : int
@@ -151,7 +149,6 @@ class Parameters(Bundle):
     encoder_noise: float = number(float)
     encoder_bias: float = number(float)
     smoothing: float = number(float)
-    pitch: int = number(int)
     pitch_noise: float = number(float)
     pitch_bias: float = number(float)
     rate_noise: float = number(float)
@@ -263,6 +260,15 @@ def read_feet(contacts: Contacts, parameters: Parameters, memory: Memory) -> Non
 
 
 @kernel
+def pitch_coordinate(robot: ControlledRobot) -> int:
+    """Coordinate in which the trunk turns: the first turning one without a motor, or -1."""
+    for i in range(robot.unactuated.shape[0]):
+        if robot.model.axis[robot.unactuated[i], 0] != 0.0:
+            return int(robot.unactuated[i])
+    return -1
+
+
+@kernel
 def read_all(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
     memory: Memory,
@@ -284,7 +290,7 @@ def read_all(
             q[joint] = memory.joint[i]
             v[joint] = memory.joint_rate[i]
     if parameters.inertial_every > 0:
-        pitch = parameters.pitch
+        pitch = pitch_coordinate(robot)
         if memory.calls % parameters.inertial_every == 0:
             noise = parameters.pitch_noise * normal(memory.seeds)
             memory.pitch = state.q[pitch] + memory.pitch_bias + noise
@@ -348,13 +354,11 @@ class Sensed(Around):
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
     controller : Controller
         What decides the torques.
     encoders : Encoders, optional
         Of the actuated joints.
-    inertial : InertialUnit, optional
+    imu : InertialUnit, optional
         Of the trunk's pitch.
     feet : FootSensors, optional
         Under the contact points.
@@ -368,7 +372,7 @@ class Sensed(Around):
     Raises
     ------
     ControllerError
-        If a number cannot be, or the robot has no pitch to measure.
+        If a number cannot be; when it is simulated, if the robot has no pitch to measure.
 
     Notes
     -----
@@ -382,27 +386,26 @@ class Sensed(Around):
     >>> class Relaxed:
     ...     def torque(self, t, state, contacts):
     ...         return -2.0 * state.v[3:]
-    >>> seeing = hs.Sensed(robot, Relaxed(), encoders=hs.Encoders(bits=14, noise=1e-4), seed=3)
+    >>> seeing = hs.Sensed(Relaxed(), encoders=hs.Encoders(bits=14, noise=1e-4), seed=3)
     >>> run = hs.simulate(robot, seeing, state=robot.reference_state(), duration=0.01)
     >>> bool(abs(run.log["measured_position"].values - run.position).max() < 1e-3)
     True
     """
 
     def __init__(
-        self, robot: Robot, controller: Controller, *, encoders: Encoders | None = None,
-        inertial: InertialUnit | None = None, feet: FootSensors | None = None,
+        self, controller: Controller, *, encoders: Encoders | None = None,
+        imu: InertialUnit | None = None, feet: FootSensors | None = None,
         delay: float = 0.0, period: float | None = None, seed: int = 0,
     ) -> None:  # fmt: skip
         period = min(inside(controller).period or PERIOD, PERIOD) if period is None else period
         late = periods("delay", delay, period)
         seen, unit, under = (
             encoders or Encoders(),
-            inertial or InertialUnit(),
+            imu or InertialUnit(),
             feet or FootSensors(),
         )
         each = [
-            0 if sensor is None else _calls(sensor.rate, period)
-            for sensor in (encoders, inertial, feet)
+            0 if sensor is None else _calls(sensor.rate, period) for sensor in (encoders, imu, feet)
         ]
         smoothing = 1.0
         if seen.cutoff is not None:
@@ -412,13 +415,22 @@ class Sensed(Around):
             period=period, encoder_every=each[0], inertial_every=each[1], foot_every=each[2],
             resolution=0.0 if seen.bits is None else 2.0 * math.pi / 2**seen.bits,
             encoder_noise=seen.noise, encoder_bias=seen.bias, smoothing=smoothing,
-            pitch=-1 if inertial is None else _pitch_of(robot), pitch_noise=unit.noise,
-            pitch_bias=unit.bias, rate_noise=unit.rate_noise, rate_bias=unit.rate_bias,
+            pitch_noise=unit.noise, pitch_bias=unit.bias,
+            rate_noise=unit.rate_noise, rate_bias=unit.rate_bias,
             force_noise=under.noise, force_bias=under.bias, threshold=under.least,
             switches=int(under.switches), late=late, seeds=np.array(seeded(seed)),
         )  # fmt: skip
         super().__init__(SENSED, controller, own, period=period, extents={"late": late})
-        self.encoders, self.inertial, self.feet, self.delay = encoders, inertial, feet, delay
+        self.encoders, self.imu, self.feet, self.delay = encoders, imu, feet, delay
+
+    def numbers(self, robot: Robot) -> tuple[Bundle, Bundle]:
+        """Return parameters and memory, if the robot has what is to be measured."""
+        if self.imu is not None and pitch_coordinate(controlled_robot(robot)) < 0:
+            raise ControllerError(
+                f"robot {robot.name!r} has no trunk that turns freely: there is no pitch for an "
+                "imu to measure"
+            )
+        return super().numbers(robot)
 
 
 def periods(name: str, time: float, period: float) -> int:
@@ -450,15 +462,3 @@ def _calls(rate: float | None, period: float) -> int:
             f"whole number of periods of {period} s: give another rate or period"
         )
     return calls
-
-
-def _pitch_of(robot: Robot) -> int:
-    """Return the coordinate of the trunk's pitch."""
-    model = robot.model
-    driven = set(model.actuator_joint.tolist())
-    turning = [j for j in range(robot.nv) if model.axis[j, 0] != 0.0 and j not in driven]
-    if not turning:
-        raise ControllerError(
-            f"robot {robot.name!r} has no trunk that turns freely: there is no pitch to measure"
-        )
-    return turning[0]

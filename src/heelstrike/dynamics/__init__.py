@@ -17,6 +17,11 @@ from heelstrike.dynamics.queries.equations_of_motion import (
 )
 from heelstrike.dynamics.queries.inverse_kinematics import LegPose, inverse_kinematics
 from heelstrike.dynamics.queries.linearization import Linearization, linearize
+from heelstrike.dynamics.queries.loops import (
+    loop_bias_acceleration,
+    loop_displacement,
+    loop_jacobian,
+)
 from heelstrike.dynamics.queries.momenta import (
     angular_momentum,
     center_of_mass,
@@ -79,6 +84,9 @@ __all__ = [
     "linearize",
     "link_poses",
     "link_velocities",
+    "loop_bias_acceleration",
+    "loop_displacement",
+    "loop_jacobian",
     "mass_matrix",
     "momentum",
     "momentum_matrix",

@@ -93,7 +93,7 @@ def _claims(claims: Sequence[Claim]) -> str:
         )
         for claim in claims
     ]
-    return _table(("where", "the paper", "measured here", "criterion", "verdict"), rows)
+    return _table(("where", "the paper", "computed here", "criterion", "verdict"), rows)
 
 
 def _refinement(rows: Sequence[RefinedWalk]) -> str:

@@ -5,5 +5,18 @@ from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.optimize import optimize_gait
+from heelstrike.gait.phased.phased_gait import PhasedGait
+from heelstrike.gait.phased.surface import Touchdown, make_invariant
 
-__all__ = ["ClearanceProfile", "Footing", "Gait", "Margins", "Phase", "load_gait", "optimize_gait"]
+__all__ = [
+    "ClearanceProfile",
+    "Footing",
+    "Gait",
+    "Margins",
+    "Phase",
+    "PhasedGait",
+    "Touchdown",
+    "load_gait",
+    "make_invariant",
+    "optimize_gait",
+]

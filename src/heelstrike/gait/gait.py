@@ -417,6 +417,11 @@ class Gait:
 
         save_gait(self, path)
 
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import gait_card
+
+        return gait_card(self)
+
     def __repr__(self) -> str:
         return (
             f"Gait({self.robot!r}: {self.step_length:g} m in {self.step_duration:g} s, "
@@ -455,7 +460,13 @@ def actuated_joints(robot: Robot) -> tuple[str, ...]:
     return tuple(robot.joint_names[j] for j in robot.model.actuator_joint)
 
 
-YOUNGER = frozenset({"stall_torque", "no_load_speed", "winding_resistance"})
+YOUNGER = frozenset(
+    {
+        "stall_torque", "no_load_speed", "winding_resistance",
+        "loop_link", "loop_position", "coupling_joint", "coupling_polynomial",
+        "latch_joint", "latch_side", "latch_release",
+    }
+)  # fmt: skip
 """Numbers of a robot that are younger than the first gaits in files."""
 
 

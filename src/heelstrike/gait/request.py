@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.sole import reach, sole, standing_height
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sides.mirror import Mirror
 
@@ -94,6 +95,7 @@ class Request:
 
     def __post_init__(self) -> None:
         robot = self.robot
+        refuse_loops(robot, "gait design", GaitError)
         self.mirror = _mirror_of(robot)
         self.lower, self.upper = ranges_kept(robot, self.mirror, self.joint_ranges)
         self.stance, self.swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)

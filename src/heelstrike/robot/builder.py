@@ -12,7 +12,15 @@ import numpy as np
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
-from heelstrike.robot.model import AXES, PROPERTIES, JointProperties, Limits, Model, Pair
+from heelstrike.robot.model import (
+    AXES,
+    POWERS,
+    PROPERTIES,
+    JointProperties,
+    Limits,
+    Model,
+    Pair,
+)
 from heelstrike.robot.robot import Robot
 
 UNLIMITED = (-math.inf, math.inf)
@@ -60,6 +68,9 @@ class RobotBuilder:
         self._gravity = _number("gravity", gravity)
         self._links: list[_Link] = []
         self._points: list[ContactPoint] = []
+        self._loops: list[tuple[tuple[int, int], tuple[Pair, Pair]]] = []
+        self._couplings: list[tuple[tuple[int, int], tuple[float, ...]]] = []
+        self._latches: list[tuple[int, int, int]] = []
 
     def floating_base(
         self, link: str, at: Pair = (0.0, 0.0), **properties: Unpack[JointProperties]
@@ -208,6 +219,109 @@ class RobotBuilder:
         self.contact(link, heel, friction=friction)
         self.contact(link, toe, friction=friction)
 
+    def loop(self, link: str, other: str | None, *, at: Pair, other_at: Pair | None = None) -> None:
+        """Close a loop: join two links, which hang on others already, by one more hinge.
+
+        It holds exactly, whatever it takes; what it takes is recorded as ``Run.loop_force``.
+
+        Parameters
+        ----------
+        link, other : str
+            The two links; None for the world as the other.
+        at : (2,) float
+            Place of the hinge in the frame of the first link (m).
+        other_at : (2,) float, optional
+            Its place in the frame of the other (m). By default where it is as the robot stands in
+            its reference; if it is elsewhere, the loop is open there, and :meth:`Robot.closed`
+            finds states in which it is not.
+
+        Raises
+        ------
+        RobotError
+            If a link is unknown, or both are one.
+        """
+        first = self._index(link, "a loop joins")
+        second = -1 if other is None else self._index(other, "a loop joins")
+        if first == second:
+            raise self._error(f"a loop joins link {link!r} to itself, which says nothing.")
+        try:
+            x, z = _pair("at", at)
+            if other_at is None:
+                (x1, z1), (x2, z2) = self._origin(first), self._origin(second)
+                other_at = x + x1 - x2, z + z1 - z2
+            places = (x, z), _pair("other_at", other_at)
+        except RobotError as error:
+            raise self._error(f"loop of {link!r} and {other!r}: {error}") from None
+        self._loops.append(((first, second), places))
+
+    def couple(
+        self, joint: str, leader: str | None, polynomial: Sequence[float] = (0.0, 1.0)
+    ) -> None:
+        """Let a joint follow another, as gears or belts make it.
+
+        Parameters
+        ----------
+        joint : str
+            The joint that follows.
+        leader : str or None
+            The joint that it follows; None holds it where the first coefficient says.
+        polynomial : sequence of float
+            How far from its reference the joint is (rad, m): up to five coefficients of the powers
+            0, 1 … of how far the leader is from its own. By default as far as the leader.
+
+        Raises
+        ------
+        RobotError
+            If a joint is unknown or follows itself or two others, or the coefficients are none.
+        """
+        places = self._joint(joint), -1 if leader is None else self._joint(leader)
+        if places[0] == places[1]:
+            raise self._error(f"joint {joint!r} follows itself, which says nothing.")
+        if any(places[0] == follower for (follower, _), _ in self._couplings):
+            raise self._error(f"joint {joint!r} follows another already.")
+        if not 1 <= len(polynomial) <= POWERS:
+            raise self._error(
+                f"joint {joint!r} follows by a polynomial of one to {POWERS} coefficients, got "
+                f"{polynomial!r}."
+            )
+        try:
+            factors = [_number("a coefficient of its polynomial", each) for each in polynomial]
+        except RobotError as error:
+            raise self._error(f"joint {joint!r} follows: {error}") from None
+        self._couplings.append((places, (*factors, *[0.0] * (POWERS - len(factors)))))
+
+    def latch(self, joint: str, end: str, *, release: str | None = None) -> None:
+        """Let an end of a joint's range hold the joint once it is there, as locks of knees do.
+
+        Parameters
+        ----------
+        joint : str
+            The joint, which has a limit at that end.
+        end : {"lower", "upper"}
+            The end that holds it.
+        release : str, optional
+            Link that makes it let go when it touches down, by any of its contact points. Else the
+            latch holds until :attr:`Simulation.latched` says otherwise.
+
+        Raises
+        ------
+        RobotError
+            If joint or link are unknown, or the joint has no limit there or a latch already.
+        """
+        place = self._joint(joint, "latch")
+        if end not in ("lower", "upper"):
+            raise self._error(
+                f"the latch of joint {joint!r} is at an end, 'lower' or 'upper', not {end!r}."
+            )
+        if not math.isfinite(self._links[place].numbers[end]):
+            raise self._error(
+                f"the latch of joint {joint!r} holds it at its {end} limit, and it has none."
+            )
+        if any(place == known for known, _, _ in self._latches):
+            raise self._error(f"joint {joint!r} has a latch already.")
+        by = -1 if release is None else self._index(release, f"the latch of {joint!r} lets go by")
+        self._latches.append((place, 1 if end == "upper" else -1, by))
+
     def build(self) -> Robot:
         """Return the robot. The builder may go on and build others.
 
@@ -235,6 +349,13 @@ class RobotBuilder:
             actuator_joint=driven,
             torque_lower=torques[0],
             torque_upper=torques[1],
+            loop_link=[links for links, _ in self._loops],
+            loop_position=[places for _, places in self._loops],
+            coupling_joint=[joints for joints, _ in self._couplings],
+            coupling_polynomial=[factors for _, factors in self._couplings],
+            latch_joint=[joint for joint, _, _ in self._latches],
+            latch_side=[side for _, side, _ in self._latches],
+            latch_release=[link for _, _, link in self._latches],
             pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(
@@ -275,6 +396,22 @@ class RobotBuilder:
         numbers |= {"parent": place, "axis": axis, "offset": at}
         self._links.append(_Link(joint, name, numbers, torque))
         return name
+
+    def _joint(self, joint: str, what: str = "couple") -> int:
+        names = [link.joint for link in self._links]
+        if joint not in names:
+            known = ", ".join(names) or "none yet"
+            raise self._error(f"there is no joint {joint!r} to {what}. Joints are: {known}.")
+        return names.index(joint)
+
+    def _origin(self, link: int) -> tuple[float, float]:
+        """World position of the frame of a link in the reference configuration."""
+        x = z = 0.0
+        while link >= 0:
+            numbers = self._links[link].numbers
+            x, z = x + numbers["offset"][0], z + numbers["offset"][1]
+            link = numbers["parent"]
+        return x, z
 
     def _index(self, link: str, why: str = "a contact point is on") -> int:
         for i in reversed(range(len(self._links))):

@@ -20,6 +20,7 @@ from heelstrike.robot.files.options import LoadOptions, Options
 from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
+from heelstrike.robot.loops import coupling_words, latch_words
 from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
 from heelstrike.robot.plausibility import (
     Finding,
@@ -292,6 +293,9 @@ def _description(robot: Robot) -> str:
                 + (radius if robot.model.contact_radius[i] else "")
                 + (f", friction {robot.contact_friction[i]:g}" if robot.contact_friction else "")
             )
+    lines += [f"closed loop: {name}" for name in robot.loop_names]
+    lines += [f"coupled: {coupling_words(robot, k)}" for k in range(robot.model.couplings)]
+    lines += [f"latch: {latch_words(robot, k)}" for k in range(robot.model.latches)]
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
@@ -442,5 +446,8 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "contact_points": list(robot.contact_names),
         "feet": [foot.name for foot in robot.feet],
         "locked": [asdict(one) for one in robot.locked],
+        "loops": list(robot.loop_names),
+        "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
+        "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
         **of_joints,
     }

@@ -26,6 +26,12 @@ Limits = float | Sequence[float]
 AXES = 2
 """Dimension of space."""
 
+POWERS = 5
+"""Coefficients of the polynomial by which a joint follows another."""
+
+SELDOM = ("loops", "couplings", "latches")
+"""Extents of what most robots have nothing of."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Number(Member):
@@ -74,6 +80,7 @@ _POSE: dict[str, Any] = {"default": 0.0, "given": True}
 _PART: dict[str, Any] = {"default": 0.0, "given": True, "least": 0.0, "alike": True}
 _LIMIT: dict[str, Any] = {"infinite": True}
 _UNKNOWN: dict[str, Any] = {"default": math.inf}
+_LATER: dict[str, Any] = {"default": 0, "later": True}
 
 
 class Model(Bundle):
@@ -91,6 +98,8 @@ class Model(Bundle):
         are equal; each counts what it says.
     nc, nu : int
         Number of contact points and of actuators.
+    loops, couplings, latches : int
+        Number of closed loops, of coupled joints and of latches.
     axes : int
         Dimension of space.
     parent : (nl,) int
@@ -138,6 +147,21 @@ class Model(Bundle):
         Coordinate that each actuator drives.
     torque_lower, torque_upper : (nu,) float
         Torque (N m) or force (N) limits at the joint; infinite where there is none.
+    loop_link : (loops, 2) int
+        The two links that each closed loop joins by a hinge, -1 for the world.
+    loop_position : (loops, 2, axes) float
+        Where the hinge is on each of them, in the frame of the link (m).
+    coupling_joint : (couplings, 2) int
+        Joint that follows another and the one that leads it, -1 if it is held where it is.
+    coupling_polynomial : (couplings, 5) float
+        How far from its `reference` the follower is (rad, m): coefficients c₀ … c₄ of the powers of
+        how far the leader is from its own.
+    latch_joint : (latches,) int
+        Joint that each latch holds once it has reached an end of its range.
+    latch_side : (latches,) int
+        That end: 1 for the upper, -1 for the lower.
+    latch_release : (latches,) int
+        Link whose touchdown makes it let go; -1 if none does.
     pivot : int
         Link whose origin serves as the reference point of spatial vectors, so that a robot far
         from the world origin loses no digits.
@@ -149,6 +173,9 @@ class Model(Bundle):
     nv: int = extent()
     nc: int = extent()
     nu: int = extent()
+    loops: int = extent()
+    couplings: int = extent()
+    latches: int = extent()
     axes: int = extent()
 
     parent: Integers = of("nl", kind=int, points="nl", least=-1)
@@ -182,6 +209,13 @@ class Model(Bundle):
     actuator_joint: Integers = of("nu", kind=int, points="nv", least=0)
     torque_lower: Floats = of("nu", unit="N m, N", **_LIMIT)
     torque_upper: Floats = of("nu", unit="N m, N", **_LIMIT)
+    loop_link: Integers = of("loops", 2, kind=int, points="nl", least=-1, **_LATER)
+    loop_position: Floats = of("loops", 2, "axes", unit="m", **_LATER)
+    coupling_joint: Integers = of("couplings", 2, kind=int, points="nv", least=-1, **_LATER)
+    coupling_polynomial: Floats = of("couplings", POWERS, unit="rad, m", **_LATER)
+    latch_joint: Integers = of("latches", kind=int, points="nv", least=0, **_LATER)
+    latch_side: Integers = of("latches", kind=int, least=-1, **_LATER)
+    latch_release: Integers = of("latches", kind=int, points="nl", least=-1, **_LATER)
     pivot: int = of(kind=int, points="nl", least=0)
 
     @classmethod
@@ -191,7 +225,7 @@ class Model(Bundle):
         Parameters
         ----------
         **members : array
-            Every member by its name.
+            Every member by its name; loops, couplings and latches only where there are any.
 
         Returns
         -------
@@ -202,7 +236,8 @@ class Model(Bundle):
         for name, number in NUMBERS.items():
             if number.shape:
                 rest = [AXES if size == "axes" else size for size in number.shape[1:]]
-                values = np.array(members[name], dtype=number.dtype, order="C")
+                given = members.get(name, ()) if number.shape[0] in SELDOM else members[name]
+                values = np.array(given, dtype=number.dtype, order="C")
                 made[name] = values.reshape(-1, *rest)
         return cls(**made)
 

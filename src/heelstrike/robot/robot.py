@@ -150,6 +150,22 @@ class Robot:
         return self.model.nc
 
     @property
+    def loop_names(self) -> tuple[str, ...]:
+        """Names of the closed loops: those of the two links that each joins."""
+        names = [*self.link_names, "world"]  # which is link -1
+        return tuple(f"{names[a]}-{names[b]}" for a, b in self.model.loop_link.tolist())
+
+    @property
+    def coupling_names(self) -> tuple[str, ...]:
+        """Names of the joints that follow others."""
+        return tuple(self.joint_names[joint] for joint in self.model.coupling_joint[:, 0])
+
+    @property
+    def latch_names(self) -> tuple[str, ...]:
+        """Names of the joints that latches hold."""
+        return tuple(self.joint_names[joint] for joint in self.model.latch_joint)
+
+    @property
     def total_mass(self) -> float:
         """Mass of the whole robot in kg."""
         return float(np.sum(self.model.mass))
@@ -328,7 +344,8 @@ class Robot:
         Returns
         -------
         State
-            Its positions stay inside the joints' ranges; its feet may be in the ground or above it.
+            Its positions stay inside the joints' ranges; its feet may be in the ground or above it,
+            and its loops open (see :meth:`closed`).
 
         Raises
         ------
@@ -414,6 +431,44 @@ class Robot:
         from heelstrike.contact.queries.placing import standing
 
         return standing(self, ground)
+
+    def closed(self, state: State, *, keep: Iterable[str | int] = ()) -> State:
+        """Return the nearest state in which all loops are closed and all couplings hold.
+
+        Positions move the shortest way by the masses, but not out of the joints' ranges, and so do
+        velocities, as an impact would change them.
+
+        Parameters
+        ----------
+        state : State
+            The state, left as it is.
+        keep : iterable of str or int, optional
+            Joints that stay as they are, in position and velocity: the crank of a four-bar.
+
+        Returns
+        -------
+        State
+            The state; the same if the robot has neither loops nor couplings.
+
+        Raises
+        ------
+        RobotError
+            If a joint is unknown, or no such state is found.
+
+        Examples
+        --------
+        >>> import heelstrike as hs
+        >>> build = hs.RobotBuilder("pair")
+        >>> for name in ("front", "rear"):
+        ...     wheel = build.hinge(name, None, mass=1.0, inertia=0.1)
+        >>> build.couple("rear", "front", [0.0, 2.0])
+        >>> pair = build.build()
+        >>> pair.closed(pair.state({"front": 0.3}), keep=["front"]).q
+        array([0.3, 0.6])
+        """
+        from heelstrike.contact.queries.placing import closed
+
+        return closed(self, state, keep)
 
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.
@@ -516,6 +571,11 @@ class Robot:
         str
             The page, to be written to a file.
 
+        Raises
+        ------
+        RobotError
+            If the robot has closed loops or coupled joints, of which the page would know nothing.
+
         Examples
         --------
         >>> import heelstrike as hs
@@ -525,6 +585,11 @@ class Robot:
         from heelstrike.dynamics.queries.c_code import c_code
 
         return c_code(self.model, name or self.name, self.joint_names)
+
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import robot_card
+
+        return robot_card(self)
 
     def __repr__(self) -> str:
         return (

@@ -40,7 +40,7 @@ from heelstrike.sim.record.record import Record as Record
 from heelstrike.sim.record.recording import note_events as note_events
 from heelstrike.sim.record.recording import note_extremes as note_extremes
 from heelstrike.sim.record.recording import note_row_when_due as note_row_when_due
-from heelstrike.sim.run import Certificates, Event, Run, SolverCount, Timing
+from heelstrike.sim.run import Certificates, Event, Logged, Run, SolverCount, Timing
 from heelstrike.sim.setting import Setting as Setting
 from heelstrike.sim.simulation import Simulation, simulate
 from heelstrike.sim.snapshot import Snapshot, load_snapshot
@@ -59,6 +59,7 @@ __all__ = [
     "HuntCrossley",
     "KelvinVoigt",
     "Kernels",
+    "Logged",
     "Method",
     "Push",
     "RegularisedFriction",

@@ -174,8 +174,8 @@ def simulate_batch(
     Parameters
     ----------
     robot : Robot, or sequence of n
-        Robots may differ in every number, but must have as many coordinates, actuators and contact
-        points.
+        Robots may differ in every number, but must have as many coordinates, actuators, contact
+        points, closed loops and coupled joints.
     controller : controller, sequence of n, or None
         Stock controllers, and those made with :func:`heelstrike.controller`. Each run has a memory
         of its own. A Python controller would run one at a time: call `simulate` instead.
@@ -386,12 +386,18 @@ def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
     )
 
 
+_ALIKE = {
+    "nv": "coordinates", "nu": "actuators", "nc": "contact points", "loops": "closed loops",
+    "couplings": "coupled joints",
+}  # fmt: skip
+
+
 def _check_robots(robots: Sequence[Any]) -> None:
     for index, robot in enumerate(robots):
         if not isinstance(robot, Robot):
             raise SimulationError(f"robot must be a Robot or several, got {robot!r}")
-        for name, what in (("nv", "coordinates"), ("nu", "actuators"), ("nc", "contact points")):
-            first, other = getattr(robots[0], name), getattr(robot, name)
+        for name, what in _ALIKE.items():
+            first, other = getattr(robots[0].model, name), getattr(robot.model, name)
             if first != other:
                 raise SimulationError(
                     f"the robots of a batch must be built alike: robot {index} has {other} "

@@ -6,7 +6,17 @@ import enum
 
 
 class RunStatus(enum.Enum):
-    """How a run ended."""
+    """How a run ended; ``run.message`` says it in words, with the time.
+
+    ``COMPLETED``, ``FELL``
+        The time is up; the centre of mass sank below half its first height.
+    ``DIVERGED``
+        The state stopped being finite.
+    ``SOLVER_FAILED``
+        No contact forces or impulses could be certified. An event-driven run tries bridges first.
+    ``CONTROLLER_FAILED``, ``INTERRUPTED``
+        The controller raised, or asked for what is no number; somebody pressed Ctrl-C.
+    """
 
     COMPLETED = "completed"
     FELL = "fell"
@@ -26,7 +36,8 @@ class EventKind(enum.IntEnum):
     ``IMPACT``
         It was on the ground and received an impulse from an impact elsewhere.
     ``ZENO``
-        Its ever smaller bounces have come to an end, and it stays on the ground.
+        Its ever smaller bounces have come to an end, and it stays on the ground. Bounces shorter
+        than 1e-8 s are not followed, nor what restitution is in those shorter than 1e-6 s.
     ``PAINLEVE``
         No contact force, or several, agreed with the laws of motion and friction. With an impulse:
         the velocity jumped without a collision. Without: one of the solutions was chosen.
@@ -34,10 +45,22 @@ class EventKind(enum.IntEnum):
         Newton's restitution with friction made energy in an impact (Kane's paradox).
     ``JOINT_STOP``
         A joint reached the end of its range, with the impulse that took, or was pressed against it
-        by an impact elsewhere; the event's `contact` is the index of the joint.
+        by an impact elsewhere (or, held by a latch, pulled off it: the impulse is negative then);
+        the event's `contact` is the index of the joint.
     ``JOINT_SLIP``, ``JOINT_STICK``
         A joint with dry friction broke away, or turned round; it came to rest. The event's
         `contact` is the index of the joint.
+    ``BRIDGE``
+        Contact events piled up without time moving on, or no forces agreed with the laws: a short
+        time is bridged by impulses at its beginning, which are told of by events of their own. The
+        event's `impulse` is the length of the bridge (s) and how far its end may be wrong (the
+        largest error of a coordinate or velocity), its `contact` zero.
+    ``WEDGED``
+        It is in the ground, by so little as rounding and turning explain, and neither it nor a
+        joint can be pushed out without the other being pressed in: from here on they are left where
+        they are until that ends.
+    ``JOINT_RELEASE``
+        A latch let go of a joint, whose index the event's `contact` is.
     """
 
     TOUCHDOWN = 0
@@ -52,6 +75,14 @@ class EventKind(enum.IntEnum):
     JOINT_STOP = 9
     JOINT_SLIP = 10
     JOINT_STICK = 11
+    BRIDGE = 12
+    WEDGED = 13
+    JOINT_RELEASE = 14
+
+    @property
+    def of_joint(self) -> bool:
+        """Whether it happens to a joint, and not to a contact point."""
+        return self.name.startswith("JOINT_")
 
 
 class Scheme(enum.IntEnum):
@@ -68,8 +99,10 @@ class Scheme(enum.IntEnum):
         is computed at the new position, where the vertices whose gap is not positive are active.
     ``MOREAU_JEAN``
         Moreau's scheme with Newton's restitution: points whose gap is foreseen to close within
-        half a step get ``v_n⁺ + e v_n ≥ 0``; positions move with the mean velocity (Moreau 1988;
-        Jean 1999, with Siconos' θ = γ = 1/2).
+        half a step get ``v_n⁺ + e v_n ≥ 0``; positions move with the mean velocity, and joint
+        springs and dampers act as in the middle of the step, to first order (Moreau 1988; Jean
+        1999; θ = γ = 1/2). Gravity, Coriolis forces and motors act as at its beginning: a pendulum
+        that swings with ω gains (ω h)²/2 of its energy a step.
     ``LINEARLY_IMPLICIT``
         ``GAP_LINEARISED`` with joint springs, dampers and controller gains at the end of the step,
         to first order (Anitescu and Potra 2002, the paper's [17]).

@@ -135,15 +135,9 @@ def frame(kernels: Kernels) -> Callable[..., int]:
     report, move = kernels.report, kernels.move
 
     def advance(
-        controller: Any,
-        model: Model,
-        ground: GroundModel,
-        control: Control,
-        memory: Memory,
-        work: Any,
-        record: Record,
-        clock: Clock,
-    ) -> int:
+        controller: Any, model: Model, ground: GroundModel, control: Control, memory: Memory,
+        work: Any, record: Record, clock: Clock,
+    ) -> int:  # fmt: skip
         """Advance a simulation until its time is up or something stops it; return what."""
         scene = Scene(controller, model, ground)
         while True:

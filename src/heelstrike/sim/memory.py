@@ -11,6 +11,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
+from heelstrike.dynamics.loops import LoopRows, count_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
@@ -105,11 +106,13 @@ class Assembly(Bundle):
     ----------
     candidate : (capacity,) int
         Contact points that take part; after them joint stops, numbered on from nc: twice the joint,
-        plus one for its upper end; last dry joints. The capacity has room for all.
+        plus one for its upper end; then dry joints, then rows of the loops. The capacity has room
+        for all.
     jacobian : (2 capacity, nv) float
         Contact Jacobian of the candidates.
     leaf : (capacity,) int
-        Link that each candidate acts on: only its joint and those before have a part in its rows.
+        Link that each candidate acts on: only its joint and those before have a part in its rows;
+        ``EVERYWHERE`` for one that acts on several.
     root : (nv,) float
     half : (nv, 2 capacity) float
         D^(-1/2) and D^(-1/2) L⁻ᵀ Jᵀ, with A = Lᵀ D L.
@@ -187,6 +190,39 @@ class Reaction(Bundle):
     dry_mode: Integers = array("nd", of=int)
 
 
+class Loops(Bundle):
+    """What holds besides the joints: closed loops, coupled joints and latches.
+
+    Attributes
+    ----------
+    rows : LoopRows
+        Their equations in the state now.
+    response : (loop_rows, nv) float
+        What a unit force of each does to the coordinates.
+    system : (loop_rows, loop_rows + 1) float
+    unknown : (loop_rows,) float
+    order : (loop_rows,) int
+        Equations of the forces where there is no contact problem, their solution, and its order.
+    loop_force : (loops, axes) float
+    coupling_force : (couplings,) float
+        Forces of the last solve.
+    held : (latches,) int
+        Whether each latch is engaged.
+    latch_stop : (latches,) int
+        The joint stop that each is, as candidates of time stepping are numbered.
+    """
+
+    rows: LoopRows = part(LoopRows)
+    response: Floats = array("loop_rows", "nv")
+    system: Floats = array("loop_rows", "loop_rows + 1")
+    unknown: Floats = array("loop_rows")
+    order: Integers = array("loop_rows", of=int)
+    loop_force: Floats = array("loops", "axes")
+    coupling_force: Floats = array("couplings")
+    held: Integers = array("latches", of=int)
+    latch_stop: Integers = array("latches", of=int)
+
+
 class Reported(Bundle):
     """The contact modes that events have told of.
 
@@ -238,6 +274,8 @@ class Memory(Bundle):
         What straight-line programs make it of.
     reaction : Reaction
         What else came of it.
+    loops : Loops
+        What holds between coordinates.
     reported : Reported
         What events have told of it.
     pushes : Pushes
@@ -260,6 +298,7 @@ class Memory(Bundle):
     assembly: Assembly = part(Assembly, flat=True)
     usual: UsualPoints = part(UsualPoints, flat=True)
     reaction: Reaction = part(Reaction, flat=True)
+    loops: Loops = part(Loops)
     reported: Reported = part(Reported, flat=True)
     pushes: Pushes = part(Pushes)
     tally: Tally = part(Tally)
@@ -282,14 +321,15 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     place[points] = np.arange(len(points))
     extents = {
         **model.extents, "nd": len(dry), "capacity": capacity,
-        "points": len(points), "components": 2,
+        "points": len(points), "components": 2, "loop_rows": count_rows(model),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
+    most = capacity + nc + count_rows(model)  # in a concave corner a point is there twice
     assembly = Assembly.allocate(
-        extents,
-        problem=ContactProblem.allocate(nc=capacity),
-        answer=ContactAnswer.allocate(nc=capacity),
-        solver=contact_workspace(max(capacity, 1), ready=False),  # loops make it ready
+        {**extents, "capacity": most},
+        problem=ContactProblem.allocate(nc=most),
+        answer=ContactAnswer.allocate(nc=most),
+        solver=contact_workspace(max(most, 1), ready=False),  # loops make it ready
     )
     problem = assembly.problem
     return Memory.allocate(
@@ -312,6 +352,9 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
             programs=programs,
             usual_place=place,
             every_point=np.arange(nc),
+        ),
+        loops=Loops.allocate(
+            extents, latch_stop=nc + 2 * model.latch_joint + (model.latch_side > 0)
         ),
         reported=Reported.allocate(extents, resting=np.full(len(dry), -1, dtype=np.int64)),
         pushes=pushes_on(robot, pushes),

@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from heelstrike.analysis.summary import Summary
+    from heelstrike.gait.gait import Gait
     from heelstrike.sim.method import Method, UnknownMethod
     from heelstrike.sim.record.record import Record
+    from heelstrike.view.notebook.cards import Film
 
 Floats = NDArray[np.float64]
 
@@ -100,7 +102,8 @@ class Event:
     contact : int
         Index of the contact point, or of the joint of a ``JOINT_`` event.
     impulse : tuple of float
-        Impulse (normal, tangent) on the robot over the step in which it happened, in N s.
+        Impulse (normal, tangent) on the robot over the step in which it happened, in N s. Of a
+        ``BRIDGE`` its length (s) and how far it may be wrong.
     """
 
     time: float
@@ -214,6 +217,12 @@ class Run:
     slip_velocity : (nt, nc) float
         Tangential velocity (m/s) at the end of the step of the points in the contact problem;
         zero for the others.
+    loop_force : (nt, loops, 2) float
+        Force (x, z) on the first link of each closed loop at its hinge (N), in world axes: the mean
+        over the step. The second link feels the opposite.
+    coupling_force : (nt, couplings) float
+        Generalised force on each joint that follows another (N m, or N for a slide); the leader
+        feels it times minus the slope of the coupling.
     residual : (nt, 3) float
         Relative residuals of the contact problem: complementarity, cone, non-penetration.
     events : tuple of Event
@@ -277,6 +286,14 @@ class Run:
         "nc", of="reaction.slip", unit="m/s",
         label="tangential velocity of the contact points at the end of the step",
     )  # fmt: skip
+    loop_force: Floats = recorded(
+        "loops", "axes", of="loops.loop_force", unit="N", later=True,
+        label="force on the first link of the closed loops, mean over the step that follows",
+    )  # fmt: skip
+    coupling_force: Floats = recorded(
+        "couplings", of="loops.coupling_force", unit="N m or N", later=True,
+        label="force on the joints that follow others",
+    )  # fmt: skip
     residual: Floats = recorded(
         "conditions", of="assembly.answer.residual", unit="1",
         label="relative residuals of the contact problem",
@@ -298,6 +315,11 @@ class Run:
             f"Run({self.robot.name}, {self.method.name}, {last:.6g} s, "
             f"{self.status.value}, {self.steps} steps)"
         )
+
+    def _repr_html_(self) -> str:
+        from heelstrike.view.notebook.cards import run_card
+
+        return run_card(self)
 
     @property
     def completed(self) -> bool:
@@ -370,6 +392,70 @@ class Run:
         from heelstrike.view.animation import animate
 
         return animate(self, path, **options)
+
+    def save_html(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write the run as one HTML file; see :func:`heelstrike.view.page.page.save_html`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.page.page import save_html
+
+        return save_html(self, path, **options)
+
+    def show(self, *, gait: Gait | None = None, height: int = 820) -> Film:
+        """Show the run in a notebook: the page of :meth:`save_html`, in place.
+
+        Parameters
+        ----------
+        gait : Gait, optional
+            The gait that it followed.
+        height : int
+            Of the frame, in pixels.
+
+        Returns
+        -------
+        object
+            What a notebook shows, if it is the last value of a cell.
+
+        Raises
+        ------
+        ViewError
+            If the run has no rows.
+        GaitError
+            If the gait does not fit the robot of the run.
+        """
+        from heelstrike.view.notebook.cards import film
+
+        return film(self, gait, height)
+
+    def save_report(self, path: str | os.PathLike[str], **options: Any) -> Path:
+        """Write a report of the run; see :func:`heelstrike.report`.
+
+        Parameters
+        ----------
+        path : str or path
+            File to write.
+        **options
+            As for that function.
+
+        Returns
+        -------
+        Path
+            The file.
+        """
+        from heelstrike.view.report.writing import report
+
+        return report(self, path, **options)
 
     def to_dataset(self) -> xarray.Dataset:
         """Return the run as a labelled dataset with units."""

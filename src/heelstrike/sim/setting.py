@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Required, TypedDict
 from weakref import WeakKeyDictionary
@@ -11,11 +11,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from heelstrike.contact.ground import Ground
+from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Model
+from heelstrike.robot.model import NUMBERS, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.push import Push
 from heelstrike.sim.snapshot import Snapshot
 
@@ -26,6 +28,9 @@ if TYPE_CHECKING:
 MOST_EVERY = 2**62
 
 FLAT = Ground()
+
+# Loops that are open by no more than this (m, rad) are closed as a simulation begins.
+OPEN_LOOP = 1e-6
 
 # A walking robot has fallen when its centre of mass is below this fraction of its first height.
 FALL_FRACTION = 0.5
@@ -41,6 +46,7 @@ class Setup(TypedDict, total=False):
     record_every: int
     stop_when_fallen: bool | None
     pushes: Sequence[Push] | Push
+    latched: Iterable[str | int] | None
     checked: bool
 
 
@@ -61,6 +67,8 @@ class Setting:
     fallen_height : float
         Height of the centre of mass above the ground (m) below which the robot has fallen.
     pushes : tuple of Push
+    held : tuple of bool
+        Which latches of the robot are engaged as it begins.
     checked : bool
         Whether compiled controllers run in Python, every index looked at.
     """
@@ -72,6 +80,7 @@ class Setting:
     record_every: int
     fallen_height: float
     pushes: tuple[Push, ...]
+    held: tuple[bool, ...]
     checked: bool
 
 
@@ -84,6 +93,7 @@ def checked_setting(
     record_every: int = 1,
     stop_when_fallen: bool | None = None,
     pushes: Sequence[Push] | Push = (),
+    latched: Iterable[str | int] | None = None,
     checked: bool = False,
 ) -> Setting:
     """Check what is to be simulated.
@@ -119,6 +129,7 @@ def checked_setting(
         record_every=int(record_every),
         fallen_height=fallen_height,
         pushes=checked_pushes(robot, pushes),
+        held=latches_at(robot, state, ground, latched),
         checked=checked,
     )
 
@@ -137,7 +148,7 @@ def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, .
 def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, str]:
     """Say what a snapshot is one of: a simulation that is the same in this can take it up."""
     return {
-        "robot": f"{setting.robot.name} {_digest(setting.robot.model)}",
+        "robot": f"{setting.robot.name} {model_digest(setting.robot.model)}",
         "method": repr(method),
         "controller": controller + (", checked" if setting.checked else ""),
         "control_period": str(setting.control_period),
@@ -148,11 +159,13 @@ def identity_of(setting: Setting, method: Method, controller: str) -> dict[str, 
 _DIGESTS: WeakKeyDictionary[Model, str] = WeakKeyDictionary()
 
 
-def _digest(model: Model) -> str:
+def model_digest(model: Model) -> str:
     """Return what tells the numbers of a robot from those of others."""
     if model not in _DIGESTS:
         digest = hashlib.sha256()
         for name, value in model.members().items():
+            if NUMBERS[name].later and np.size(value) == 0:
+                continue  # snapshots that are older than the number stay good
             digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
         _DIGESTS[model] = digest.hexdigest()[:16]
     return _DIGESTS[model]
@@ -173,3 +186,12 @@ def _check_state(robot: Robot, state: State) -> None:
         if not np.all(np.isfinite(vector)):
             joint = robot.joint_names[int(np.flatnonzero(~np.isfinite(vector))[0])]
             raise SimulationError(f"state.{name} of joint {joint!r} is not finite")
+    open_by = np.abs(loop_displacement(robot, state.q))
+    if np.any(open_by > OPEN_LOOP):
+        row = int(np.argmax(open_by))
+        names = [f"loop {name}" for name in robot.loop_names for _ in range(2)]
+        names += [f"coupling of {name}" for name in robot.coupling_names]
+        raise SimulationError(
+            f"in this state the {names[row]} of robot {robot.name!r} is open by "
+            f"{open_by[row]:.3g}; robot.closed(state) is the nearest state in which all hold"
+        )

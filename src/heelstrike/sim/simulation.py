@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time as clock_time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn, Unpack
@@ -21,6 +21,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
@@ -75,7 +76,8 @@ class Simulation:
         The ground; flat with μ = 0.75 and no restitution by default.
     control_period : float, optional
         Time between two calls of the controller, in which its torques are held; a whole number of
-        steps where the method has steps. By default time stepping calls it every step, and under
+        steps where the method has steps. By default that of the law, if it has a period; without
+        one time stepping calls it every step, and under
         ``EventDriven`` and ``Compliant`` a compiled controller acts continuously; one in Python is
         called every millisecond by the former and at every sample by the latter.
     record_every : int
@@ -85,6 +87,9 @@ class Simulation:
         of what it was at first. By default true for floating robots with several feet.
     pushes : sequence of Push
         Forces from outside, each on a point of the robot over a window of time.
+    latched : iterable of str or int, optional
+        Joints that their latches hold as it begins. By default those at rest at their latched end,
+        unless the link whose touchdown lets go stands on the ground.
     checked : bool
         Run a compiled controller in Python, some hundred times slower, and look at every index: one
         that reads or writes beyond its arrays, or writes where it may not, ends the run with a
@@ -134,6 +139,7 @@ class Simulation:
         record_every: int = 1,
         stop_when_fallen: bool | None = None,
         pushes: Sequence[Push] | Push = (),
+        latched: Iterable[str | int] | None = None,
         checked: bool = False,
     ) -> None:
         begin, given = state.state if isinstance(state, Snapshot) else state, ground
@@ -141,7 +147,7 @@ class Simulation:
             ground = _ground_of(state)
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
-            stop_when_fallen=stop_when_fallen, pushes=pushes, checked=checked,
+            stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, checked=checked,
         )  # fmt: skip
         law_of(controller, begin=True)
         self._begin(setting, checked_method(method))
@@ -155,6 +161,8 @@ class Simulation:
             ):
                 self._clock.fallen_height = setting.fallen_height
             self.apply(setting.pushes)
+            if latched is not None:
+                self.latched = latched
 
     def __reduce__(self) -> NoReturn:
         """Copies would share memory that compiled code finds by address."""
@@ -184,6 +192,7 @@ class Simulation:
         self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
         self._memory.q[:] = setting.state.q
         self._memory.v[:] = setting.state.v
+        self._memory.loops.held[:] = setting.held
         self._work = method.new_work(self.robot)
         rows, events = method.room(self.robot)
         self._clock = Clock(
@@ -252,6 +261,18 @@ class Simulation:
         self._ground = ground
 
     @property
+    def latched(self) -> tuple[str, ...]:
+        """Joints that latches hold; when others are set, the latches of the rest let go at once."""
+        held = self._memory.loops.held
+        return tuple(name for name, one in zip(self.robot.latch_names, held, strict=True) if one)
+
+    @latched.setter
+    def latched(self, joints: Iterable[str | int]) -> None:
+        held = self._memory.loops.held
+        held[:] = latches_at(self.robot, self.state, self._ground, joints)
+        self.method.reconsider(self._work)
+
+    @property
     def controller(self) -> Controller | None:
         """What decides the torques; one that is set begins anew."""
         return self._controller
@@ -268,6 +289,16 @@ class Simulation:
     @parameters.setter
     def parameters(self, parameters: Bundle) -> None:
         self._numbers.set_parameters(parameters)
+
+    @property
+    def memory(self) -> Bundle:
+        """What a law remembers now; what is written into it, it remembers at its next call."""
+        return self._numbers.memory
+
+    @property
+    def log(self) -> Bundle:
+        """What a controller told of itself when it was last called."""
+        return self._logs.log
 
     def apply(self, push: Push | Sequence[Push]) -> None:
         """Let a push act, from its beginning or from now on, whichever is later.
@@ -481,9 +512,10 @@ class Simulation:
                 "gains"
             )
         if outcome is Outcome.SOLVER_FAILED:
+            reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
-                f"{self._memory.assembly.answer.residual.tolist()}"
+                f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
 
@@ -558,17 +590,9 @@ class Simulation:
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
         self._shown = read_only(memory.contacts)
-        memory.stiffness[:] = robot.model.stiffness
-        memory.damping[:] = robot.model.damping
         if law is not None:
             self._name = f"controller {law.function.name!r}"
-            driven = robot.model.actuator_joint
-            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
-            memory.damping[driven] += 0.0 if law.damping is None else law.damping
-        if voltage:
-            driven = robot.model.actuator_joint
-            speed = robot.model.no_load_speed[driven]
-            memory.damping[driven] += robot.model.stall_torque[driven] / speed
+        self._take_gains(law, voltage)
         if python is None:
             self._control.continuous = setting.control_period is None and controller is not None
         else:
@@ -583,6 +607,18 @@ class Simulation:
         clock.answered = 0
         known = self._numbers.robot
         self._watch = Watch((robot,) if known is robot else (robot, known), ready, memory)
+
+    def _take_gains(self, law: Law | None, voltage: bool) -> None:
+        """Note which joint forces an implicit scheme takes at the end of a step."""
+        model, memory = self.robot.model, self._memory
+        driven = model.actuator_joint
+        memory.stiffness[:] = model.stiffness
+        memory.damping[:] = model.damping
+        if law is not None:
+            memory.stiffness[driven] += 0.0 if law.stiffness is None else law.stiffness
+            memory.damping[driven] += 0.0 if law.damping is None else law.damping
+        if voltage:
+            memory.damping[driven] += model.stall_torque[driven] / model.no_load_speed[driven]
 
     def snapshot(self) -> Snapshot:
         """Return everything that the further course hangs on.
@@ -631,6 +667,22 @@ class Simulation:
         self._fork = None
         self.status, self.message = RunStatus.COMPLETED, f"restored at {self._now}"
         self.error = None
+
+    def forget(self) -> None:
+        """Forget what was: the record begins anew, and pushes that are over are gone from it.
+
+        How it goes on does not change. For simulations without an end, whose record is looked at
+        piece by piece.
+        """
+        self._recorded_until = self.time
+        self._records.clear()
+        if any(push.end < self.time for push in self._pushes):
+            kept = [i for i, push in enumerate(self._pushes) if push.end >= self.time]
+            share = self._memory.pushes.share[kept].copy()
+            self._pushes = tuple(self._pushes[i] for i in kept)
+            pushes = pushes_on(self.robot, self._pushes)
+            pushes.share[:] = share
+            self._memory = self._memory.replaced(pushes=pushes)
 
     def _put_back(self, snapshot: Snapshot) -> None:
         """Take up what a snapshot holds, or leave everything as it is."""
@@ -717,6 +769,8 @@ class Simulation:
 
     def _run(self, status: RunStatus, message: str, final: Snapshot | None = None) -> Run:
         """Return what is recorded as a run, which goes on from `final`."""
+        if not self._records:
+            self._new_record()
         return Run(
             robot=self.robot,
             ground=self._ground,

@@ -20,6 +20,9 @@ from heelstrike.view.panels import (
 )
 from heelstrike.view.style import BOUND, INK, foot_color, in_words
 
+ROOM_ABOUT_POINTS = 0.05
+"""Half the span of the axis of a zero moment point under point feet, in m."""
+
 STROKES = ("solid", (0, (4, 2)), (0, (1, 1.5)), (0, (5, 1, 1, 1)))
 
 
@@ -36,10 +39,12 @@ def draw_zero_moment_point(excerpt: Excerpt) -> Figure:
     ]
     curves += [Curve(alone[:, i], in_words(foot.name), look[i]) for i, foot in enumerate(feet)]
     heel, toe = zero_moment_point_limits(run.robot)
-    room = 0.15 * max(toe - heel, 1e-3)
+    points = not toe > heel
+    room = ROOM_ABOUT_POINTS if points else 0.15 * (toe - heel)
     panel = Panel(
         "ahead of the ankle (m)",
         curves,
+        remark="the feet are points: it can only be there" if points else "",
         bounds={"heel and toe": (heel, toe)},
         span=(heel - room, toe + room),
     )
@@ -111,7 +116,7 @@ def draw_gaps(excerpt: Excerpt) -> Figure:
         curves = [
             Curve(
                 run.gap[:, contact],
-                in_words(run.robot.contact_names[contact].removeprefix(f"{foot.name}_")),
+                _within_foot(run.robot.contact_names[contact], foot.name),
                 {"color": INK if k else foot_color(i), "linestyle": STROKES[k % len(STROKES)]},
             )
             for k, contact in enumerate(foot.contacts)
@@ -119,6 +124,12 @@ def draw_gaps(excerpt: Excerpt) -> Figure:
         panels.append(Panel("height (m)", curves, in_words(foot.name)))
     title = "height of the contact points above the ground"
     return draw_panels(excerpt, title, panels, height=0.9 + 2.3 * len(panels))
+
+
+def _within_foot(contact: str, foot: str) -> str:
+    """What a contact point of a foot is called beside the others of it."""
+    own = in_words(contact.removeprefix(f"{foot}_"))
+    return f"point {own}" if own.isdigit() else own
 
 
 def _feet(run: Run) -> tuple[Foot, ...]:

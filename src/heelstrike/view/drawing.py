@@ -151,11 +151,16 @@ class Skeleton:
 
 
 def body(robot: Robot) -> Skeleton:
-    """Make what a robot is drawn by: outlines, and bones of the links that have none."""
+    """Make what a robot is drawn by: outlines, and bones of the links that have none.
+
+    A foot whose outlines do not reach up to its ankle has both, so that it does not hang in the
+    air.
+    """
     bones = skeleton(robot)
     if not robot.outlines:
         return bones
     shaped = {outline.link for outline in robot.outlines}
+    shaped -= {foot.link for foot in robot.feet if not _reaches_joint(robot, foot.link)}
     side = _sides(robot)
     parts = [
         (bones.link[i : i + 1], bones.local[i : i + 1], float(bones.width[i]))
@@ -177,6 +182,12 @@ def body(robot: Robot) -> Skeleton:
         foot=legs(robot)[links[:, 0]],
         pieces=tuple(slice(start, end) for start, end in pairwise((0, *ends))),
     )
+
+
+def _reaches_joint(robot: Robot, link: int) -> bool:
+    """Whether the outlines of a link go round its joint, the origin of its axes."""
+    rims = [outline.rim() for outline in robot.outlines if outline.link == link]
+    return any(np.all((rim.min(axis=0) <= 0.0) & (rim.max(axis=0) >= 0.0)) for rim in rims)
 
 
 def skeleton(robot: Robot) -> Skeleton:
@@ -220,7 +231,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
     thickness = width
     if bones:
         lines = [(home, p) for p in points if all(_apart(p, end) for end in (home, *joints))]
-    elif _are_around(points):
+    elif are_around(points):
         lines, thickness = [(home, p) for p in points], THINNEST
     else:
         lines = _outline(points)
@@ -254,7 +265,7 @@ def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
     )
 
 
-def _are_around(points: Floats) -> bool:
+def are_around(points: Floats) -> bool:
     """Whether points lie on all sides of the joint, as those of a wheel: no half-plane is free."""
     if len(points) < 3:
         return False
@@ -356,7 +367,7 @@ def robot_picture(
     q = legs_apart(robot) if ground is None else robot.standing(ground).q
     poses = link_poses(robot, q)
     if ground is None and robot.floating and robot.nc:  # stand on z = 0
-        q[1] -= _contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min()
+        q[1] -= standing_height(robot, q)
         poses = link_poses(robot, q)
     shape = body(robot)
     segments = shape.segments(poses.origin, poses.angle)
@@ -447,6 +458,12 @@ def legs_apart(robot: Robot) -> Floats:
             turn = -(moved - q[joint]) * sense  # what the hip turned, the ankle turns back
             q[joint] = moved
     return q
+
+
+def standing_height(robot: Robot, q: Floats) -> float:
+    """Height of the lowest contact point of a robot in a configuration (nq,), in m."""
+    poses = link_poses(robot, q)
+    return float(_contact_bottoms(robot, poses.origin, poses.angle)[:, 1].min())
 
 
 def _contact_bottoms(robot: Robot, origin: Floats, angle: Floats) -> Floats:

@@ -23,7 +23,7 @@ WORKS = {
     "residual": ("residual", INK),
 }
 """Label and colour of each part of the balance, those over which others are drawn first."""
-ALWAYS = ("actuators", "contacts", "residual")
+ALWAYS = ("contacts", "residual")
 
 
 def draw_energy(excerpt: Excerpt) -> Figure:

@@ -150,7 +150,8 @@ def draw_panels(
         axes.set_ylabel(panel.unit)
         time_axis(axes, time, labelled=number + columns >= len(panels))
         if legends or number == 0:
-            legend_above(axes, right=bool(panel.title))
+            # To the right, where neither a title nor the factor of an axis stands.
+            legend_above(axes, right=bool(panel.title) or not panel.remark)
     figure_title(figure, run.robot, title, note=note(cut))
     return figure
 

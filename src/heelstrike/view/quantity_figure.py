@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from heelstrike.errors import ViewError
 from heelstrike.sim.files.dataset import labels
 from heelstrike.sim.files.logs import dimensions
 from heelstrike.sim.run import QUANTITIES
+from heelstrike.view.comparison_figure import COLORS, STROKES
 from heelstrike.view.panels import THIN, Curve, Excerpt, Panel, draw_panels
+
+
+def _look(number: int) -> dict[str, Any]:
+    """Look of a curve: a colour of the palette, and other strokes when all have been used."""
+    stroke = STROKES[number // len(COLORS) % len(STROKES)]
+    return {"linewidth": THIN, "color": COLORS[number % len(COLORS)], "linestyle": stroke}
 
 
 def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
@@ -40,7 +49,7 @@ def draw_quantity(excerpt: Excerpt, name: str) -> Figure:
         Panel(
             unit,
             [
-                Curve(values[:, i, k], each.replace("_", " "), {"linewidth": THIN})
+                Curve(values[:, i, k], each.replace("_", " "), _look(i))
                 for i, each in enumerate(names[0])
             ],
             title=component,

@@ -72,6 +72,10 @@ _STYLE: dict[str, Any] = {
 }
 
 
+LEGEND_COLUMNS = 6
+"""Entries of a legend side by side."""
+
+
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
     """Draw with heelstrike's look, whatever the caller's own settings are."""
@@ -147,7 +151,7 @@ def time_axis(axes: Axes, time: NDArray[np.float64], *, labelled: bool = True) -
 
 
 def legend_above(axes: Axes, *, right: bool = False) -> None:
-    """Put the legend above the axes, in one row, out of the way of the curves."""
+    """Put the legend above the axes, in rows, out of the way of the curves."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         axes.legend(
@@ -155,7 +159,7 @@ def legend_above(axes: Axes, *, right: bool = False) -> None:
             labels,
             loc="lower right" if right else "lower left",
             bbox_to_anchor=(1.0 if right else 0.0, 1.0),
-            ncols=len(handles),
+            ncols=min(len(handles), LEGEND_COLUMNS),
             borderaxespad=0.1,
             columnspacing=1.5,
             handletextpad=0.5,

@@ -13,6 +13,7 @@ from random_trees import random_tree
 from heelstrike.errors import RobotError
 from heelstrike.robot import Model, RobotWarning, read_mjcf
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS
+from heelstrike.robot.model import NUMBERS
 
 Floats = NDArray[np.float64]
 
@@ -142,8 +143,7 @@ def test_arrays_are_what_kernels_want() -> None:
         if name == "pivot":
             assert type(values) is int
             continue
-        kind = np.int64 if name in ("parent", "contact_link", "actuator_joint") else np.float64
-        assert values.dtype == kind, name
+        assert values.dtype == NUMBERS[name].dtype, name
         assert values.flags.c_contiguous, name
         assert values.flags.writeable, name
 
@@ -283,9 +283,9 @@ def test_numbers_that_are_none_are_refused(number: str) -> None:
     ("content", "more", "words"),
     [
         (
-            '<joint name="a" axis="0 1 0"/><joint name="b" axis="0 1 0" pos="1 0 0"/>',
-            '<equality><joint joint1="a" joint2="b"/></equality>',
-            "equality constraints",
+            '<joint name="a" axis="0 1 0"/>',
+            '<equality><weld body1="trunk"/></equality>',
+            "equality constraints other than connect and joint",
         ),
         (
             '<joint name="a" axis="0 1 0"/>',

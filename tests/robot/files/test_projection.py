@@ -291,11 +291,13 @@ def test_a_locked_leader_leads_to_where_the_pose_has_it() -> None:
     assert {one.name: one.position for one in robot.locked}["hand_pitch"] == pytest.approx(0.12)
 
 
-def test_a_joint_that_follows_one_in_the_plane_is_free_and_that_is_said() -> None:
+def test_a_joint_that_follows_one_in_the_plane_is_coupled_to_it() -> None:
     text = humanoid(more=ARM, end=FOLLOWS.format("left_knee"))
-    with pytest.warns(RobotWarning, match=r"constraints \(hand_pitch follows left_knee\)"):
-        robot = read_mjcf(text, projected=True)
-    assert "hand_pitch" in robot.joint_names
+    robot = read_mjcf(text, projected=True)
+    names = [robot.joint_names[joint] for joint in robot.model.coupling_joint[0]]
+    assert names == ["hand_pitch", "left_knee"]
+    state = robot.closed(robot.state({"left_knee": 0.1}), keep=["left_knee"])
+    assert robot.positions(state)["hand_pitch"] == pytest.approx(0.1 + 2.0 * 0.1)
 
 
 def test_mimic_of_a_urdf() -> None:

@@ -26,7 +26,7 @@ from heelstrike.robot import Robot, RobotWarning, builtin_robots, inspect_robot,
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS
 
 LONGEST = 5.0  # seconds of processor time
-EACH = 28  # files of each robot and format: 9 * 2 * 28 = 504
+EACH = 28  # files of each robot and format: 10 * 2 * 28 = 560
 
 NUMBERS = ("nan", "inf", "-inf", "-1", "0", "1e308", "1e400", "-0", "", "abc", "9" * 400)
 MORE_NUMBERS = ("1,5", "1_0", "0x10", "1e-320", "1 2 3 4 5 6 7", "٣", "1.5.2", "--1", "1e", "+2")

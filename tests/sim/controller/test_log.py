@@ -130,3 +130,17 @@ def test_a_controller_set_later_cannot_log_other_things() -> None:
     with pytest.raises(hs.SimulationError, match=r"state=simulation\.state"):
         simulation.controller = tells()
     assert simulation.step().value == "completed"
+
+
+@pytest.mark.parametrize("compiles", [True, False])
+def test_what_a_law_remembers_and_tells_can_be_looked_at(compiles: bool) -> None:
+    robot = walking.bravo7()
+    law = (tells if compiles else hs.controller(compile=False)(tells.python))()
+    simulation: Any = hs.Simulation(robot, law, state=robot.reference_state())
+    simulation.advance(0.005)
+    assert simulation.memory.calls == 5
+    assert simulation.log.calls == 5
+    assert simulation.log.asked_at == pytest.approx(0.004)
+    simulation.memory.calls = 100
+    simulation.step()
+    assert simulation.log.calls == 101

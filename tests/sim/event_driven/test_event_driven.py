@@ -19,7 +19,7 @@ from heelstrike.sim import (
     EventKind,
     RunStatus,
 )
-from heelstrike.sim.event_driven.method import EVENTS_WITHOUT_END, LOOKS
+from heelstrike.sim.event_driven.method import LOOKS, NO_BRIDGE
 from heelstrike.sim.event_driven.phase import allocate_phase
 from heelstrike.sim.frame import Outcome
 
@@ -290,9 +290,11 @@ def test_why_it_could_not_go_on_is_told() -> None:
     simulation = hs.Simulation(
         walking.bravo7(), state=walking.gait().initial_state, method=hs.EventDriven()
     )
-    simulation._work.reason = EVENTS_WITHOUT_END
-    _, message = simulation._ending(Outcome.DIVERGED)
+    simulation._work.reason = NO_BRIDGE
+    status, message = simulation._ending(Outcome.SOLVER_FAILED)
+    assert status is RunStatus.SOLVER_FAILED
     assert "events followed each other" in message
+    assert message.endswith("TimeStepping() asks less of an instant")
 
 
 def test_a_robot_sunk_in_the_ground_is_refused_whatever_swing_feet_may_do() -> None:

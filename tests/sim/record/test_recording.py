@@ -281,3 +281,26 @@ def test_torques_are_clipped_to_their_own_limit_and_counted(wanted: float, given
     np.testing.assert_array_equal(run.torque, given)
     clipped = len(run.time) if wanted != given else 0
     assert run.saturations == clipped
+
+
+def test_events_of_a_step_come_in_the_order_in_which_they_happened() -> None:
+    """One mass lands by the end of the step at whose beginning another, numbered after it, leaves.
+
+    Euler steps let the first one fall by g h² k (k + 1) / 2 in k of them; it arrives in the 51st.
+    The second is pulled up from the beginning of the 50th on.
+    """
+    step, falls = 1e-3, 50
+    builder = hs.RobotBuilder("two masses", gravity=G)
+    for name in ("lands", "leaves"):
+        mass = builder.slide(name, None, direction=(0, 1), mass=1.0)
+        builder.contact(mass, (0.0, 0.0))
+    height = G * step**2 * (falls * (falls + 1) / 2 + falls / 2)
+    run = hs.simulate(
+        builder.build(),
+        state=hs.State(np.array([height, 0.0]), np.zeros(2)),
+        duration=0.06,
+        method=hs.TimeStepping(step=step),
+        pushes=[hs.Push("leaves", force=(0.0, 3.0 * G), start=0.049, duration=0.1)],
+    )
+    told = [(event.kind, event.contact, pytest.approx(event.time)) for event in run.events]
+    assert told == [(EventKind.LIFTOFF, 1, 0.050), (EventKind.TOUCHDOWN, 0, 0.051)]

@@ -12,8 +12,15 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, ContactMode, Solver
 from heelstrike.contact.problem import run_solvers, solver_order
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
+from heelstrike.contact.sets import CONE, LINE
 from heelstrike.contact.workspace import Floats
-from heelstrike.dynamics import applied_force, bias_force, mass_matrix
+from heelstrike.dynamics import (
+    applied_force,
+    bias_force,
+    loop_bias_acceleration,
+    loop_jacobian,
+    mass_matrix,
+)
 from heelstrike.errors import ContactProblemError
 from heelstrike.robot.robot import Robot
 
@@ -40,6 +47,9 @@ class ContactForwardDynamics:
         What every contact point does.
     certificate : Certificate
         Whether, and how well, the contact problem is solved.
+    loop_force : (2 loops + couplings,) float
+        Forces of closed loops and coupled joints along the rows of
+        :func:`heelstrike.dynamics.loop_jacobian`, in N and N m.
     """
 
     acceleration: Floats
@@ -47,6 +57,7 @@ class ContactForwardDynamics:
     contact_acceleration: Floats
     mode: tuple[ContactMode, ...]
     certificate: Certificate
+    loop_force: Floats
 
 
 def contact_forward_dynamics(
@@ -62,7 +73,8 @@ def contact_forward_dynamics(
 
     Points that touch (gap below 1e-6 m) and neither separate nor slide (velocity below 1e-6 m/s)
     may stay, slip or lift as the forces decide; points that slide go on doing so; points that
-    separate are free. The joints' own stops and dry friction do not act.
+    separate are free. Closed loops and couplings hold; the joints' own stops and dry friction do
+    not act.
 
     Parameters
     ----------
@@ -104,27 +116,35 @@ def contact_forward_dynamics(
     touching = _touching(robot, kinematics)
     sliding = np.where(np.abs(kinematics.velocity[:, 1]) > MOVING, kinematics.velocity[:, 1], 0.0)
     count = len(touching)
-    mode = np.full(count, OPEN, np.int64)
-    mode[sliding[touching] > 0.0] = SLIDING_FORWARD
-    mode[sliding[touching] < 0.0] = SLIDING_BACKWARD
+    loops = loop_jacobian(robot, q)
+    held = len(loops)
+    mode = np.full(count + held, OPEN, np.int64)
+    mode[:count][sliding[touching] > 0.0] = SLIDING_FORWARD
+    mode[:count][sliding[touching] < 0.0] = SLIDING_BACKWARD
 
     matrix = mass_matrix(robot, q)
-    rows = kinematics.jacobian[touching].reshape(2 * count, robot.nv)
+    rows = np.zeros((2 * (count + held), robot.nv))
+    rows[: 2 * count] = kinematics.jacobian[touching].reshape(2 * count, robot.nv)
+    rows[2 * count :: 2] = loops
+    bias = np.zeros(len(rows))
+    bias[: 2 * count] = kinematics.bias_acceleration[touching].ravel()
+    bias[2 * count :: 2] = loop_bias_acceleration(robot, q, v)
     force = applied_force(robot, q, v, torque) - bias_force(robot, q, v)
     free = np.linalg.solve(matrix, force)
     response = np.linalg.solve(matrix, rows.T)
     delassus = rows @ response
     forces, _, certificate = run_solvers(
         np.ascontiguousarray(0.5 * (delassus + delassus.T)),
-        rows @ free + kinematics.bias_acceleration[touching].ravel(),
-        np.ascontiguousarray(kinematics.friction[touching]),
+        rows @ free + bias,
+        np.concatenate([kinematics.friction[touching], np.zeros(held)]),
         solver_order(solver),
         mode,
         tolerance=1e-9,
+        sets=np.repeat([CONE, LINE], [count, held]),
     )
     acceleration = free + response @ forces
     contact_force = np.zeros((robot.nc, 2))
-    contact_force[touching] = forces.reshape(count, 2)
+    contact_force[touching] = forces[: 2 * count].reshape(count, 2)
     modes = [ContactMode.OPEN] * robot.nc
     for place, contact in enumerate(touching):
         modes[contact] = ContactMode(int(mode[place]))
@@ -134,6 +154,7 @@ def contact_forward_dynamics(
         contact_acceleration=kinematics.jacobian @ acceleration + kinematics.bias_acceleration,
         mode=tuple(modes),
         certificate=certificate,
+        loop_force=forces[2 * count :: 2],
     )
 
 

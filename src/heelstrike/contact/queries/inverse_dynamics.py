@@ -16,6 +16,7 @@ from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import inverse_dynamics, passive_force
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.robot import Robot
 
@@ -105,7 +106,8 @@ def contact_inverse_dynamics(
     Raises
     ------
     RobotError
-        If a vector has the wrong length or there is no such contact point.
+        If a vector has the wrong length, there is no such contact point, or the robot has closed
+        loops, whose forces share with the motors in a way that this does not decide.
     ContactProblemError
         If the distribution is not known.
 
@@ -121,6 +123,7 @@ def contact_inverse_dynamics(
     (True, True)
     """
     choice = _choice(distribution)
+    refuse_loops(robot, "contact_inverse_dynamics", latches=False)
     kinematics = contact_kinematics(robot, q, v, ground)
     touching = np.flatnonzero(kinematics.gap < TOUCHING)
     carrying = list(contact_indices(robot, touching if contacts is None else contacts))

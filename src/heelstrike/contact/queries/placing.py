@@ -1,15 +1,17 @@
-"""Robots put on the ground: above no part of it, and in no part of it."""
+"""Robots put where they can be: on the ground and in no part of it, their loops closed."""
 
 from __future__ import annotations
+
+from collections.abc import Iterable
 
 import numpy as np
 
 from heelstrike import dynamics
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
-from heelstrike.contact.workspace import Floats
+from heelstrike.contact.workspace import Floats, Integers
 from heelstrike.errors import RobotError
-from heelstrike.robot.coordinates import checked
+from heelstrike.robot.coordinates import checked, index_of
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 
@@ -40,6 +42,7 @@ def placed(robot: Robot, state: State, ground: Ground) -> State:
 def standing(robot: Robot, ground: Ground) -> State:
     """Stand a robot on the ground with its soles on it; see :meth:`Robot.standing`."""
     start = placed(robot, robot.reference_state(), ground)
+    start = closed(robot, start) if _has_loops(robot) else start
     sole = _soles(robot)
     lift = _lift(robot)
     held = {*_above(robot, lift), *(TRUNK if robot.floating else ())} - {lift}
@@ -50,11 +53,12 @@ def standing(robot: Robot, ground: Ground) -> State:
     q = start.q.copy()
     for _ in range(MOST_ITERATIONS if sole else 0):
         at = contact_kinematics(robot, q, start.v, ground)
-        gap = at.gap[sole]
+        gap = np.concatenate([at.gap[sole], dynamics.loop_displacement(robot, q)])
         if np.abs(gap).max() < CLOSE:
             break
         # The least change that closes the gaps, were the ground straight around each point.
-        rows = at.jacobian[sole, 0][:, free] * ease[free]
+        along = np.vstack([at.jacobian[sole, 0], dynamics.loop_jacobian(robot, q)])
+        rows = along[:, free] * ease[free]
         change = ease[free] * np.linalg.lstsq(rows, -gap, rcond=1e-9)[0]
         wanted = q[free] + np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
         q[free] = np.clip(wanted, low[free], high[free])
@@ -62,6 +66,52 @@ def standing(robot: Robot, ground: Ground) -> State:
         if np.any(np.abs(np.delete(q - start.q, lift)) > MOST_TILT):
             return start
     return placed(robot, State(q, start.v), ground)
+
+
+def closed(robot: Robot, state: State, keep: Iterable[str | int] = ()) -> State:
+    """Close the loops of a robot; see :meth:`Robot.closed`."""
+    state = checked(robot, state)
+    kept = [index_of(robot, "joint", robot.joint_names, joint) for joint in keep]
+    free = np.setdiff1d(np.arange(robot.nq), kept)
+    q, v = state.q.copy(), state.v.copy()
+    low, high = np.minimum(robot.model.lower, q), np.maximum(robot.model.upper, q)
+    moves, before = free, np.inf
+    for _ in range(MOST_ITERATIONS):
+        open_by = dynamics.loop_displacement(robot, q)
+        worst = float(np.abs(open_by).max(initial=0.0))
+        if worst < CLOSE and (before == np.inf or not worst < 0.5 * before):
+            break  # closed as it came, or as well as can be
+        before = worst
+        change = _least(robot, q, moves, -open_by)
+        wanted = q[moves] + np.clip(change, -LARGEST_CHANGE, LARGEST_CHANGE)
+        q[moves] = np.clip(wanted, low[moves], high[moves])
+        moves = moves[q[moves] == wanted]  # a joint that comes to its stop stays there
+    rates = dynamics.loop_jacobian(robot, q) @ v
+    v[free] += _least(robot, q, free, -rates)
+    left = np.abs(dynamics.loop_jacobian(robot, q) @ v).max(initial=0.0)
+    if not worst < CLOSE or left > CLOSE * max(1.0, float(np.abs(v).max(initial=0.0))):
+        names = [f"{name} along {axis}" for name in robot.loop_names for axis in "xz"]
+        names += [f"coupling of {name}" for name in robot.coupling_names]
+        place = int(np.argmax(np.abs(open_by)))
+        told = f" while {', '.join(robot.joint_names[j] for j in kept)} stay" if kept else ""
+        raise RobotError(
+            f"robot {robot.name!r} cannot close its loops{told}: {names[place]} stays open by "
+            f"{abs(open_by[place]):.3g}. Begin nearer to where they are closed"
+            + (", or let more joints move." if kept else ".")
+        )
+    return State(q, v)
+
+
+def _has_loops(robot: Robot) -> bool:
+    return robot.model.loops + robot.model.couplings > 0
+
+
+def _least(robot: Robot, q: Floats, free: Integers, wanted: Floats) -> Floats:
+    """Change of some coordinates, least by the masses, that moves the loops as wanted."""
+    ease = np.linalg.cholesky(np.linalg.inv(dynamics.mass_matrix(robot, q)[np.ix_(free, free)]))
+    rows = dynamics.loop_jacobian(robot, q)[:, free] @ ease
+    change: Floats = ease @ np.linalg.lstsq(rows, wanted, rcond=1e-9)[0]
+    return change
 
 
 def _lift(robot: Robot) -> int:

@@ -19,6 +19,7 @@ from heelstrike.dynamics.kernels import (
     mass_matrix,
 )
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.errors import RobotError
 from heelstrike.robot.model import Floats, Model
 
 _HEAD = """Equations of motion of {name}, A(q) a + H(q, v) = force, written by heelstrike.
@@ -65,6 +66,11 @@ def _solve(
 
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
     """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
+    if model.loops + model.couplings > 0:
+        raise RobotError(
+            f"the equations of motion as C know robots whose joints move by themselves only, and "
+            f"robot {name!r} has closed loops or coupled joints"
+        )
     tree = Workspace.allocate(model.extents)
     square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
     arrays: dict[str, Any] = {

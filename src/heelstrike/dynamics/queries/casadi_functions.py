@@ -10,6 +10,7 @@ import casadi
 import numpy as np
 
 from heelstrike import dynamics
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices
 from heelstrike.dynamics.queries.query import VECTORS, docstring
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, expression, symbols
@@ -110,7 +111,9 @@ class CasadiDynamics:
         Forward and inverse dynamics with held contact points as one set of equations, to be made
         zero: A v̇ + H − passive − SᵀΓ − Jᵀλ, and J v̇ + J̇v. Whatever is unknown of them, and whatever
         inequality the forces obey, is the user's choice; redundant points do no harm. The contact
-        force is n₀ t₀ n₁ t₁ …, in N, on the robot.
+        force is n₀ t₀ n₁ t₁ …, in N, on the robot. A robot with closed loops or coupled joints adds
+        their forces along their rows (:func:`heelstrike.dynamics.loop_jacobian`) to the arguments,
+        loop_force, and their equations to the residual.
 
         Parameters
         ----------
@@ -125,13 +128,19 @@ class CasadiDynamics:
         robot, at = self.robot, self._traced
         held = contact_indices(robot, contacts)
         sizes = {"acceleration": robot.nv, "contact_force": 2 * len(held), "torque": robot.nu}
+        if count_rows(robot.model):
+            sizes["loop_force"] = count_rows(robot.model)
         more = {name: casadi.SX.sym(name, size) for name, size in sizes.items()}
-        acceleration, push, torque = map(symbols, more.values())
+        acceleration, push, torque, *pull = map(symbols, more.values())
         force = at.inverse_dynamics(acceleration) - at.passive_force()
         force[robot.model.actuator_joint] -= torque
         jacobian = at.contact_jacobian(held).reshape(-1, robot.nv)
         force = force - jacobian.T @ push
         rates = jacobian @ acceleration + at.contact_bias_acceleration(held).ravel()
+        if pull:
+            rows = at.loop_jacobian()
+            force = force - rows.T @ pull[0]
+            rates = np.concatenate([rates, rows @ acceleration + at.loop_bias_acceleration()])
         residual = expression(np.concatenate([force, rates]))
         return self._function("contact_equations", self._state | more, residual, "residual")
 
@@ -155,19 +164,22 @@ class CasadiDynamics:
         """
         equations = self.contact_equations(contacts)
         n, k = self.robot.nv, equations.size1_in("contact_force")
+        m = count_rows(self.robot.model)
         q, v, torque = (
             casadi.MX.sym(name, getattr(self.robot, VECTORS[name])) for name in ("q", "v", "torque")
         )
-        unknown = casadi.MX.sym("unknown", n + k)
-        residual = equations(q, v, unknown[:n], unknown[n:], torque)
+        unknown = casadi.MX.sym("unknown", n + k + m)
+        pull = [unknown[n + k :]] if m else []
+        residual = equations(q, v, unknown[:n], unknown[n : n + k], torque, *pull)
+        nothing = casadi.DM.zeros(n + k + m)
         system, right = casadi.substitute(
-            [casadi.jacobian(residual, unknown), -residual], [unknown], [casadi.DM.zeros(n + k)]
+            [casadi.jacobian(residual, unknown), -residual], [unknown], [nothing]
         )
         solution = casadi.solve(system, right)
         return casadi.Function(
             "contact_forward_dynamics",
             [q, v, torque],
-            [solution[:n], solution[n:]],
+            [solution[:n], solution[n : n + k]],
             ["q", "v", "torque"],
             ["acceleration", "contact_force"],
         )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.dynamics import kernels
 from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.dynamics.queries.loops import held
 from heelstrike.dynamics.queries.query import of_position, of_state
 from heelstrike.robot.model import Floats, Model
 
@@ -71,7 +72,7 @@ def applied_force(at: Evaluation, torque: ArrayLike) -> Floats:
 def inverse_dynamics(at: Evaluation, acceleration: ArrayLike) -> Floats:
     """Generalised force A(q) a + H(q, v) that yields an acceleration.
 
-    It is the sum of all forces, whoever supplies them; see
+    It is the sum of all forces, whoever supplies them: motors, ground, closed loops; see
     :func:`heelstrike.contact_inverse_dynamics` for motors and ground apart.
     """
     rate = at.vector("acceleration", acceleration)
@@ -82,9 +83,12 @@ def inverse_dynamics(at: Evaluation, acceleration: ArrayLike) -> Floats:
 def forward_dynamics(at: Evaluation, force: ArrayLike) -> Floats:
     """Acceleration A⁻¹(force − H) under a generalised force that includes passive ones.
 
-    Without contact. The force of given joint torques is :func:`applied_force`; for the ground see
+    Closed loops and couplings hold: A⁻¹(force + Jᵀ λ − H). There is no contact. The force of given
+    joint torques is :func:`applied_force`; for the ground see
     :func:`heelstrike.contact_forward_dynamics`.
     """
     total, size = at.vector("force", force), at.model.nv
-    scratch = at.zeros(size, size), at.zeros(size, size)
-    return at.filled((size,), kernels.forward_dynamics, at.model, total, at.work, *scratch)
+    matrix, factor = at.zeros(size, size), at.zeros(size, size)
+    free = at.filled((size,), kernels.forward_dynamics, at.model, total, at.work, matrix, factor)
+    result: Floats = held(at, matrix, free)
+    return result

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -57,7 +58,7 @@ def linearize(
     """Linearise the equations of motion about a state, with derivatives exact to rounding.
 
     The derivatives come from the traced kernels (algorithmic differentiation), not from
-    differences. Dampers and springs are part of the system.
+    differences. Dampers and springs are part of the system; closed loops and couplings hold.
 
     Parameters
     ----------
@@ -87,8 +88,9 @@ def linearize(
     position, velocity = joint_vector(robot, "q", q), joint_vector(robot, "v", v)
     gamma = joint_vector(robot, "torque", torque)
     n, k = robot.nv, 2 * len(held)
+    size = n + k + count_rows(robot.model)
     equations, derivatives = _equations(robot, held)
-    nothing = np.zeros(n + k)
+    nothing = np.zeros(size)
     constant = np.array(equations(position, velocity, nothing, gamma)).ravel()
     system = np.array(derivatives(position, velocity, nothing, gamma)[0])
     solution = _solved(system, -constant[:, None], n)[:, 0]
@@ -101,9 +103,9 @@ def linearize(
         A=np.vstack([upper, by_state[:n]]),
         B=np.vstack([np.zeros((n, robot.nu)), by_torque[:n]]),
         state_derivative=np.concatenate([velocity, solution[:n]]),
-        contact_force=solution[n:].reshape(-1, 2),
-        contact_force_state=by_state[n:].reshape(len(held), 2, 2 * n),
-        contact_force_torque=by_torque[n:].reshape(len(held), 2, robot.nu),
+        contact_force=solution[n : n + k].reshape(-1, 2),
+        contact_force_state=by_state[n : n + k].reshape(len(held), 2, 2 * n),
+        contact_force_torque=by_torque[n : n + k].reshape(len(held), 2, robot.nu),
     )
 
 
@@ -121,7 +123,7 @@ def _solved(system: Floats, right: Floats, n: int) -> Floats:
 
 @lru_cache(maxsize=32)
 def _equations(robot: Robot, contacts: tuple[int, ...]) -> tuple[casadi.Function, casadi.Function]:
-    """Equations of motion and of contact as functions of (q, v, (v̇, λ), Γ), and their Jacobians.
+    """Equations of motion, contact and loops as functions of (q, v, (v̇, λ), Γ), and Jacobians.
 
     The Jacobians are those with respect to (v̇, λ), (q, v) and Γ.
     """
@@ -129,11 +131,13 @@ def _equations(robot: Robot, contacts: tuple[int, ...]) -> tuple[casadi.Function
 
     from heelstrike.dynamics.queries.casadi_functions import CasadiDynamics
 
-    sizes = {"q": robot.nq, "v": robot.nv, "unknown": robot.nv + 2 * len(contacts)}
+    held, loops = robot.nv + 2 * len(contacts), count_rows(robot.model)
+    sizes = {"q": robot.nq, "v": robot.nv, "unknown": held + loops}
     arguments = [casadi.SX.sym(name, size) for name, size in (sizes | {"torque": robot.nu}).items()]
     q, v, unknown, torque = arguments
     equations = CasadiDynamics(robot).contact_equations(contacts)
-    residual = equations(q, v, unknown[: robot.nv], unknown[robot.nv :], torque)
+    pull = [unknown[held:]] if loops else []
+    residual = equations(q, v, unknown[: robot.nv], unknown[robot.nv : held], torque, *pull)
     jacobians = [
         casadi.densify(casadi.jacobian(residual, x))
         for x in (unknown, casadi.vertcat(q, v), torque)

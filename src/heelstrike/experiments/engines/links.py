@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from heelstrike.experiments.engines.peer import InvalidRunError
 from heelstrike.robot import Robot
+from heelstrike.robot.loops import refuse_loops
 
 Floats = NDArray[np.float64]
 
@@ -68,6 +69,7 @@ def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
         If the robot has what no engine here is told.
     """
     model = robot.model
+    refuse_loops(robot, "what hands robots over to other engines", InvalidRunError)
     for name in ("stiffness", "dry_friction"):
         if np.any(getattr(model, name)):
             raise InvalidRunError(f"{name} of joints is not handed over")

@@ -14,7 +14,7 @@ import numpy as np
 from mujoco import rollout
 from numpy.typing import NDArray
 
-from heelstrike.experiments.engines.peer import Engine, Peer
+from heelstrike.experiments.engines.peer import Engine, InvalidRunError, Peer
 from heelstrike.experiments.engines.scenario import Scenario
 from heelstrike.robot import State
 
@@ -135,6 +135,8 @@ class MuJoCoPeer(Peer):
 
 
 def _spec(scenario: Scenario) -> Any:
+    if scenario.robot.model.latches:
+        raise InvalidRunError("latches of joints are not handed over")
     with tempfile.TemporaryDirectory() as folder:
         file = scenario.robot.save(Path(folder) / "robot.xml")
         spec = mujoco.MjSpec.from_file(str(file))

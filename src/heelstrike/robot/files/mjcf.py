@@ -12,7 +12,7 @@ from heelstrike.robot.assembly import LARGEST_NUMBER, assembled
 from heelstrike.robot.contact_points import of_model, read_contact_points
 from heelstrike.robot.files.actuators import read_actuators
 from heelstrike.robot.files.joint_numbers import read_joint_numbers
-from heelstrike.robot.files.links import read_links
+from heelstrike.robot.files.links import read_links, read_loops
 from heelstrike.robot.files.mujoco_file import MujocoFile, parse
 from heelstrike.robot.files.options import AVERAGE, LoadOptions, Options
 from heelstrike.robot.files.posture import BALL
@@ -88,6 +88,7 @@ def _robot(file: MujocoFile, name: str, options: Options) -> Robot:
         actuator_joint=actuators.joint,
         torque_lower=_limits(actuators.lower),
         torque_upper=_limits(actuators.upper),
+        **read_loops(file, links),
         pivot=int(hinges[0]) if len(hinges) else 0,
     )
     robot = assembled(

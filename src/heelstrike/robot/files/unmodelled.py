@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from heelstrike.robot.files.links import is_modelled
 from heelstrike.robot.files.mujoco_file import MujocoFile
-from heelstrike.robot.files.posture import followers
 from heelstrike.robot.warning import warn
-
-JOINT = 2  # MuJoCo's mjtEq
 
 TENDON_FORCES = (
     "tendon_stiffness",
@@ -23,7 +21,7 @@ def warn_of_unmodelled(file: MujocoFile) -> None:
     """Warn of every part of the file that would act in MuJoCo and does not act here."""
     model = file.model
     acting = {
-        f"equality constraints{_following(file)}": _holds(file),
+        "equality constraints other than connect and joint": _holds(file),
         "tendons": any(np.any(file.field(name)) for name in TENDON_FORCES),
         "nonlinear springs or dampers": _any(file, "jnt_stiffnesspoly")
         or _any(file, "dof_dampingpoly")
@@ -60,26 +58,10 @@ def _warn_of_fixed_root(file: MujocoFile) -> None:
 
 
 def _holds(file: MujocoFile) -> bool:
-    """Whether an equality constraint holds more than joints that are locked anyway."""
-    model = file.model
+    """Whether an equality constraint acts that is neither a closed loop nor a coupled joint."""
     if file.disabled("equality"):
         return False
-    moving = {one.joint for one in file.coordinates}
-    return any(
-        int(model.eq_type[one]) != JOINT or int(model.eq_obj1id[one]) in moving
-        for one in range(model.neq)
-    )
-
-
-def _following(file: MujocoFile) -> str:
-    """Which joints are to follow others and move by themselves here, in brackets."""
-    moving = {one.joint: one.name for one in file.coordinates}
-    told = [
-        f"{moving[joint]} follows {moving[leader]}"
-        for joint, leader, _ in followers(file.model)
-        if joint in moving and leader in moving
-    ]
-    return f" ({', '.join(told)})" if told else ""
+    return not all(is_modelled(file, one) for one in range(file.model.neq))
 
 
 def _any(file: MujocoFile, name: str) -> bool:

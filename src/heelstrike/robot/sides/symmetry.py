@@ -97,6 +97,9 @@ def differences(
         *_differing_joints(model, mirror, joint_names),
         *_differing_actuators(model, mirror, joint_names),
         *_differing_contacts(model, mirror, link_names),
+        *_differing_loops(model, mirror, link_names),
+        *_differing_couplings(model, mirror, joint_names),
+        *_differing_latches(model, mirror, joint_names),
     ]
     return list(dict.fromkeys(findings))  # two points of a foot may say the same
 
@@ -265,6 +268,55 @@ def _differing_contacts(model: Model, mirror: Mirror, names: Sequence[str]) -> I
             ("radius of the contact points", *model.contact_radius[[i, j]], SAME_PLACE),
         ]
         yield from _unequal(compared, f"of {names[link]} and {names[other]}")
+
+
+def _differing_loops(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    """Tell which loops have no mirror image; their two ends may be the other way round."""
+    image = np.append(mirror.joint, -1)  # the world is its own
+
+    def is_image(one: int, other: int) -> bool:
+        ends, places = model.loop_link[other], model.loop_position[other]
+        return any(
+            np.array_equal(image[model.loop_link[one]], ends[::way])
+            and same(model.loop_position[one], places[::way], SAME_PLACE)
+            for way in (1, -1)
+        )
+
+    for one in range(model.loops):
+        if not any(is_image(one, other) for other in range(model.loops)):
+            joined = " and ".join([*names, "the world"][link] for link in model.loop_link[one])
+            yield f"the loop of {joined} has no mirror image"
+
+
+def _differing_couplings(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    image = np.append(mirror.joint, -1)
+    known = {
+        tuple(joints): factors
+        for joints, factors in zip(
+            model.coupling_joint.tolist(), model.coupling_polynomial, strict=True
+        )
+    }
+    for (joint, leader), factors in known.items():
+        its = known.get((int(image[joint]), int(image[leader])))
+        sense = mirror.sign[leader] if leader >= 0 else 1.0
+        mirrored = mirror.sign[joint] * factors * sense ** np.arange(len(factors))
+        if its is None or not same(mirrored, its):
+            yield f"how {names[joint]} follows has no mirror image"
+
+
+def _differing_latches(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    image = np.append(mirror.joint, -1)
+    ends = zip(
+        model.latch_joint.tolist(),
+        model.latch_side.tolist(),
+        model.latch_release.tolist(),
+        strict=True,
+    )
+    known = list(ends)
+    for joint, side, release in known:
+        its = int(image[joint]), int(side * mirror.sign[joint]), int(image[release])
+        if its not in known:
+            yield f"the latch of {names[joint]} has no mirror image"
 
 
 def _unequal(compared: Iterable[tuple[Any, ...]], pair: str) -> Iterator[str]:

@@ -10,7 +10,10 @@ g = γ h, u_q = g (r_q + u_v) and the bristles, each its own equation, eliminate
 
     (A − g ∂f/∂v − g² ∂f/∂q) u_v = g A r_v + g² ∂f/∂q r_q + g Jᵀ ∂F/∂s (…)
 
-which stays well conditioned however stiff the ground. A controller's gains matter as much as the
+which stays well conditioned however stiff the ground. Loops are exact here as elsewhere: their
+forces λ keep ``J v̇ + J̇ v`` at zero in every evaluation, and in a stage, whose equations gain Jᵀ μ,
+``J u_v = g J r_v`` (so that W is the Jacobian of what the loops let through); at the end of a step
+the state is put back on them. A controller's gains matter as much as the
 ground's stiffness: computed torque on a foot that is not quite flat damps the light foot with the
 inertia of the whole robot.
 """
@@ -28,6 +31,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
+from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import (
     bias_force,
     factorize,
@@ -37,16 +41,18 @@ from heelstrike.dynamics.kernels import (
     passive_force,
     solve_factorized,
 )
+from heelstrike.dynamics.loops import count_rows, find_rows
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
-from heelstrike.sim.contacts.geometry import contact_rows, observe, row_product
+from heelstrike.sim.contacts.geometry import contact_rows, observe, row_product, weigh
+from heelstrike.sim.contacts.loops import push_loops, respond, speed_along
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
 from heelstrike.sim.controller.motors import motor_damping, try_torque
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Loops, Memory
 from heelstrike.sim.push import add_pushes
 
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
@@ -105,6 +111,8 @@ class Rates(Bundle):
         Forces of the joint stops, with their signs.
     dry_force, dry_by_speed : (nv,) float
         Dry friction in the joints, and its derivative.
+    loop : (loop_rows,) float
+        Forces of the loops along their rows.
     """
 
     acceleration: Floats = array("nv")
@@ -114,6 +122,7 @@ class Rates(Bundle):
     stop_force: Floats = array("nv")
     dry_force: Floats = array("nv")
     dry_by_speed: Floats = array("nv")
+    loop: Floats = array("loop_rows")
 
 
 class CompliantWorkspace(Bundle):
@@ -143,6 +152,11 @@ class CompliantWorkspace(Bundle):
         A − g ∂f/∂v − g² ∂f/∂q, then its triangular factors.
     order : (nv,) int
         Row exchanges of the factors.
+    loop_rows : (loop_rows, nv) float
+    loop_response : (loop_rows, nv) float
+    loop_matrix : (loop_rows, loop_rows) float
+        Jacobian of the loops at the start of the step, what the system makes of its rows, and the
+        products of both.
     stage_q, stage_v : (4, nv) float
     stage_bristle : (4, nc) float
         The stages u_i.
@@ -151,7 +165,9 @@ class CompliantWorkspace(Bundle):
         Right-hand side of a stage.
     impulse : (nc, 2) float
     stop_impulse, dry_impulse : (nv,) float
-        Impulses of contacts, joint stops and dry friction since the last sample, in N s (N m s).
+    loop_impulse : (loop_rows,) float
+        Impulses of contacts, joint stops, dry friction and loops since the last sample, in N s
+        (N m s).
     touched, left : (nc,) float
         When a contact point last came to the ground and left it since the last sample; negative
         if it did not.
@@ -181,6 +197,9 @@ class CompliantWorkspace(Bundle):
     force_by_q: Floats = array("nv", "nv")
     system: Floats = array("nv", "nv")
     order: Integers = array("nv", of=int)
+    loop_rows: Floats = array("loop_rows", "nv")
+    loop_response: Floats = array("loop_rows", "nv")
+    loop_matrix: Floats = array("loop_rows", "loop_rows")
     stage_q: Floats = array("stages", "nv")
     stage_v: Floats = array("stages", "nv")
     stage_bristle: Floats = array("stages", "nc")
@@ -190,6 +209,7 @@ class CompliantWorkspace(Bundle):
     impulse: Floats = array("nc", "components")
     stop_impulse: Floats = array("nv")
     dry_impulse: Floats = array("nv")
+    loop_impulse: Floats = array("loop_rows")
     touched: Floats = array("nc")
     left: Floats = array("nc")
     laws: Laws = part(Laws)
@@ -204,7 +224,10 @@ def compliant_workspace(
     robot: Robot, laws: Laws, step: float, rtol: float, atol: float
 ) -> CompliantWorkspace:
     """Allocate the scratch for a robot."""
-    extents = {"nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "stages": STAGES}
+    extents = {
+        "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "stages": STAGES,
+        "loop_rows": count_rows(robot.model),
+    }  # fmt: skip
     rates = Rates.allocate(
         extents,
         normal=NormalForces.allocate(n=robot.nc),
@@ -331,6 +354,22 @@ def evaluate(
                     + memory.assembly.jacobian[2 * contact + 1, j] * tangent
                 )
     solve_factorized(model, memory.equations.factor, rate)
+    if now.loop.shape[0] > 0:
+        hold_loops(model, memory, now)
+
+
+@kernel
+def hold_loops(model: Model, memory: Memory, now: Rates) -> None:
+    """Find the forces of the loops, and the accelerations under them."""
+    loops, rate = memory.loops, now.acceleration
+    rows = now.loop.shape[0]
+    find_rows(model, memory.q, memory.v, memory.equations.tree, loops.rows)
+    weigh(model, memory.equations)
+    respond(model, memory.equations, loops)
+    for row in range(rows):
+        loops.system[row, rows] = -speed_along(row, loops, rate) - loops.rows.bias[row]
+    push_loops(loops, rate)
+    copy_words(loops.unknown, now.loop)
 
 
 @kernel
@@ -366,9 +405,28 @@ def push_stops(model: Model, laws: Laws, memory: Memory, now: Rates) -> None:
         above = model.upper[j] - memory.q[j]
         stop.gap[j] = below if below < 0.0 else above
         stop.speed[j] = memory.v[j] if below < 0.0 else -memory.v[j]
+    held = memory.loops.held
+    for latch in range(held.shape[0]):
+        if held[latch] == 1:
+            pull_back(model, latch, memory, stop)
     call_at(laws.stop_code, (address_of(laws.stop), stop))
     for j in range(model.parent.shape[0]):
         now.stop_force[j] = stop.force[j] if memory.q[j] < model.lower[j] else -stop.force[j]
+    for latch in range(held.shape[0]):
+        j = model.latch_joint[latch]
+        if held[latch] == 1 and model.lower[j] <= memory.q[j] <= model.upper[j]:
+            now.stop_force[j] = model.latch_side[latch] * stop.force[j]
+
+
+@kernel
+def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> None:
+    """Ask the law of a stop that holds for its pull: what it would press with, mirrored."""
+    j = model.latch_joint[latch]
+    if model.lower[j] <= memory.q[j] <= model.upper[j]:
+        side = model.latch_side[latch]
+        end = model.upper[j] if side > 0 else model.lower[j]
+        stop.gap[j] = -abs(end - memory.q[j])
+        stop.speed[j] = side * memory.v[j]
 
 
 @kernel
@@ -392,6 +450,9 @@ def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     for row in range(2 * model.contact_link.shape[0]):
         for j in range(model.parent.shape[0]):
             work.base_rows[row, j] = memory.assembly.jacobian[row, j]
+    for row in range(work.loop_rows.shape[0]):
+        for j in range(model.parent.shape[0]):
+            work.loop_rows[row, j] = memory.loops.rows.jacobian[row, j]
 
 
 @kernel
@@ -450,6 +511,11 @@ def factorize_step(
         for j in range(nv):
             system[i, j] -= g * g * by_q[i, j]
     eliminate(nv, system, work.order)
+    for row in range(work.loop_rows.shape[0]):
+        copy_words(work.loop_rows[row], work.loop_response[row])
+        substitute(nv, system, work.order, work.loop_response[row])
+        for other in range(work.loop_rows.shape[0]):
+            work.loop_matrix[other, row] = dot(work.loop_rows[other], work.loop_response[row])
 
 
 @kernel
@@ -500,7 +566,7 @@ def dot(a: Floats, b: Floats) -> float:
 
 
 @kernel
-def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) -> None:
+def solve_stage(model: Model, g: float, stage: int, loops: Loops, work: CompliantWorkspace) -> None:
     """Solve for a stage from its right-hand side."""
     nv = model.parent.shape[0]
     u_q = work.stage_q[stage]
@@ -519,6 +585,7 @@ def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) ->
         for j in range(nv):
             u_v[j] += push * work.base_rows[2 * contact + 1, j]
     substitute(nv, work.system, work.order, u_v)
+    keep_loops(g, u_v, loops, work)
     for j in range(nv):
         u_q[j] = g * (work.right_q[j] + u_v[j])
     for contact in range(u_s.shape[0]):
@@ -531,6 +598,21 @@ def solve_stage(model: Model, g: float, stage: int, work: CompliantWorkspace) ->
             change += base.friction.rate_by_normal[contact] * pressing
             change += base.friction.rate_by_speed[contact] * sliding
         u_s[contact] = change / (1.0 / g - base.friction.rate_by_bend[contact])
+
+
+@kernel
+def keep_loops(g: float, u_v: Floats, loops: Loops, work: CompliantWorkspace) -> None:
+    """Add to a stage what the loops make of it."""
+    rows = work.loop_rows.shape[0]
+    for row in range(rows):
+        for other in range(rows):
+            loops.system[row, other] = work.loop_matrix[row, other]
+        along = work.loop_rows[row]
+        loops.system[row, rows] = g * dot(along, work.right_v) - dot(along, u_v)
+    solve_to_rank(rows, loops.system, loops.order, loops.unknown)
+    for row in range(rows):
+        for j in range(u_v.shape[0]):
+            u_v[j] += loops.unknown[row] * work.loop_response[row, j]
 
 
 @kernel
@@ -574,7 +656,7 @@ def attempt_step(
             work.right_bristle[i] = base.friction.rate[i] if stage == 0 else now.friction.rate[i]
             for k in range(stage):
                 work.right_bristle[i] += C[stage, k] / h * work.stage_bristle[k, i]
-        solve_stage(model, g, stage, work)
+        solve_stage(model, g, stage, memory.loops, work)
     worst = 0.0
     for i in range(nv):
         worst = larger(worst, finish(work.base_q, work.stage_q, rtol, atol, memory.q, i))

@@ -40,6 +40,8 @@ from heelstrike.sim.compliant.dynamics import (
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
 from heelstrike.sim.contacts.geometry import observe
+from heelstrike.sim.contacts.latches import react
+from heelstrike.sim.contacts.loops import close_loops, note_loop, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
@@ -166,7 +168,7 @@ class Compliant(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a sample may add to the record."""
-        return 1, 4 * robot.nc + robot.nv
+        return 1, 4 * robot.nc + robot.nv + robot.model.latches
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with a restitution of its own."""
@@ -188,6 +190,8 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
     for joint in range(model.parent.shape[0]):
         work.stop_impulse[joint] += 0.5 * h * (base.stop_force[joint] + now.stop_force[joint])
         work.dry_impulse[joint] += 0.5 * h * (base.dry_force[joint] + now.dry_force[joint])
+    for row in range(work.loop_impulse.shape[0]):
+        work.loop_impulse[row] += 0.5 * h * (base.loop[row] + now.loop[row])
     for contact in range(model.contact_link.shape[0]):
         normal = base.normal.force[contact] + now.normal.force[contact]
         tangent = base.friction.force[contact] + now.friction.force[contact]
@@ -272,6 +276,11 @@ def sample(
             h = max(taken * rescaled(error, SHRINK), SHORTEST)
             rejected = True
             continue
+        if work.loop_rows.shape[0] > 0:
+            equations, loops, q = memory.equations, memory.loops, memory.q
+            if not close_loops(model, equations, loops, q):
+                return DIVERGED
+            steady_loops(model, q, equations, loops, memory.v)
         observe(model, ground, memory.q, memory.v, memory)
         met = landing(model, work.atol, memory.contacts.gap, work)
         if met < 1.0 and not shortest:
@@ -290,7 +299,7 @@ def sample(
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
     work.proposed = min(h, span)
-    finish_sample(memory, work)
+    finish_sample(model, memory, work)
     return DONE
 
 
@@ -313,13 +322,17 @@ def begin_sample(memory: Memory, work: CompliantWorkspace) -> None:
     for joint in range(work.stop_impulse.shape[0]):
         work.stop_impulse[joint] = 0.0
         work.dry_impulse[joint] = 0.0
+    for row in range(work.loop_impulse.shape[0]):
+        work.loop_impulse[row] = 0.0
     memory.assembly.answer.residual[1] = cone_residual(memory.surface.friction, work)
 
 
 @kernel
-def finish_sample(memory: Memory, work: CompliantWorkspace) -> None:
+def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Put the mean forces since the sample before into the memory."""
     span = work.step
+    for row in range(work.loop_impulse.shape[0]):
+        note_loop(model, row, work.loop_impulse[row] / span, memory.loops)
     for contact in range(work.touched.shape[0]):
         for k in range(2):
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
@@ -367,7 +380,7 @@ def note_events(
 def note_forces(
     row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory, record: Record
 ) -> None:
-    """Write the forces of contacts and joints, the slip and the residual of a row."""
+    """Write the forces of contacts, joints and loops, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
@@ -375,6 +388,11 @@ def note_forces(
         record.contact_force[row, contact, 0] = force[contact, 0]
         record.contact_force[row, contact, 1] = force[contact, 1]
         record.slip_velocity[row, contact] = memory.reaction.slip[contact]
+    for loop in range(record.loop_force.shape[1]):
+        record.loop_force[row, loop, 0] = memory.loops.loop_force[loop, 0]
+        record.loop_force[row, loop, 1] = memory.loops.loop_force[loop, 1]
+    for coupling in range(record.coupling_force.shape[1]):
+        record.coupling_force[row, coupling] = memory.loops.coupling_force[coupling]
     record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
@@ -382,7 +400,12 @@ def note_forces(
 def begin(
     model: Model, ground: GroundModel, memory: Memory, work: CompliantWorkspace, record: Record
 ) -> int:
-    """Points in the ground, or on it, are closed when the simulation begins."""
+    """Points in the ground, or on it, are closed when the simulation begins; loops are, too."""
+    if work.loop_rows.shape[0] > 0:
+        equations, loops, q = memory.equations, memory.loops, memory.q
+        if not close_loops(model, equations, loops, q):
+            return DIVERGED
+        steady_loops(model, q, equations, loops, memory.v)
     observe(model, ground, memory.q, memory.v, memory)
     for contact in range(model.contact_link.shape[0]):
         memory.reported.closed[contact] = memory.contacts.gap[contact] <= LIFTOFF_GAP
@@ -417,6 +440,8 @@ def report(
     clock: Clock,
 ) -> None:  # fmt: skip
     """Append a row if one is due, with the forces of this instant."""
+    for row in range(work.loop_rows.shape[0]):
+        note_loop(scene.model, row, work.now.loop[row], memory.loops)
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
         now = work.now
@@ -434,7 +459,9 @@ def move(
     if code != DONE:
         return code
     step = work.step
+    first = record.events
     note_events(model, clock.time + step, work, memory, record)
+    react(model, first, memory.q, record, memory.loops)
     if work.row >= 0:
         # What acted until the next sample takes the place of what acted at the first instant.
         reaction = memory.reaction

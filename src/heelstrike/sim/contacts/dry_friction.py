@@ -23,9 +23,10 @@ def select_dry_joints(
 ) -> int:  # fmt: skip
     """Append the joints with dry friction to the candidates of a step; return how many there are.
 
-    They are numbered on from the joint stops; `guess` holds their contact modes.
+    They are numbered on from the joint stops and the second faces of corners, one a contact point;
+    `guess` holds their contact modes.
     """
-    first = model.nc + 2 * model.nv
+    first = 2 * model.nc + 2 * model.nv
     problem = assembly.problem
     for place in range(dry_joint.shape[0]):
         joint = dry_joint[place]

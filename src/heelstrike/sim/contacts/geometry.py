@@ -19,12 +19,15 @@ from heelstrike.dynamics.kernels import (
     solve_lower,
 )
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
-from heelstrike.dynamics.spatial import plus, scaled, spatial
+from heelstrike.dynamics.spatial import plus, power, scaled, spatial, write
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.straight_line import EQUATIONS, SOLVE
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.memory import Assembly, Equations, Memory, Surface
+
+EVERYWHERE = -1
+"""Leaf of a candidate that acts on several links."""
 
 
 @kernel
@@ -133,7 +136,39 @@ def halve_by_bodies(model: Model, equations: Equations, place: int, assembly: As
 
 
 @kernel
-def assemble_delassus(model: Model, equations: Equations, count: int, assembly: Assembly) -> None:
+def halve_all_by_factor(model: Model, factor: Floats, row: int, assembly: Assembly) -> None:
+    """Write a column of ``assembly.half`` for a row that has a part in any joint."""
+    half = assembly.half
+    for j in range(model.nv):
+        half[j, row] = assembly.jacobian[row, j]
+    for j in range(model.nv - 1, -1, -1):
+        value = half[j, row]
+        half[j, row] = assembly.root[j] * value
+        i = model.parent[j]
+        while i >= 0:
+            half[i, row] -= factor[j, i] * value
+            i = model.parent[i]
+
+
+@kernel
+def halve_all_by_bodies(model: Model, row: int, equations: Equations, assembly: Assembly) -> None:
+    """Write a column of ``assembly.half`` for a row that has a part in any joint."""
+    motion, momentum = equations.tree.motion, equations.bodies.momentum
+    left = equations.tree.force  # scratch
+    for i in range(model.nl):
+        write(i, (0.0, 0.0, 0.0), left)
+    for j in range(model.nv - 1, -1, -1):
+        force = spatial(left, j)
+        entry = assembly.root[j] * (assembly.jacobian[row, j] + power(spatial(motion, j), force))
+        assembly.half[j, row] = entry
+        parent = model.parent[j]
+        if parent >= 0:
+            rest = plus(force, scaled(spatial(momentum, j), -assembly.root[j] * entry))
+            write(parent, plus(spatial(left, parent), rest), left)
+
+
+@kernel
+def assemble_delassus(model: Model, count: int, equations: Equations, assembly: Assembly) -> None:
     """Delassus matrix G = J A⁻¹ Jᵀ of the first `count` candidates.
 
     With A = Lᵀ D L it is the square of ``assembly.half`` = D^(-1/2) L⁻ᵀ Jᵀ, whose rows are
@@ -149,7 +184,12 @@ def assemble_delassus(model: Model, equations: Equations, count: int, assembly: 
         for row in range(rows):
             half[j, row] = 0.0
     for place in range(count):
-        if straight:
+        if assembly.leaf[place] == EVERYWHERE:
+            if straight:
+                halve_all_by_factor(model, factor, 2 * place, assembly)
+            else:
+                halve_all_by_bodies(model, 2 * place, equations, assembly)
+        elif straight:
             halve_by_factor(model, factor, place, assembly)
         else:
             halve_by_bodies(model, equations, place, assembly)

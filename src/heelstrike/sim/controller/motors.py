@@ -85,11 +85,25 @@ def motor_damping(model: Model, actuator: int, voltage: int, command: float, v: 
 
 
 @dissolved_kernel
+def is_obeyed(model: Model, actuator: int, voltage: int, command: float) -> bool:
+    """Whether a command is a torque within its limits, and that of a motor without a line."""
+    return (
+        voltage == 0
+        and abs(command) < INFINITY
+        and model.torque_lower[actuator] <= command <= model.torque_upper[actuator]
+        and model.stall_torque[model.actuator_joint[actuator]] == INFINITY
+    )
+
+
+@dissolved_kernel
 def limit_torque(model: Model, control: Control, memory: Memory) -> bool:
     """Find the torques of an instant from its commands; return whether all of these were finite."""
     voltage = control.voltage
     for i in range(model.actuator_joint.shape[0]):
         wanted = memory.command[i]
+        if is_obeyed(model, i, voltage, wanted):
+            memory.torque[i] = wanted
+            continue
         if not abs(wanted) < INFINITY:
             memory.tally.bad_torque = i
             return False
@@ -113,7 +127,9 @@ def try_torque(
     """
     bad = 0
     for i in range(torque.shape[0]):
-        if not abs(command[i]) < INFINITY:
+        if is_obeyed(model, i, control.voltage, command[i]):
+            torque[i] = command[i]
+        elif not abs(command[i]) < INFINITY:
             bad = i + 1
             torque[i] = command[i]
         else:

@@ -85,10 +85,11 @@ def force_wanted(robot: ControlledRobot, state: ControlState, force: Floats) -> 
 @kernel
 def refused(robot: ControlledRobot, torque: Floats) -> bool:
     """Whether other than three coordinates are without a motor; then torques are NaN."""
-    unfit = robot.unactuated.shape[0] != 3
+    if robot.unactuated.shape[0] == 3:
+        return False
     for i in range(robot.nu):
-        torque[i] = np.nan if unfit else torque[i]
-    return unfit
+        torque[i] = np.nan
+    return True
 
 
 @kernel

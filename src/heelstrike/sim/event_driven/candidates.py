@@ -7,18 +7,20 @@ from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SO
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Assembly
+from heelstrike.sim.memory import Assembly, Loops
 
 
 @kernel
 def solve_candidates(
-    count: int, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
     assembly: Assembly,
 ) -> int:  # fmt: skip
     """Solve the contact problem of the candidates at the level of accelerations or velocities.
 
-    Matrix and free term are there. Of accelerations, points that slide are prescribed to go on
+    These are `count` contacts and, after them, the rows of the loops, whose sets are there. Matrix
+    and free term are there, too. Of accelerations, points that slide are prescribed to go on
     doing so: their friction is known. Forces or impulses and modes go to ``assembly.answer``.
     Returns the solver's status.
     """
@@ -35,13 +37,16 @@ def solve_candidates(
                 mode[place] = SLIDING_BACKWARD
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
-    problem.count = count
+    hold(count, phase.latch_stop, loops.held, assembly)
+    problem.count = count + loops.unknown.shape[0]
+    for place in range(count, problem.count):
+        mode[place] = STICK
     return int(solve_contact_kernel(phase.order, problem, assembly.solver, assembly.answer))
 
 
 @kernel
 def share_redundant(
-    count: int, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly
+    count: int, loops: Loops, friction: Floats, guess: Integers, phase: Phase, assembly: Assembly
 ) -> None:
     """Find forces within their limits where the equations leave open who carries what.
 
@@ -55,7 +60,9 @@ def share_redundant(
         contact = assembly.candidate[place]
         short = short or phase.value[2 * contact] < 0.0
         short = short or (phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0)
-    if not short or solve_candidates(count, True, friction, guess, phase, assembly) != SOLVED:
+    if not short:
+        return
+    if solve_candidates(count, loops, True, friction, guess, phase, assembly) != SOLVED:
         return
     for place in range(count):
         contact = assembly.candidate[place]

@@ -7,10 +7,13 @@ this takes (a small linear system in J A⁻¹ Jᵀ) the motion obeys eq. 1 of th
 
 from __future__ import annotations
 
+import math
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
-from heelstrike.dynamics.kernels import passive_force
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
@@ -19,35 +22,49 @@ from heelstrike.sim.contacts.geometry import (
     assemble_delassus,
     contact_velocity,
     evaluate_equations,
-    locate_contacts,
-    observe,
     row_product,
     solve_mass_matrix,
     weigh,
 )
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import try_torque
 from heelstrike.sim.event_driven.candidates import share_redundant
+from heelstrike.sim.event_driven.faces import has_corners, locate, watch_corners
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Equations, Memory
+from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 from heelstrike.sim.push import Pushes, add_pushes
+
+# How far a projection may move a state, as a multiple of the error that a step may make: the end of
+# a step, beyond which the motion has not kept its constraints, and a place on its dense output.
+EXPLAINED, INTERPOLATED = 100.0, 1e4
 
 
 @kernel
-def tangential_place(model: Model, tree: Workspace, contacts: Contacts, contact: int) -> float:
+def tangential_place(
+    model: Model, tree: Workspace, contacts: Contacts, contact: int, phase: Phase
+) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled."""
     position, normal = contacts.position[contact], contacts.normal[contact]
     rolled = model.contact_radius[contact] * tree.angle[model.contact_link[contact]]
+    if phase.face[contact] >= 0 and phase.face[contact] % 2 == 1:
+        # The way of the contact point round the disc that pivots on a corner.
+        return model.contact_radius[contact] * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
 
 
 @kernel
-def list_unknowns(count: int, candidate: Integers, friction: Floats, phase: Phase) -> int:
-    """List the Jacobian rows along which closed points are held, and friction per normal force."""
+def list_unknowns(
+    count: int, loops: int, candidate: Integers, friction: Floats, phase: Phase
+) -> int:
+    """List the Jacobian rows along which closed points are held, and friction per normal force.
+
+    The rows of the loops, which come after the `count` contacts, are held always.
+    """
     size = 0
     for place in range(count):
         contact = candidate[place]
@@ -59,19 +76,35 @@ def list_unknowns(count: int, candidate: Integers, friction: Floats, phase: Phas
             phase.row[size] = 2 * place + 1
             phase.lean[size] = 0.0
             size += 1
+    for place in range(count, count + loops):
+        phase.row[size] = 2 * place
+        phase.lean[size] = 0.0
+        size += 1
     return size
 
 
 @kernel
-def constraint_matrix(size: int, friction: float, delassus: Floats, phase: Phase) -> None:
-    """Write the matrix of the equations of the contact forces, with friction (1) or without (0)."""
-    row, lean = phase.row, phase.lean
+def solve_constraints(size: int, friction: float, delassus: Floats, phase: Phase) -> int:
+    """Solve the equations of the contact forces, with friction (1) or without (0); return the rank.
+
+    Their right-hand side is there. A contact may be a million times heavier than another: only in
+    units in which all weigh the same does the size of a pivot tell whether it is one.
+    """
+    row, lean, scale, system = phase.row, phase.lean, phase.scale, phase.system
+    for i in range(size):
+        weight = delassus[row[i], row[i]]
+        scale[i] = 1.0 / math.sqrt(weight) if weight > 0.0 else 1.0
     for i in range(size):
         for j in range(size):
             entry = delassus[row[i], row[j]]
             if lean[j] != 0.0:
                 entry += friction * lean[j] * delassus[row[i], row[j] + 1]
-            phase.system[i, j] = entry
+            system[i, j] = scale[i] * scale[j] * entry
+        system[i, size] *= scale[i]
+    rank = solve_to_rank(size, system, phase.column, phase.unknown)
+    for i in range(size):
+        phase.unknown[i] *= scale[i]
+    return rank
 
 
 @dissolved_kernel
@@ -112,13 +145,16 @@ def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
 
 @kernel
 def watch_geometry(
-    model: Model, tree: Workspace, contacts: Contacts, state: Floats, phase: Phase
-) -> None:
-    """Event functions that need no forces: gaps of open points, speeds of what slides.
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
+    phase: Phase,
+) -> None:  # fmt: skip
+    """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
     That of a point that is let pass below the ground is its depth.
     """
     value, rate = phase.value, phase.rate
+    if has_corners(ground):
+        watch_corners(model, ground, contacts, phase, value)
     for dry in range(phase.dry_joint.shape[0]):
         contact = phase.first_dry + dry
         slide = phase.slide[contact]
@@ -144,7 +180,9 @@ def watch_geometry(
 
 
 @dissolved_kernel
-def watch_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase) -> None:
+def watch_forces(
+    count: int, loops: int, assembly: Assembly, friction: Floats, phase: Phase
+) -> None:
     """Event functions of closed points: normal forces, and what is left to the friction limit."""
     delassus, free = assembly.problem.delassus, assembly.problem.free
     impulse = assembly.answer.impulse
@@ -158,9 +196,18 @@ def watch_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
             phase.value[2 * contact + 1] = limit - abs(impulse[2 * place + 1])
         elif phase.slide[contact] != 0 and phase.group[contact] == contact:
             acceleration = free[2 * place + 1]
-            for column in range(2 * count):
+            for column in range(2 * (count + loops)):
                 acceleration += delassus[2 * place + 1, column] * impulse[column]
             phase.rate[2 * contact + 1] = phase.slide[contact] * acceleration
+
+
+@dissolved_kernel
+def trust_latches(held: Integers, phase: Phase) -> None:
+    """Stops that hold their joint never open, whatever the sign of their force."""
+    for latch in range(held.shape[0]):
+        stop = phase.latch_stop[latch]
+        if held[latch] == 1 and phase.closed[stop] == 1:
+            phase.value[2 * stop] = 1.0
 
 
 @dissolved_kernel
@@ -185,11 +232,13 @@ def free_acceleration(
 
 @kernel
 def gather_closed(
-    model: Model, contacts: Contacts, phase: Phase, equations: Equations, assembly: Assembly
-) -> int:
+    model: Model, contacts: Contacts, phase: Phase, loops: Loops, equations: Equations,
+    assembly: Assembly,
+) -> int:  # fmt: skip
     """Jacobian rows and Delassus matrix of the closed contacts; return their number.
 
-    Dry joints that move are none of them: their friction is known.
+    Dry joints that move are none of them: their friction is known. The rows of the loops come
+    after those of the contacts and are not counted; they have been found for the state.
     """
     count = 0
     for contact in range(phase.closed.shape[0]):
@@ -198,8 +247,9 @@ def gather_closed(
             gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
             assembly.candidate[count] = contact
             count += 1
-    if count > 0:
-        assemble_delassus(model, equations, count, assembly)
+    total = append_loops(phase.closed.shape[0], count, loops, assembly)
+    if total > 0:
+        assemble_delassus(model, total, equations, assembly)
     return count
 
 
@@ -217,24 +267,39 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
         if contact >= phase.first_dry:
             joint = phase.dry_joint[contact - phase.first_dry]
             impulse[2 * place] = model.dry_friction[joint]
-    size = list_unknowns(count, assembly.candidate, friction, phase)
-    constraint_matrix(size, 1.0, assembly.problem.delassus, phase)
+    loops = memory.loops.unknown.shape[0]
+    total = count + loops
+    free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)
+    for row in range(2 * count, 2 * total):
+        impulse[row] = 0.0
+    size = list_unknowns(count, loops, assembly.candidate, friction, phase)
     for i in range(size):
         phase.system[i, size] = -assembly.problem.free[phase.row[i]]
-    rank = solve_to_rank(size, phase.system, phase.column, phase.unknown)
+    rank = solve_constraints(size, 1.0, assembly.problem.delassus, phase)
     phase.deficient = 1 if rank < size else 0
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
         if phase.lean[i] != 0.0:
             impulse[phase.row[i] + 1] += phase.lean[i] * phase.unknown[i]
-    add_impulse(model, assembly, count, memory.equations, memory.equations.rate)
+    add_impulse(model, assembly, total, memory.equations, memory.equations.rate)
+
+
+@kernel
+def observe_faces(
+    model: Model, ground: GroundModel, state: Floats, phase: Phase, memory: Memory
+) -> None:
+    """Kinematics, velocities and contact points of a state (q, v)."""
+    tree = memory.equations.tree
+    forward_kinematics(model, state[: model.nq], tree)
+    link_velocities(model, state[model.nq :], tree)
+    locate(model, ground, tree, phase, memory.contacts, memory.surface)
 
 
 @kernel
 def look(model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase) -> None:
     """Pose, contact points, and the event functions that need no forces, of a state (q, v)."""
-    observe(model, ground, state[: model.nq], state[model.nq :], memory)
-    watch_geometry(model, memory.equations.tree, memory.contacts, state, phase)
+    observe_faces(model, ground, state, phase, memory)
+    watch_geometry(model, ground, memory.equations.tree, memory.contacts, state, phase)
 
 
 @kernel
@@ -252,20 +317,23 @@ def evaluate(
     equations, assembly, friction = memory.equations, memory.assembly, memory.surface.friction
     rate = equations.rate
     evaluate_equations(model, q, v, equations)
-    locate_contacts(model, scene.ground, equations.tree, memory.contacts, memory.surface)
-    watch_geometry(model, equations.tree, memory.contacts, state, phase)
+    locate(model, scene.ground, equations.tree, phase, memory.contacts, memory.surface)
+    watch_geometry(model, scene.ground, equations.tree, memory.contacts, state, phase)
     if control.continuous == 1:
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    count = gather_closed(model, memory.contacts, phase, equations, assembly)
+    loops = memory.loops.unknown.shape[0]
+    find_rows(model, q, v, equations.tree, memory.loops.rows)
+    count = gather_closed(model, memory.contacts, phase, memory.loops, equations, assembly)
     phase.closed_count = count
-    if count > 0:
+    if count + loops > 0:
         hold_closed(model, count, friction, phase, memory)
     share_forces(count, assembly, friction, phase)
-    watch_forces(count, assembly, friction, phase)
+    watch_forces(count, loops, assembly, friction, phase)
+    trust_latches(memory.loops.held, phase)
     if count > 0 and phase.deficient == 1:
-        share_redundant(count, friction, memory.reaction.mode, phase, assembly)
+        share_redundant(count, memory.loops, friction, memory.reaction.mode, phase, assembly)
     for i in range(model.nv):
         slope[i] = v[i]
         slope[model.nq + i] = rate[i]
@@ -276,52 +344,70 @@ def evaluate(
 
 @kernel
 def displacement(
-    row: int, model: Model, tree: Workspace, contacts: Contacts, assembly: Assembly, phase: Phase,
+    row: int, model: Model, tree: Workspace, contacts: Contacts, memory: Memory, phase: Phase,
     state: Floats,
 ) -> float:  # fmt: skip
     """How far a candidate is along its row from where its constraint wants it."""
-    contact = assembly.candidate[row // 2]
+    contact = memory.assembly.candidate[row // 2]
+    if contact >= phase.closed.shape[0]:
+        return memory.loops.rows.displacement[contact - phase.closed.shape[0]]
     if row % 2 == 0:
         return gap_now(contact, contacts, phase, state)
     if contact >= phase.first_dry:
         return state[phase.dry_joint[contact - phase.first_dry]] - phase.anchor[contact]
     if phase.stuck[contact] == 1:
-        return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact)
+        return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact, phase)
     return 0.0
 
 
 @kernel
-def project(model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats) -> None:
+def project(
+    model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
+) -> float:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
-    Closed points return to the ground, sticking ones (and joints) to where they began to stick, and
-    their velocities along these directions vanish.
+    Closed points return to the ground, sticking ones (and joints) to where they began to stick,
+    ends of loops to each other, and their velocities along these directions vanish. Returns how far
+    (m) the worst is left from its place: constraints that say the same twice need not agree.
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
-    system, row = phase.system, phase.row
+    system, row, loops = phase.system, phase.row, memory.loops.unknown.shape[0]
     for attempt in range(5):
-        observe(model, ground, q, v, memory)
+        observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
-        count = gather_closed(model, contacts, phase, equations, assembly)
-        if count == 0:
-            return
-        size = list_unknowns(count, assembly.candidate, memory.surface.friction, phase)
+        find_rows(model, q, v, equations.tree, memory.loops.rows)
+        count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
+        total = count + loops
+        if total == 0:
+            return 0.0
+        size = list_unknowns(count, loops, assembly.candidate, memory.surface.friction, phase)
         worst = 0.0
         for i in range(size):
-            error = displacement(row[i], model, equations.tree, contacts, assembly, phase, state)
+            error = displacement(row[i], model, equations.tree, contacts, memory, phase, state)
             system[i, size] = -error
             worst = max(worst, abs(error))
         positions = worst > 1e-14 and attempt < 4
         if not positions:
             for i in range(size):
                 system[i, size] = -row_product(assembly.jacobian, row[i], v)
-        constraint_matrix(size, 0.0, assembly.problem.delassus, phase)
-        solve_to_rank(size, system, phase.column, phase.unknown)
-        for i in range(2 * count):
+        solve_constraints(size, 0.0, assembly.problem.delassus, phase)
+        for i in range(2 * total):
             assembly.answer.impulse[i] = 0.0
         for i in range(size):
             assembly.answer.impulse[row[i]] = phase.unknown[i]
-        add_impulse(model, assembly, count, equations, q if positions else v)
+        add_impulse(model, assembly, total, equations, q if positions else v)
         if not positions:
-            return
+            return worst
+    return math.inf
+
+
+@kernel
+def explained(before: Floats, after: Floats, times: float, phase: Phase) -> bool:
+    """Whether some multiple of the error that a step may make explains how far a state moved."""
+    size = before.shape[0]
+    total = 0.0
+    for i in range(size):
+        scale = phase.absolute + phase.relative * max(abs(before[i]), abs(after[i]))
+        total += ((after[i] - before[i]) / scale) ** 2
+    return bool(total <= size * times**2)

@@ -10,10 +10,12 @@ from __future__ import annotations
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import point_bias_acceleration
+from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import contact_rows, contact_velocity, write_unit_row
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.event_driven.faces import face_curvature
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Assembly, Equations
 
@@ -78,6 +80,11 @@ def free_gap_acceleration(
         point_bias_acceleration(equations.tree, link, center, acceleration)
         along_normal, along_tangent = into_frame(normal, (acceleration[0], acceleration[1]))
         along_tangent -= radius * acceleration[2]
+        curvature = face_curvature(contact, model, phase)
+        if curvature != 0.0:
+            velocity = velocity_at(equations.tree.velocity, link, place_of(equations.tree, center))
+            _, along = into_frame(normal, velocity)
+            along_normal += curvature * along * along
     jacobian, rate = assembly.jacobian, equations.rate
     for j in range(model.nv):
         along_normal += jacobian[2 * place, j] * rate[j]

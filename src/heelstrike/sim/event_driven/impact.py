@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     evaluate_equations,
-    locate_contacts,
     row_product,
 )
+from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
+from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Memory, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
 
@@ -29,8 +33,11 @@ ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 REST = 1e-9
 # Energy counts as made when it exceeds this part of the energy that went through the contacts.
 NOTICEABLE = 1e-9
-# Bounces shorter than this (s) are not followed: their limit is computed.
+# Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
+# rest: what speed is left of them is less than anyone could see.
 SHORTEST_BOUNCE = 1e-6
+NO_BOUNCE = 1e-8
+PLASTIC, AT_REST = 1, 2
 # Ratio of successive bounces beyond which there is no limit in sight.
 PERPETUAL = 0.999999
 
@@ -77,9 +84,12 @@ def collide(
         count += 1
     if count == 0:
         return True, 0.0
-    assemble_delassus(model, equations, count, assembly)
+    find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
+    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    free_loops(total, memory.loops, v, 0.0, assembly)
+    assemble_delassus(model, total, equations, assembly)
     friction, guess = memory.surface.friction, memory.reaction.mode
-    status = solve_candidates(count, False, friction, guess, phase, assembly)
+    status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
@@ -87,7 +97,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
-    add_impulse(model, assembly, count, equations, v)
+    add_impulse(model, assembly, total, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -97,7 +107,7 @@ def collide(
         through += abs(pressing) + abs(rubbing)
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        rests = normal <= REST or phase.plastic[contact] == 1
+        rests = normal <= REST or phase.plastic[contact] == AT_REST
         phase.closed[contact] = 1 if rests else 0
         phase.slide[contact] = heading(tangent) if rests else 0
     for dry in range(phase.dry_joint.shape[0]):
@@ -118,25 +128,29 @@ def short_bounces(
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     friction = memory.surface.friction
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
-    locate_contacts(model, ground, equations.tree, contacts, memory.surface)
+    locate(model, ground, equations.tree, phase, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    count = gather_closed(model, contacts, phase, equations, assembly)
+    loops = memory.loops.unknown.shape[0]
+    find_rows(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops.rows)
+    count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
     for place in range(count):
         contact = assembly.candidate[place]
         free_gap_acceleration(model, contacts, equations, contact, place, phase, assembly)
-    if count > 0:
-        solve_candidates(count, True, friction, memory.reaction.mode, phase, assembly)
-        add_impulse(model, assembly, count, equations, equations.rate)
+    total = count + loops
+    free_loops(total, memory.loops, equations.rate, 1.0, assembly)
+    if total > 0:
+        solve_candidates(count, memory.loops, True, friction, memory.reaction.mode, phase, assembly)
+        add_impulse(model, assembly, total, equations, equations.rate)
     found = False
     for contact in range(phase.closed.shape[0]):
         touched = phase.hit[contact] == 1 or was_closed[contact] == 1
         if phase.closed[contact] == 1 or not touched:
             continue
-        gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
-        free_gap_acceleration(model, contacts, equations, contact, count, phase, assembly)
+        gap_rows(model, equations.tree, contacts, phase, contact, total, assembly)
+        free_gap_acceleration(model, contacts, equations, contact, total, phase, assembly)
         normal, _ = gap_velocity(contact, model, contacts, equations.tree, phase, state)
-        pull = -assembly.problem.free[2 * count]
-        if not (pull > 0.0 and 2.0 * normal <= SHORTEST_BOUNCE * pull):
+        pull = -assembly.problem.free[2 * total]
+        if not (pull > 0.0 and 0.0 < 2.0 * normal <= SHORTEST_BOUNCE * pull):
             continue
         bounce = 2.0 * normal / pull
         last = time - phase.last_blow
@@ -145,10 +159,20 @@ def short_bounces(
         ratio = bounce / last
         if not ratio < PERPETUAL:
             ratio = min(memory.surface.restitution[contact], PERPETUAL)
-        phase.plastic[contact] = 1
+        phase.plastic[contact] = AT_REST if bounce <= NO_BOUNCE else PLASTIC
         phase.accumulation[contact] = time + bounce / (1.0 - ratio)
         found = True
     return found
+
+
+@kernel
+def restore(before: Floats, reported: Reported, phase: Phase) -> None:
+    """Go back to the state and the modes before an impact."""
+    for i in range(before.shape[0]):
+        phase.begin[i] = before[i]
+    for contact in range(phase.first_dry):
+        phase.closed[contact] = reported.closed[contact]
+        phase.slide[contact] = reported.slipping[contact]
 
 
 @kernel
@@ -165,24 +189,25 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     for attempt in range(2):
         solved, made = collide(model, 0.0, memory, phase, state)
         if not solved:
+            restore(before, reported, phase)
             return False
         if attempt == 1 or not short_bounces(model, ground, state, memory, phase):
             break
-        for i in range(state.shape[0]):
-            state[i] = before[i]
-        for contact in range(phase.first_dry):
-            phase.closed[contact] = reported.closed[contact]
-            phase.slide[contact] = reported.slipping[contact]
+        restore(before, reported, phase)
     phase.last_blow = time
     largest = 0
     for contact in range(phase.first_dry):
         normal, tangent = impulse[contact, 0], impulse[contact, 1]
+        if phase.plastic[contact] != 0 and phase.closed[contact] == 0:
+            # Others throw it up again, and it is followed.
+            phase.accumulation[contact] = np.inf
         phase.plastic[contact] = 0
         if phase.hit[contact] == 1:
             phase.last_impact[contact] = time
         if contact < model.nc and normal > impulse[largest, 0]:
             largest = contact
-        if not normal > 0.0:
+        pulls = contact >= model.nc and normal < 0.0  # as a latch may
+        if not (normal > 0.0 or pulls):
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1

@@ -21,7 +21,8 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import evaluate, look
+from heelstrike.sim.event_driven.dynamics import EXPLAINED, evaluate, explained, look, project
+from heelstrike.sim.event_driven.faces import has_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
@@ -35,11 +36,20 @@ SAMPLES = 4
 EVENT_TIME = 1e-12
 """Seconds to which events are located."""
 
+TOGETHER = 1e-10
+"""Points nearer to the ground than this (m) share an impact."""
+
 # How far an event function must be below zero to count: m, m/s, and a fraction of the weight.
 GAP_NOISE = 1e-13
+CORNER_NOISE = 1e-11
 SPEED_NOISE = 1e-12
 FORCE_NOISE = 1e-10
-
+# An event function that is nearer to zero than this part of its noise is zero.
+NEAR_ENOUGH = 0.1
+# How often a step is looked through for its first event.
+ATTEMPTS = 3
+# How much a step is shortened whose end does not fit its constraints.
+SHORTENED = 0.25
 
 # Shortest step as a multiple of the rounding of time.
 SHORTEST_STEP = 8.0
@@ -107,6 +117,8 @@ def take_step(scene: Scene, length: float, control: Control, memory: Memory, pha
 def is_geometric(function: int, phase: Phase) -> bool:
     """Whether an event function needs no forces: a gap, or the speed of what slides."""
     contact = function // 2
+    if contact >= phase.closed.shape[0]:
+        return True
     slides = function % 2 == 1 and phase.slide[contact] != 0
     return bool(phase.closed[contact] == 0 or slides)
 
@@ -114,22 +126,26 @@ def is_geometric(function: int, phase: Phase) -> bool:
 @kernel
 def noise(function: int, phase: Phase) -> float:
     """How far an event function may be below zero without meaning it."""
+    if function >= 2 * phase.closed.shape[0]:
+        return CORNER_NOISE
     if phase.closed[function // 2] == 0:
-        return GAP_NOISE
+        # An event is found to a time, and so a gap to what it closes in that time.
+        speed = max(abs(phase.before_rate[function]), abs(phase.sample_rate[function]))
+        return max(GAP_NOISE, EVENT_TIME * speed)
     return SPEED_NOISE if is_geometric(function, phase) else FORCE_NOISE * phase.weight
 
 
 @kernel
 def find_root(
-    scene: Scene, function: int, of_rate: bool, bracket: tuple[float, float, float, float],
+    scene: Scene, function: int, turn: float, bracket: tuple[float, float, float, float],
     length: float, control: Control, memory: Memory, phase: Phase,
 ) -> float:  # fmt: skip
-    """Fraction of the step at which an event function, or its rate, first changes sign.
+    """Fraction of the step at which an event function first changes sign, or turns round.
 
-    In the bracket (low, its value, high, its value) it is positive (its rate negative) at `low` and
-    the other way round at `high`. Regula falsi that halves the interval every third time. An event
-    function that is zero at `low`, where its phase begins, is first followed back from `high` to
-    where it is positive.
+    In the bracket (low, its value, high, its value) it is positive at `low` and negative at `high`;
+    with `turn` not zero these are `turn` times its rate. Regula falsi that halves the interval
+    every third time. An event function that is zero at `low`, where its phase begins, is first
+    followed back from `high` to where it is positive.
     """
     low, low_value, high, high_value = bracket
     forces = not is_geometric(function, phase)
@@ -143,7 +159,7 @@ def find_root(
             part = high - high_value * (high - low) / (high_value - low_value)
             part = min(max(part, low + 0.4 * width), high - 0.4 * width)
         evaluate_within(scene, part, length, forces, control, memory, phase)
-        value = -phase.rate[function] if of_rate else phase.value[function]
+        value = turn * phase.rate[function] if turn != 0.0 else phase.value[function]
         if value > 0.0:
             low = part
             low_value = value
@@ -159,19 +175,36 @@ def crossing(
     scene: Scene, function: int, low: float, high: float, length: float, control: Control,
     memory: Memory, phase: Phase,
 ) -> float:  # fmt: skip
-    """Fraction of the step at which an event function passes zero, between two samples of it."""
+    """Fraction of the step at which an event function passes zero, between two samples of it.
+
+    Of a point that has just left the ground the gap is zero but for rounding: it cannot come back
+    before it turned round. If it got no higher than noise until then, it ends there, at rest.
+    """
+    before, begin = phase.before[function], low
     value, end = phase.sample[function], high
     rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
-    is_gap = function % 2 == 0 and phase.closed[function // 2] == 0
+    is_gap = function < 2 * phase.closed.shape[0]
+    is_gap = is_gap and function % 2 == 0 and phase.closed[function // 2] == 0
     if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
         # An open point came down and went up again: how close was it?
         bracket = low, -rate, high, -later_rate
-        end = find_root(scene, function, True, bracket, length, control, memory, phase)
+        end = find_root(scene, function, -1.0, bracket, length, control, memory, phase)
         value = phase.value[function]
-    if not value < -noise(function, phase):
+    least = noise(function, phase)
+    if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
+        # It rises: it is no nearer than before, but for the error of the dense output.
+        least = phase.absolute + phase.relative
+    # What is below zero from the beginning tells nothing new until it falls further.
+    if not value < -least - max(-before, 0.0):
         return NO_EVENT
-    bracket = low, phase.before[function], end, value
-    return find_root(scene, function, False, bracket, length, control, memory, phase)
+    if is_gap and rate > 0.0 and later_rate < 0.0 and before <= least:
+        bracket = low, rate, high, later_rate
+        begin = find_root(scene, function, 1.0, bracket, length, control, memory, phase)
+        before = phase.value[function]
+        if before <= least:
+            return begin
+    bracket = begin, before, end, value
+    return find_root(scene, function, 0.0, bracket, length, control, memory, phase)
 
 
 @kernel
@@ -184,6 +217,7 @@ def first_event(
     ``phase.before_rate`` must hold the event functions at the start of the step.
     """
     sample, sample_rate = phase.sample, phase.sample_rate
+    functions = sample.shape[0] if has_corners(scene.ground) else 2 * phase.closed.shape[0]
     together = EVENT_TIME / length
     low = 0.0
     for k in range(1, SAMPLES + 1):
@@ -194,7 +228,7 @@ def first_event(
         else:
             copy_events(phase.end_value, phase.end_rate, sample, sample_rate)
         first = NO_EVENT
-        for i in range(sample.shape[0]):
+        for i in range(functions):
             phase.fired[i] = 0
             root = crossing(scene, i, low, high, length, control, memory, phase)
             if root < first - together:
@@ -234,25 +268,60 @@ def longest_good_step(
 
 
 @kernel
+def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
+    """Put the end of the step on its constraints; return whether its error explains how far."""
+    end, before = phase.end, phase.trial
+    for i in range(end.shape[0]):
+        before[i] = end[i]
+    left = project(scene.model, scene.ground, memory, phase, end)
+    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
+
+
+@kernel
 def end_at_event(
     scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
-) -> tuple[float, bool]:
+) -> tuple[float, bool, bool]:
     """Repeat the step to end at the event, and correct its length by what is left there.
 
-    Returns the length, and whether the step is good enough.
+    Returns the length, whether the step is good enough, and whether its end fits its constraints.
     """
     for attempt in range(4):
         if not take_step(scene, length, control, memory, phase) <= 1.0:
-            return length, False
+            return length, False, True
+        if not settle(scene, memory, phase):
+            return length, True, False
+        look(scene.model, scene.ground, phase.end, memory, phase)
+        value, rate = phase.value, phase.rate
         change = 0.0
         for i in range(phase.fired.shape[0]):
-            if phase.fired[i] == 1 and is_geometric(i, phase) and phase.end_rate[i] < 0.0:
-                change = -phase.end_value[i] / phase.end_rate[i]
-        change = max(change, -length)
-        if attempt == 3 or not 1e-15 < abs(change) < 1e-6:
+            passes = phase.fired[i] == 1 and is_geometric(i, phase) and rate[i] < 0.0
+            if passes and abs(value[i]) > NEAR_ENOUGH * noise(i, phase):
+                change = -value[i] / rate[i]
+        # Where it turns round rather than passes zero, its rate does not tell where zero is.
+        if attempt == 3 or change == 0.0 or abs(change) > 0.5 * length:
             break
         length += change
-    return length, True
+    return length, True, True
+
+
+@kernel
+def missed(phase: Phase) -> bool:
+    """Whether a point is in the ground at the end of a step that ends with another's event.
+
+    The step is not the one on whose dense output that was found first.
+    """
+    for contact in range(phase.first_dry):
+        gap = phase.value[2 * contact]
+        if phase.closed[contact] == 0 and phase.fired[2 * contact] == 0 and gap < -TOGETHER:
+            return True
+    return False
+
+
+@kernel
+def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase) -> None:
+    """Evaluate the beginning of the step again."""
+    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
 
 
 @kernel
@@ -277,16 +346,23 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
             phase.next_length = max(min(wish, 10.0 * length), length * factor)
         part = first_event(scene, length, control, memory, phase)
         phase.has_fired = 0 if part == NO_EVENT else 1
-        if part == NO_EVENT:
-            break
-        length, good = end_at_event(scene, length * part, control, memory, phase)
-        if good:
+        good, fits = True, True
+        for _ in range(ATTEMPTS):
+            if part == NO_EVENT:
+                break
+            length, good, fits = end_at_event(scene, length * part, control, memory, phase)
+            if not (good and fits and missed(phase)):
+                break
+            look_back(scene, control, memory, phase)
+            part = first_event(scene, length, control, memory, phase)
+        if phase.has_fired == 0:
+            fits = settle(scene, memory, phase)
+        if good and fits:
             break
         # Where a torque saturates the shorter step can be the worse one: take less of it.
-        length *= 0.5
+        length *= SHORTENED if good else 0.5
         rejected = True
-        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-        copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
+        look_back(scene, control, memory, phase)
     phase.length = length
     phase.finished = 1
     return True

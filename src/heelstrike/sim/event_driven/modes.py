@@ -76,7 +76,7 @@ def form_groups(
     for contact in range(model.nc):
         sticks = phase.closed[contact] == 1 and phase.slide[contact] == 0
         if sticks and phase.stuck[contact] == 0:
-            phase.anchor[contact] = tangential_place(model, tree, contacts, contact)
+            phase.anchor[contact] = tangential_place(model, tree, contacts, contact, phase)
         phase.stuck[contact] = 1 if sticks else 0
 
 

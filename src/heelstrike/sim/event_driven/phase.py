@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 from heelstrike.sim.memory import contact_capacity
@@ -35,6 +36,8 @@ class Phase(Bundle):
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     dry_joint : (nd,) int
         Joints with dry friction.
+    latch_stop : (latches,) int
+        The stop that each latch is, as contacts are numbered here.
     order : (3,) int
         Contact solvers in the order in which they are tried.
     closed : (nc,) int
@@ -52,6 +55,9 @@ class Phase(Bundle):
         Points that reach the ground in this instant; those whose rebound is too short to follow.
     passing : (nc,) int
         Points of a swing leg below the ground that are let pass.
+    face : (points,) int
+        Face of the ground that each closed contact point is on, -1 for none
+        (:mod:`heelstrike.sim.event_driven.faces`).
     force : (nc, 2) float
         Contact forces of the last evaluation (N), normal and tangent, on the robot.
     end_force : (nc, 2) float
@@ -60,19 +66,19 @@ class Phase(Bundle):
         Impulses of the impact in this instant (N s).
     last_impact, accumulation : (nc,) float
         When each point hit the ground last; when its accumulating impacts come to rest.
-    row : (2 nc,) int
-    lean : (2 nc,) float
-    system : (2 nc, 2 nc + 1) float
-    unknown : (2 nc,) float
-    column : (2 nc,) int
-        Equations of the contact forces: row of the Jacobian, tangential per normal force, the
-        equations themselves, their solution, and its order.
-    value, rate, end_value, end_rate : (2 nc,) float
-    before, before_rate, sample, sample_rate : (2 nc,) float
+    row : (forces,) int
+    lean, scale : (forces,) float
+    system : (forces, forces + 1) float
+    unknown : (forces,) float
+    column : (forces,) int
+        Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal
+        force, unit of each, the equations themselves, their solution, and its order.
+    value, rate, end_value, end_rate : (2 nc + points,) float
+    before, before_rate, sample, sample_rate : (2 nc + points,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
         the step, at the sample before, at this one. Of a joint stop the second is always 1, of a
-        dry joint the first.
-    fired : (2 nc,) int
+        dry joint the first. On ground with corners each contact point has a third, after these.
+    fired : (2 nc + points,) int
         Event functions that ended the step.
     scratch : (2, 3) float
         A place and its acceleration.
@@ -109,6 +115,14 @@ class Phase(Bundle):
         Whether contact forces at their limits made it so; whether those that grow without bound.
     closed_count, deficient : int
         Closed contact points at the last evaluation; whether it found their forces ambiguous.
+    left : float
+        How far from its constraints the phase began, because they cannot all be met (m).
+    bridging, bridges : int
+        Whether this instant is left by a bridge; how many there were in the series.
+    series, bridge_end : float
+        When the series of bridges began, and when the last of them ended, s.
+    allowance : float
+        Events that are allowed for until time has moved on.
     reason : int
         Why the simulation could not go on.
     let_pass : int
@@ -121,6 +135,7 @@ class Phase(Bundle):
     stop_side: Floats = array("ns")
     stop_limit: Floats = array("ns")
     dry_joint: Integers = array("nd", of=int)
+    latch_stop: Integers = array("latches", of=int)
     order: Integers = array(3, of=int)
     closed: Integers = array("contacts", of=int)
     slide: Integers = array("contacts", of=int)
@@ -132,25 +147,27 @@ class Phase(Bundle):
     hit: Integers = array("contacts", of=int)
     plastic: Integers = array("contacts", of=int)
     passing: Integers = array("contacts", of=int)
+    face: Integers = array("nc", of=int)
     force: Floats = array("contacts", "components")
     end_force: Floats = array("contacts", "components")
     impulse: Floats = array("contacts", "components")
     last_impact: Floats = array("contacts")
     accumulation: Floats = array("contacts")
-    row: Integers = array("2 contacts", of=int)
-    lean: Floats = array("2 contacts")
-    system: Floats = array("2 contacts", "2 contacts + 1")
-    unknown: Floats = array("2 contacts")
-    column: Integers = array("2 contacts", of=int)
-    value: Floats = array("2 contacts")
-    rate: Floats = array("2 contacts")
-    end_value: Floats = array("2 contacts")
-    end_rate: Floats = array("2 contacts")
-    before: Floats = array("2 contacts")
-    before_rate: Floats = array("2 contacts")
-    sample: Floats = array("2 contacts")
-    sample_rate: Floats = array("2 contacts")
-    fired: Integers = array("2 contacts", of=int)
+    row: Integers = array("forces", of=int)
+    lean: Floats = array("forces")
+    scale: Floats = array("forces")
+    system: Floats = array("forces", "forces + 1")
+    unknown: Floats = array("forces")
+    column: Integers = array("forces", of=int)
+    value: Floats = array("functions")
+    rate: Floats = array("functions")
+    end_value: Floats = array("functions")
+    end_rate: Floats = array("functions")
+    before: Floats = array("functions")
+    before_rate: Floats = array("functions")
+    sample: Floats = array("functions")
+    sample_rate: Floats = array("functions")
+    fired: Integers = array("functions", of=int)
     scratch: Floats = array("axes", 3)
     begin: Floats = array("2 nv")
     end: Floats = array("2 nv")
@@ -181,6 +198,12 @@ class Phase(Bundle):
     jammed: int = cell(int)
     closed_count: int = cell(int)
     deficient: int = cell(int)
+    left: float = cell(float)
+    bridging: int = cell(int)
+    bridges: int = cell(int)
+    series: float = cell(float)
+    bridge_end: float = cell(float)
+    allowance: float = cell(float)
     reason: int = cell(int)
     let_pass: int = cell(int)
 
@@ -195,14 +218,27 @@ def allocate_phase(robot: Robot) -> Phase:
     contacts = contact_capacity(robot)
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
+        forces=2 * contacts + count_rows(model), functions=2 * contacts + robot.nc,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
         dry_joint=dry.astype(np.int64),
+        latch_stop=np.array(
+            [
+                robot.nc
+                + (
+                    len(lower) + int(np.searchsorted(upper, joint))
+                    if side > 0
+                    else int(np.searchsorted(lower, joint))
+                )
+                for joint, side in zip(model.latch_joint, model.latch_side, strict=True)
+            ],
+            dtype=np.int64,
+        ),
         closed=(np.arange(contacts) >= contacts - len(dry)).astype(np.int64),
         last_impact=np.full(contacts, -np.inf),
         accumulation=np.full(contacts, np.inf),
-        value=np.ones(2 * contacts),
+        value=np.ones(2 * contacts + robot.nc), face=np.full(robot.nc, -1),
     )  # fmt: skip

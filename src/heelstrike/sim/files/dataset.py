@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from heelstrike.robot.model import SELDOM
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.files.logs import DIMENSIONS, log_attribute, log_variables
@@ -63,12 +64,19 @@ PUSHES = {
 }
 
 
+def _seldom(name: str) -> bool:
+    """Whether a quantity is one of what most robots have nothing of, which need not be told."""
+    return any(extent in SELDOM for extent in QUANTITIES[name].shape)
+
+
 def labels(robot: Robot) -> dict[str, list[str]]:
     """Return what counts along the dimensions of a dataset."""
     return {
         "coordinate": list(robot.joint_names),
         "actuator": list(robot.actuator_names),
         "contact": list(robot.contact_names),
+        "loop": list(robot.loop_names),
+        "coupling": list(robot.coupling_names),
         "axis": ["x", "z"],
         "component": ["normal", "tangent"],
         "condition": ["complementarity", "cone", "non-penetration"],
@@ -98,13 +106,15 @@ def to_dataset(run: Run) -> xarray.Dataset:
     columns: list[Any] = [[getattr(event, name) for event in run.events] for name in EVENT_MEMBERS]
     columns[-1] = np.reshape(columns[-1], (-1, 2))  # of no events, too
     values: dict[str, Any] = {
-        **{name: getattr(run, name) for name in ROWS},
+        **{name: rows for name in ROWS if (rows := getattr(run, name)).size or not _seldom(name)},
         **dict(zip(EVENTS, columns, strict=True)),
         **{f"ground_{name}": each for name, each in run.ground.numbers().items()},
         **{f"push_{name}": each for name, each in numbers_of_pushes(run.robot, run.pushes).items()},
     }
     declared = ROWS | EVENTS | GROUND | PUSHES
-    variables = {name: each.written(values[name]) for name, each in declared.items()}
+    variables = {
+        name: each.written(values[name]) for name, each in declared.items() if name in values
+    }
     variables["event_kind"][2].update(
         flag_values=np.array([kind.value for kind in EventKind]),
         flag_meanings=" ".join(kind.name.lower() for kind in EventKind),

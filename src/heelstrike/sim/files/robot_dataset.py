@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.model import NUMBERS, Model
+from heelstrike.robot.model import NUMBERS, SELDOM, Model
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 _DIMS: dict[str | int, str] = {
     "nl": "coordinate", "nj": "coordinate", "nq": "coordinate", "nv": "coordinate",
     "nc": "contact", "nu": "actuator", "axes": "xz", 3: "motion",
+    "loops": "loop", "couplings": "coupling", "latches": "latch", 2: "end", 5: "power",
 }  # fmt: skip
 """Dimensions of the file. In the plane links, joints and coordinates share one."""
-_SIZES = {"xz": 2, "motion": 3}
+_SIZES = {"xz": 2, "motion": 3, "end": 2, "power": 5}
 _NUMBERS = {
     name: Variable(
         tuple(_DIMS[size] for size in number.shape),
@@ -69,7 +70,11 @@ def robot_to_dataset(robot: Robot) -> xarray.Dataset:
     for index, foot in enumerate(robot.feet):
         foot_of[list(foot.contacts)] = index
     values: dict[str, Any] = {
-        **{name: getattr(robot.model, name) for name in _NUMBERS},
+        **{
+            name: each
+            for name in _NUMBERS
+            if (each := getattr(robot.model, name)).size or NUMBERS[name].shape[0] not in SELDOM
+        },
         **{name: getattr(robot, name) for name in _NAMES},
         "foot_link": [foot.link for foot in robot.feet],
         "foot_name": [foot.name for foot in robot.feet],

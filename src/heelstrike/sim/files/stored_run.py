@@ -40,7 +40,6 @@ from heelstrike.sim.run import (
 
 _ENDED_WELL = (RunStatus.COMPLETED, RunStatus.FELL, RunStatus.INTERRUPTED)
 """Ends of runs of which every number is finite."""
-_JOINT_EVENTS = (EventKind.JOINT_STOP, EventKind.JOINT_SLIP, EventKind.JOINT_STICK)
 
 
 def stored_run(
@@ -166,7 +165,9 @@ def _events(stored: Stored, robot: Robot, sizes: dict[str, int]) -> tuple[Event,
     for k, c in zip(kind.tolist(), contact.tolist(), strict=True):
         if k not in known:
             raise DamageError(f"an event is of kind {k}, which is none")
-        where, count = ("joint", robot.nv) if k in _JOINT_EVENTS else ("contact point", robot.nc)
+        # A bridge is one of the whole robot, but every robot has a joint.
+        of_joint = EventKind(k).of_joint or k == EventKind.BRIDGE
+        where, count = ("joint", robot.nv) if of_joint else ("contact point", robot.nc)
         if not 0 <= c < count:
             raise DamageError(f"an event names a {where} that is not there")
     return events_of(time, kind, contact, impulse)

@@ -35,8 +35,10 @@ STANDING_SPEED = 1e-6
 def note_extremes(model: Model, memory: Memory) -> None:
     """Keep the worst penetration and residuals of the run."""
     tally = memory.tally
+    deepest = tally.penetration
     for contact in range(model.contact_link.shape[0]):
-        tally.penetration = max(tally.penetration, -memory.contacts.gap[contact])
+        deepest = max(deepest, -memory.contacts.gap[contact])
+    tally.penetration = deepest
     note_residual(memory.assembly.answer.residual, tally)
 
 
@@ -78,6 +80,7 @@ def note_events(model: Model, time: float, step: float, memory: Memory, record: 
     Points that already stand on the ground when the run begins do not touch down, and joints that
     rest at a stop do not reach it. Joints with dry friction come to rest, or begin to move.
     """
+    first = record.events
     for contact in range(model.contact_link.shape[0]):
         note_events_of_contact(model, time, step, contact, memory, record)
     for joint in range(model.parent.shape[0]):
@@ -91,6 +94,25 @@ def note_events(model: Model, time: float, step: float, memory: Memory, record: 
         if rests != (memory.reported.resting[dry] == 1):
             log_event(time + step, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
             memory.reported.resting[dry] = 1 if rests else 0
+    if record.events > first + 1:
+        order_events(first, record)
+
+
+@kernel
+def order_events(first: int, record: Record) -> None:
+    """Put the events from the `first` on in the order of their times; those of one time stay."""
+    time, kind, contact = record.event_time, record.event_kind, record.event_contact
+    impulse = record.event_impulse
+    for event in range(first + 1, record.events):
+        place = event
+        while place > first and time[place - 1] > time[place]:
+            before = place - 1
+            time[before], time[place] = time[place], time[before]
+            kind[before], kind[place] = kind[place], kind[before]
+            contact[before], contact[place] = contact[place], contact[before]
+            for i in range(2):
+                impulse[before, i], impulse[place, i] = impulse[place, i], impulse[before, i]
+            place = before
 
 
 @dissolved_kernel
@@ -199,7 +221,7 @@ def center_height(model: Model, ground: GroundModel, tree: Workspace) -> float:
 @dissolved_kernel
 def sound(memory: Memory) -> bool:
     """Whether the state is finite and not absurd."""
+    good = 0
     for i in range(memory.v.shape[0]):
-        if not (abs(memory.q[i]) < 1e9 and abs(memory.v[i]) < 1e6):
-            return False
-    return True
+        good += (abs(memory.q[i]) < 1e9) & (abs(memory.v[i]) < 1e6)
+    return good == memory.v.shape[0]

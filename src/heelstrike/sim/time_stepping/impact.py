@@ -16,6 +16,10 @@ free. It is for the contact that is *new* to say that there is an impact at all:
 the end of this step, did not at the end of the last one, and is not there already. A contact that
 is in the ground makes two problems of it, too: positions are pushed out, velocities are not, so
 that no solve makes kinetic energy. Elsewhere the two velocities are the same.
+
+Between a stop and the ground, or two walls, there may be no way out of a penetration. If it is no
+more than rounding and turning explain, the problem is asked again with negative gaps counted as
+zero, and an event tells of it.
 """
 
 from __future__ import annotations
@@ -28,17 +32,27 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.memory import Assembly, Memory, contact_capacity
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import log_event
+from heelstrike.sim.time_stepping.corners import Corner, allocate_corner
 
 Floats = NDArray[np.float64]
 
 # A contact touches when its gap is no more than this (m): far above what rounding leaves of a gap
 # that is closed (1e-16), far below what turning makes of one in a step (h² ω² l / 2, 1e-7 at 1 ms).
 TOUCHING = 1e-9
-NEVER = -1
+NEVER = -2
+
+# What is no deeper in the ground or beyond a stop than this (m, rad) may be left there, if there is
+# no way out: what turning makes of a gap that is closed, h² ω² l / 2, at 20 rad/s and 1 ms.
+WEDGED_BY = 1e-4
+WEDGED = int(EventKind.WEDGED)
 
 
 class Impact(Bundle):
@@ -48,73 +62,72 @@ class Impact(Bundle):
     ----------
     happens : int
         Whether an impact falls into this step.
-    step : int
-        Number of this step.
     touching : (places,) int
-        The last step at whose end each contact point, and then each end of each joint, touched.
-    touches : (capacity,) int
-        Whether each candidate touches at the end of this step.
+        The last step at whose end each contact point, each end of each joint, and each second face
+        of a corner touched.
     called : (places,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
-    free : (nv,) float
-        The free velocity.
+    relaxed, wedged : int
+        Whether what is in the ground is left there in this step; the last step where it was.
     arriving : (nv,) float
         Where there is an impact, the velocity that positions move with.
     member : (capacity,) int
         The candidates that take part.
     problem, answer : ContactProblem, ContactAnswer
         The impact.
+    corner : Corner
+        Second faces of concave corners.
     """
 
     happens: int = cell(int)
-    step: int = cell(int)
     touching: Integers = array("places", of=int)
-    touches: Integers = array("capacity", of=int)
     called: Integers = array("places", of=int)
     calls: int = cell(int)
-    free: Floats = array("nv")
+    relaxed: int = cell(int)
+    wedged: int = cell(int)
     arriving: Floats = array("nv")
     member: Integers = array("capacity", of=int)
     problem: ContactProblem = part(ContactProblem)
     answer: ContactAnswer = part(ContactAnswer)
+    corner: Corner = part(Corner)
 
 
 def allocate_impact(robot: Robot) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    capacity = contact_capacity(robot)
-    places = robot.nc + 2 * robot.nv
+    capacity = contact_capacity(robot) + robot.nc + count_rows(robot.model)
+    places = 2 * (robot.nc + robot.nv)
     return Impact.allocate(
         nv=robot.nv,
         capacity=capacity,
         places=places,
         touching=np.full(places, NEVER),
+        wedged=NEVER,
         problem=ContactProblem.allocate(nc=capacity),
         answer=ContactAnswer.allocate(nc=capacity),
+        corner=allocate_corner(robot),
     )
 
 
 @kernel
-def gap_of(model: Model, q: Floats, gap: Floats, candidate: int) -> float:
-    """Gap of a contact point or a joint stop."""
-    stop = candidate - model.nc
+def gap_of(model: Model, memory: Memory, corner: Corner, candidate: int) -> float:
+    """Gap of a contact point, a joint stop or the second face of a corner."""
+    stop, q = candidate - model.nc, memory.q
     if stop < 0:
-        return gap[candidate]
+        return memory.contacts.gap[candidate]
+    if stop >= 2 * model.nv:
+        return corner.contacts.gap[stop - 2 * model.nv]
     if stop % 2 == 1:
         return model.upper[stop // 2] - q[stop // 2]
     return q[stop // 2] - model.lower[stop // 2]
 
 
-@dissolved_kernel
-def begin_step(velocity: Floats, impact: Impact) -> None:
-    """Keep the free velocity; nothing is called yet."""
-    for j in range(velocity.shape[0]):
-        impact.free[j] = velocity[j]
-    impact.step += 1
-    if impact.calls > 0:
-        impact.calls = 0
-        for place in range(impact.called.shape[0]):
-            impact.called[place] = 0
+@kernel
+def dismiss(impact: Impact) -> None:
+    """Let nothing be called any more."""
+    impact.calls = 0
+    for place in range(impact.called.shape[0]):
+        impact.called[place] = 0
 
 
 @dissolved_kernel
@@ -124,48 +137,102 @@ def call(place: int, impact: Impact) -> None:
     impact.called[place] = 1
 
 
-@dissolved_kernel
-def note_touching(model: Model, candidate: Integers, count: int, impact: Impact) -> None:
-    """Keep which of the candidates touch at the end of this step."""
-    closable = model.nc + 2 * model.nv
-    touches, touching = impact.touches, impact.touching
-    for place in range(count):
-        if touches[place] == 1 and candidate[place] < closable:
-            touching[candidate[place]] = impact.step
+@kernel
+def relax(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
+    """Leave the candidates where they are that are beyond stops or in the ground; return if any is.
 
-
-@dissolved_kernel
-def find_impact(
-    model: Model, step: float, q: Floats, gap: Floats, problem: ContactProblem,
-    assembly: Assembly, impact: Impact,
-) -> int:  # fmt: skip
-    """Find what touches at the end of the step; return how many take part in an impact.
-
-    Zero if there is none. `problem` is that of the positions, solved. Writes `impact`.
+    Not if one is deeper than rounding and turning explain.
     """
-    closable = model.nc + 2 * model.nv
-    touches, member = impact.touches, impact.member
-    members = 0
-    happens = False
+    deepest = 0.0
+    for place in range(count):
+        candidate = memory.assembly.candidate[place]
+        if candidate < 2 * (model.nc + model.nv):
+            deepest = min(deepest, gap_of(model, memory, impact.corner, candidate))
+    leaves = impact.relaxed == 0 and -WEDGED_BY <= deepest < 0.0
+    if leaves:
+        impact.relaxed = 1
+    return leaves
+
+
+@kernel
+def close_gaps(model: Model, step: float, count: int, impact: Impact, memory: Memory) -> None:
+    """Count negative gaps of the candidates as zero."""
+    for place in range(count):
+        candidate = memory.assembly.candidate[place]
+        if candidate < 2 * (model.nc + model.nv):
+            gap = gap_of(model, memory, impact.corner, candidate)
+            memory.assembly.problem.free[2 * place] -= min(gap, 0.0) / step
+
+
+@kernel
+def note_wedge(model: Model, time: float, memory: Memory, impact: Impact, record: Record) -> None:
+    """Tell of a wedge that begins, by the contact point that is deepest in the ground."""
+    steps, gap = memory.tally.steps, memory.contacts.gap
+    if impact.wedged != steps - 1:
+        deepest = 0
+        for contact in range(model.nc):
+            deepest = contact if gap[contact] < gap[deepest] else deepest
+        log_event(time, WEDGED, deepest, 0.0, 0.0, record)
+    impact.wedged = steps
+
+
+@dissolved_kernel
+def arrives(step: float, place: int, answer: ContactAnswer) -> bool:
+    """Whether a candidate touches at the end of the step.
+
+    With the linearised gap in the free term, velocities are gaps at the end divided by the step.
+    """
+    return step * answer.velocity[2 * place] <= TOUCHING
+
+
+@dissolved_kernel
+def note_touching(model: Model, step: float, count: int, memory: Memory, impact: Impact) -> None:
+    """Keep which of the candidates touch at the end of this step."""
+    assembly = memory.assembly
+    for place in range(count):
+        candidate = assembly.candidate[place]
+        if candidate < 2 * (model.nc + model.nv) and arrives(step, place, assembly.answer):
+            impact.touching[candidate] = memory.tally.steps
+
+
+@dissolved_kernel
+def falls_into(
+    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
+) -> bool:
+    """Whether an impact falls into the step; `problem` is that of the positions, solved."""
+    assembly, before = memory.assembly, memory.tally.steps - 1
     for place in range(problem.count):
         candidate = assembly.candidate[place]
-        if candidate >= closable:  # dry friction is always there
-            member[members] = place
-            members += 1
+        if candidate >= 2 * (model.nc + model.nv):
             continue
-        # With the linearised gap in the free term these are gaps at the end, divided by the step.
-        arrives = step * assembly.answer.velocity[2 * place] <= TOUCHING
-        closes = problem.free[2 * place] < 0.0
-        now = gap_of(model, q, gap, candidate)
-        there = now <= TOUCHING
-        touched = impact.touching[candidate] == impact.step - 1
-        new = closes and not touched and not there
-        happens = happens or (arrives and (new or now < -TOUCHING))
-        touches[place] = arrives
-        if there or (arrives and (touched or closes)):
-            member[members] = place
+        if arrives(step, place, assembly.answer):
+            now = gap_of(model, memory, impact.corner, candidate)
+            new = impact.touching[candidate] != before and problem.free[2 * place] < 0.0
+            if now < -TOUCHING or (new and now > TOUCHING):
+                return True
+    return False
+
+
+@kernel
+def find_members(
+    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
+) -> int:
+    """List what takes part in the impact of a step; return how many that are."""
+    assembly, before = memory.assembly, memory.tally.steps - 1
+    members = 0
+    for place in range(problem.count):
+        candidate = assembly.candidate[place]
+        # Dry friction and loops are always there.
+        takes_part = candidate >= 2 * (model.nc + model.nv)
+        if not takes_part:
+            now = gap_of(model, memory, impact.corner, candidate)
+            touched = impact.touching[candidate] == before
+            stays = touched or problem.free[2 * place] < 0.0
+            takes_part = now <= TOUCHING or (stays and arrives(step, place, assembly.answer))
+        if takes_part:
+            impact.member[members] = place
             members += 1
-    return members if happens else 0
+    return members
 
 
 @kernel
@@ -184,11 +251,16 @@ def pose_impact(
                     its.delassus[2 * place + i, 2 * other + j] = entry
         candidate = assembly.candidate[source]
         normal = problem.free[2 * source]
-        if candidate < model.nc + 2 * model.nv:
-            normal -= gap_of(model, memory.q, contacts.gap, candidate) / step
+        if candidate < 2 * (model.nc + model.nv):
+            gap = gap_of(model, memory, impact.corner, candidate)
+            normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
         if candidate < model.nc:
             before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
             normal += memory.surface.restitution[candidate] * before
+        elif model.nc + 2 * model.nv <= candidate < 2 * (model.nc + model.nv):
+            contact, corner = candidate - model.nc - 2 * model.nv, impact.corner
+            before, _ = contact_velocity(model, memory.equations.tree, corner.contacts, contact)
+            normal += corner.restitution[contact] * before
         its.free[2 * place] = normal
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]

@@ -12,6 +12,15 @@ paper's own ordering (eq. 23-26) asks ``J_n v⁺ ≥ 0`` of the points whose gap
 printed it moves the positions with the old velocity. Its text has the old velocity move the
 positions first and the new velocity computed there, which is the same sequence of states as moving
 them with the new velocity at the end of each step.
+
+Where positions move with v + θ Δv, joint springs K and dampers D pull with −K (q + θ Δq) and
+−D (v + θ Δv) at that part θ of the step. With Δq = h (v + θ Δv) and all other forces f as at its
+beginning, springs and dampers among them::
+
+    (A + θ h D + θ² h² K) Δv = h (f − θ h K v)
+
+Moreau and Jean have θ = 1/2: with constant A a spring keeps its energy exactly, for the spring does
+the work K (q + Δq/2) Δq. The linearly implicit scheme has θ = 1.
 """
 
 # ruff: noqa: ARG001 - the kernels of all methods have the same arguments
@@ -26,10 +35,11 @@ from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
 from heelstrike.contact.ground import GroundModel
-from heelstrike.contact.modes import SOLVED
+from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
+from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
@@ -44,31 +54,46 @@ from heelstrike.sim.contacts.geometry import (
     contact_velocity,
     evaluate_equations,
     locate_contacts,
+    row_product,
     solve_mass_matrix,
     weigh,
     write_unit_row,
+)
+from heelstrike.sim.contacts.latches import hold, react
+from heelstrike.sim.contacts.loops import (
+    append_loops,
+    close_loops,
+    free_loops,
+    note_loop,
+    speed_along,
+    steady_loops,
 )
 from heelstrike.sim.contacts.points import point_velocities
 from heelstrike.sim.contacts.straight_line import DELASSUS, PUSH, SOLVE, VELOCITIES
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.frame import DONE, SOLVER_FAILED, Kernels, Scene
+from heelstrike.sim.frame import DIVERGED, DONE, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
+from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
     Impact,
     allocate_impact,
-    begin_step,
     call,
-    find_impact,
+    close_gaps,
+    dismiss,
+    falls_into,
+    find_members,
     note_touching,
+    note_wedge,
     pose_impact,
+    relax,
     solve_impact,
 )
 
@@ -186,11 +211,14 @@ class TimeStepping(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
-        return 1, 2 * (robot.nc + robot.nv) + len(robot.joint_names)
+        events = 2 * (robot.nc + robot.nv) + len(robot.joint_names) + robot.model.latches + 1
+        return 1, events
 
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
         """What touched other ground says nothing of this one."""
         work.impact.touching[: robot.nc] = NEVER
+        work.impact.touching[robot.nc + 2 * robot.nv :] = NEVER
+        work.impact.corner.near = 0
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with restitution where the scheme knows plastic impacts only."""
@@ -210,37 +238,60 @@ def is_linearised(scheme: int) -> bool:
 
 @dissolved_kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
-    """Begin: there is nothing to prepare."""
+    """Begin with closed loops."""
+    if memory.loops.unknown.shape[0] > 0:
+        equations, loops, q = memory.equations, memory.loops, memory.q
+        if not close_loops(model, equations, loops, q):
+            return DIVERGED
+        steady_loops(model, q, equations, loops, memory.v)
     return DONE
+
+
+@kernel
+def add_springs(
+    model: Model, ahead: float, stiffness: Floats, damping: Floats, added: Floats
+) -> None:
+    """Write what springs and dampers that act a time ahead add to the mass matrix."""
+    for i in range(model.nv):
+        added[i] = ahead * (damping[i] + ahead * stiffness[i])
 
 
 @dissolved_kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
     equations = memory.equations
-    if work.scheme == LINEARLY_IMPLICIT:
-        for i in range(model.nv):
-            equations.added[i] = work.step * (memory.damping[i] + work.step * memory.stiffness[i])
+    if work.scheme == LINEARLY_IMPLICIT:  # with the gains of the controller
+        add_springs(model, work.step, memory.stiffness, memory.damping, equations.added)
+    elif work.scheme == MOREAU_JEAN:
+        add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
+    find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
+    if ground.concave == 1:
+        locate_corners(model, ground, equations.tree, work.impact.corner)
 
 
 @dissolved_kernel
 def free_velocity(model: Model, work: Stepping, time: float, memory: Memory) -> None:
     """Velocity at the end of the step if there were no ground, into ``memory.next_v``.
 
-    The linearly implicit scheme takes the joint forces −K q − D v at the end of the step. To first
-    order that adds h D + h² K to the mass matrix, as if it were armature, and −h K v to the force.
+    Springs and dampers that a scheme takes later in the step are added to the mass matrix, as if
+    they were armature.
     """
     step, equations, v, next_v = work.step, memory.equations, memory.v, memory.next_v
     force, rate = equations.force, equations.rate
     passive_force(model, memory.q, v, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += memory.torque[i]
-    if work.scheme == LINEARLY_IMPLICIT:
+    if work.scheme in (LINEARLY_IMPLICIT, MOREAU_JEAN):
+        halved = work.scheme == MOREAU_JEAN
+        ahead = 0.5 * step if halved else step
+        stiffness = model.stiffness if halved else memory.stiffness
+        added = 0.0
         for i in range(model.nv):
-            force[i] -= step * memory.stiffness[i] * v[i]
-        if equations.programs[SOLVE] != 0:
+            force[i] -= ahead * stiffness[i] * v[i]
+            added += equations.added[i]
+        if (added > 0.0 or not halved) and equations.programs[SOLVE] != 0:
             weigh(model, equations)  # the program has not heard of it
     for i in range(model.nv):
         rate[i] = step * (force[i] - equations.bias[i])
@@ -272,8 +323,9 @@ def find_velocities(
 def are_usual(candidate: Integers, near: int, program: int, usual: UsualPoints) -> bool:
     """Whether there is a program for the contact points among the candidates, the first `near`."""
     straight = usual.programs[program] != 0
-    for place in range(near):
-        straight = straight and usual.usual_place[candidate[place]] >= 0
+    if usual.usual_points.shape[0] < usual.usual_place.shape[0]:
+        for place in range(near):
+            straight = straight and usual.usual_place[candidate[place]] >= 0
     return straight
 
 
@@ -323,10 +375,22 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
 
 
 @dissolved_kernel
+def stops_are_near(model: Model, step: float, q: Floats, v: Floats) -> bool:
+    """Whether any joint stop could act in a step that bounds the gap at its end."""
+    near = 0
+    for joint in range(model.nv):
+        reach = step * max(CLOSING_RATE, 2.0 * abs(v[joint]))
+        near += (q[joint] - model.lower[joint] < reach) | (model.upper[joint] - q[joint] < reach)
+    return near > 0
+
+
+@dissolved_kernel
 def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> int:
     """Append the joint stops that could act in this step: contacts without friction."""
     assembly, problem, step = memory.assembly, memory.assembly.problem, work.step
     linearised, calls = is_linearised(work.scheme), work.impact.calls
+    if linearised and calls == 0 and not stops_are_near(model, step, memory.q, memory.next_v):
+        return count
     for joint in range(model.nv):
         for end in range(2):
             sign = 1.0 - 2.0 * end
@@ -355,6 +419,61 @@ def select_stops(model: Model, work: Stepping, count: int, memory: Memory) -> in
     return count
 
 
+@dissolved_kernel
+def hold_latched(model: Model, count: int, memory: Memory) -> int:
+    """Let the stops of engaged latches hold; return how many candidates there are with them.
+
+    Where the gap decides, and a scheme has left a joint before its stop, it is held there.
+    """
+    loops, assembly = memory.loops, memory.assembly
+    missing = hold(count, loops.latch_stop, loops.held, assembly)
+    while missing >= 0:
+        joint = model.latch_joint[missing]
+        assembly.problem.free[2 * count] = -model.latch_side[missing] * memory.next_v[joint]
+        assembly.problem.free[2 * count + 1] = 0.0
+        assembly.problem.friction[count] = 0.0
+        assembly.answer.mode[count] = STICK
+        assembly.candidate[count] = loops.latch_stop[missing]
+        count += 1
+        missing = hold(count, loops.latch_stop, loops.held, assembly)
+    return count
+
+
+@kernel
+def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> int:
+    """Append the second faces of corners that could act in this step, and write their rows."""
+    assembly, corner, step = memory.assembly, work.impact.corner, work.step
+    problem, gaps = assembly.problem, corner.contacts.gap
+    for contact in range(model.nc):
+        gap = gaps[contact]
+        if gap > FAR_STEPS * CLOSING_SPEED * step:
+            continue
+        tree = memory.equations.tree
+        contact_rows(model, tree, corner.contacts, contact, count, assembly)
+        normal = row_product(assembly.jacobian, 2 * count, memory.next_v)
+        if is_linearised(work.scheme):
+            if gap > step * max(CLOSING_SPEED, -2.0 * normal):
+                continue
+            normal += gap / step
+        elif work.scheme == MOREAU_JEAN:
+            before = row_product(assembly.jacobian, 2 * count, memory.v)
+            if gap + 0.5 * step * before > work.activation:
+                continue
+            normal += corner.restitution[contact] * before
+        elif gap > work.activation:
+            continue
+        problem.free[2 * count] = normal
+        tangent = row_product(assembly.jacobian, 2 * count + 1, memory.next_v)
+        problem.free[2 * count + 1] = tangent
+        problem.set[count] = CONE
+        problem.friction[count] = corner.friction[contact]
+        assembly.answer.mode[count] = corner.mode[contact]
+        assembly.candidate[count] = model.nc + 2 * model.nv + contact
+        count += 1
+        corner.count += 1
+    return count
+
+
 @kernel
 def write_rows(
     model: Model, tree: Workspace, contacts: Contacts, count: int, assembly: Assembly
@@ -377,7 +496,7 @@ def joint_row(
 ) -> tuple[int, int, float]:
     """Row of a candidate that is a stop or a dry joint, its joint, and the sign of the two."""
     stop = candidate[place] - model.nc
-    dry = stop - 2 * model.nv
+    dry = stop - 2 * model.nv - model.nc
     if dry >= 0:
         return 2 * place + 1, dry_joint[dry], 1.0
     return 2 * place, stop // 2, 1.0 - 2.0 * (stop % 2)
@@ -408,7 +527,10 @@ def gather_delassus(
                 for j in range(2):
                     entry = usual.usual_problem.delassus[row + i, column + j]
                     assembly.problem.delassus[2 * place + i, 2 * other + j] = entry
+    first_loop = 2 * (model.nc + model.nv) + dry_joint.shape[0]
     for place in range(near, count):
+        if candidate[place] >= first_loop:
+            break
         add_joint(model, contacts, dry_joint, near, place, equations, usual, assembly)
 
 
@@ -447,6 +569,38 @@ def add_joint(
         delassus[column, row] = entry
 
 
+@kernel
+def add_loop(model: Model, near: int, joints: int, place: int, memory: Memory) -> None:
+    """Add the row of a loop at a place to the Delassus matrix, after all points and joints.
+
+    As with joints, A⁻¹ Jᵀ goes to that row of ``assembly.jacobian``.
+    """
+    assembly, usual, row = memory.assembly, memory.usual, 2 * place
+    candidate, delassus = assembly.candidate, assembly.problem.delassus
+    change = assembly.jacobian[row]
+    solve_mass_matrix(model, memory.equations, change)
+    for other in range(2 * place + 2):
+        for own in range(row, row + 2):
+            delassus[own, other] = 0.0
+            delassus[other, own] = 0.0
+    if near > 0:
+        find_velocities(model, memory.contacts, change, True, memory.equations.tree, usual)
+    for other in range(near):
+        for i in range(2):
+            entry = usual.point_velocity[candidate[other], i]
+            delassus[row, 2 * other + i] = entry
+            delassus[2 * other + i, row] = entry
+    for other in range(near, place + 1):
+        column = 2 * other
+        if other < joints:
+            column, joint, sign = joint_row(model, memory.dry_joint, candidate, other)
+            entry = sign * change[joint]
+        else:
+            entry = speed_along(other - joints, memory.loops, change)
+        delassus[row, column] = entry
+        delassus[column, row] = entry
+
+
 @dissolved_kernel
 def push_candidates(
     model: Model, contacts: Contacts, assembly: Assembly, near: int, count: int,
@@ -470,7 +624,7 @@ def push_candidates(
         )  # fmt: skip
     for place in range(near, count):
         row = 2 * place
-        if assembly.candidate[place] >= model.nc + 2 * model.nv:
+        if assembly.candidate[place] >= 2 * (model.nc + model.nv):
             row += 1
         for j in range(model.nv):
             v[j] += impulse[row] * assembly.jacobian[row, j]
@@ -484,7 +638,11 @@ def push_all(
     contacts, assembly = memory.contacts, memory.assembly
     equations, usual = memory.equations, memory.usual
     if straight:
-        push_candidates(model, contacts, assembly, near, count, equations, usual, v)
+        joints = count - memory.loops.unknown.shape[0]
+        push_candidates(model, contacts, assembly, near, joints, equations, usual, v)
+        for place in range(joints, count):
+            for j in range(model.nv):
+                v[j] += assembly.answer.impulse[2 * place] * assembly.jacobian[2 * place, j]
     else:
         add_impulse(model, assembly, count, equations, v)
 
@@ -495,44 +653,83 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
-    straight = are_usual(assembly.candidate, near, DELASSUS, usual)
+    corners = impact.corner.count
+    straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
+        joints = count - memory.loops.unknown.shape[0]
+        for place in range(joints, count):
+            add_loop(model, near, joints, place, memory)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        joints = count - dry_joint.shape[0]
+        rows_there = dry_joint.shape[0] + corners + memory.loops.unknown.shape[0]
+        joints = count - rows_there
         write_rows(model, equations.tree, contacts, joints, assembly)
-        assemble_delassus(model, equations, count, assembly)
+        assemble_delassus(model, count, equations, assembly)
     problem.count = count
     solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
-    if solved and work.scheme == IMPACT_RESOLVED:
-        members = find_impact(model, step, memory.q, contacts.gap, problem, assembly, impact)
-        if members > 0:
-            impact.happens = 1
-            arriving = impact.arriving
-            for j in range(model.nv):
-                arriving[j] = impact.free[j]
-            push_all(model, near, count, straight, memory, arriving)
-            pose_impact(model, step, members, problem, memory, impact)
-            solved = solve_impact(work.order, members, problem, impact, assembly)
+    resolves = solved and work.scheme == IMPACT_RESOLVED
+    if resolves and falls_into(model, step, problem, memory, impact):
+        impact.happens = 1
+        arriving = impact.arriving
+        for j in range(model.nv):
+            arriving[j] = memory.next_v[j]
+        push_all(model, near, count, straight, memory, arriving)
+        members = find_members(model, step, problem, memory, impact)
+        pose_impact(model, step, members, problem, memory, impact)
+        solved = solve_impact(work.order, members, problem, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
     return solved
 
 
 @dissolved_kernel
-def may_go_through(model: Model, step: float, near: int, v: Floats, memory: Memory) -> bool:
-    """Whether the velocity that was found could take something through a stop or the ground."""
-    q, gap = memory.q, memory.contacts.gap
-    beyond = 0
+def may_go_through(
+    model: Model, work: Stepping, near: int, count: int, v: Floats, memory: Memory
+) -> bool:
+    """Whether the velocity that was found could take something through a stop or the ground.
+
+    What is no candidate is too far away to get there at its free velocity: it has to be thrown. A
+    stop has to be reached faster than any that is out of reach can be.
+    """
+    if count == 0:
+        return False
+    thrown = 0
     for joint in range(model.nv):
-        after = q[joint] + step * v[joint]
-        low, high = model.lower[joint] - TOUCHING, model.upper[joint] + TOUCHING
-        beyond += (after < low) | (after > high)
-    within = 0
+        thrown += abs(v[joint]) > CLOSING_RATE
+    if thrown > 0:
+        return True
+    known = near == count and work.impact.happens == 0
     for contact in range(model.nc):
-        within += gap[contact] <= FAR_STEPS * CLOSING_SPEED * step
-    return beyond > 0 or within > near
+        gap = memory.contacts.gap[contact]
+        if work.step * CLOSING_SPEED < gap <= work.step * CLOSING_SPEED * FAR_STEPS and not (
+            known and stays_above(work.step, contact, gap, near, memory.assembly, memory.usual)
+        ):
+            return True
+    return False
+
+
+@kernel
+def stays_above(
+    step: float, contact: int, gap: float, near: int, assembly: Assembly, usual: UsualPoints
+) -> bool:
+    """Whether it is known that the impulses of the candidates leave a contact point above ground.
+
+    All of them are contact points. Of a usual one the Delassus matrix is there, and the free
+    velocity.
+    """
+    row = 2 * usual.usual_place[contact]
+    if usual.programs[DELASSUS] == 0 or row < 0:
+        return False
+    delassus, impulse = usual.usual_problem.delassus, assembly.answer.impulse
+    normal = usual.point_velocity[contact, 0]
+    for place in range(near):
+        column = 2 * usual.usual_place[assembly.candidate[place]]
+        if column < 0:
+            return False
+        normal += delassus[row, column] * impulse[2 * place]
+        normal += delassus[row, column + 1] * impulse[2 * place + 1]
+    return gap + step * normal >= -0.5 * TOUCHING
 
 
 @kernel
@@ -540,9 +737,8 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
     """Call what would go through at the velocity that was found; return if any is new."""
     calls = impact.calls
     usual, contacts = memory.usual, memory.contacts
-    point_velocities(
-        model, usual.every_point, contacts, v, memory.equations.tree, usual.point_velocity
-    )
+    straight = are_usual(usual.every_point, model.nc, VELOCITIES, usual)
+    find_velocities(model, contacts, v, straight, memory.equations.tree, usual)
     for contact in range(model.nc):
         if contacts.gap[contact] + step * usual.point_velocity[contact, 0] < -TOUCHING:
             call(contact, impact)
@@ -556,46 +752,62 @@ def call_missed(model: Model, step: float, v: Floats, memory: Memory, impact: Im
 
 
 @dissolved_kernel
-def solve_contacts(model: Model, work: Stepping, memory: Memory) -> bool:
-    """Turn the free velocity into the velocity at the end of the step; return success.
+def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> bool:
+    """Find the velocity at the end of the step; return success.
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
-    a candidate, is called and the step solved again.
+    a candidate, is called and the step solved again. So it is where nothing pushes all candidates
+    out of where they are already; they are left there, then.
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
-    begin_step(memory.next_v, impact)
     again = True
     solved = True
-    count = 0
+    near = count = 0
+    impact.relaxed = 0
     while again:
+        free_velocity(model, work, time, memory)
         impact.happens = 0
         for i in range(3):
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
         count = select_stops(model, work, near, memory)
+        count = hold_latched(model, count, memory)
         count = select_dry_joints(
             model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
         )
+        impact.corner.count = 0
+        if impact.corner.near > 0:
+            count = select_corners(model, count, work, memory)
+        first_loop = 2 * (model.nc + model.nv) + memory.dry_joint.shape[0]
+        count = append_loops(first_loop, count, memory.loops, assembly)
+        free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
+        if impact.relaxed == 1:
+            close_gaps(model, work.step, count, impact, memory)
         if count > 0:
             solved = solve_candidates(model, near, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
-        again = (
-            is_linearised(work.scheme)
-            and solved
-            and may_go_through(model, work.step, near, v, memory)
-            and call_missed(model, work.step, v, memory, impact)
-        )
-        if again:
-            for j in range(model.nv):
-                memory.next_v[j] = impact.free[j]
+        if not is_linearised(work.scheme):
+            again = False
+        elif solved:
+            again = may_go_through(model, work, near, count, v, memory) and call_missed(
+                model, work.step, v, memory, impact
+            )
+        else:
+            again = relax(model, count, memory, impact)
+    if impact.calls > 0:
+        dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:
-        note_touching(model, assembly.candidate, count, impact)
-    note_answer(model, work.step, count, memory)
+        note_touching(model, work.step, count, memory, impact)
+    note_answer(model, work.step, near, count, memory, impact.corner)
+    if impact.corner.count > 0:
+        join_forces(model, impact.corner, memory.contacts)
     return solved
 
 
 @dissolved_kernel
-def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
+def note_answer(
+    model: Model, step: float, near: int, count: int, memory: Memory, corner: Corner
+) -> None:
     """Keep the forces, slips and modes of the candidates; all others have none."""
     answer, force, reaction = memory.assembly.answer, memory.contacts.force, memory.reaction
     for joint in range(model.nv):
@@ -607,22 +819,30 @@ def note_answer(model: Model, step: float, count: int, memory: Memory) -> None:
         force[contact, 1] = 0.0
         reaction.slip[contact] = 0.0
         reaction.mode[contact] = 0
-    for place in range(count):
+    for place in range(near):
         contact = memory.assembly.candidate[place]
-        stop = contact - model.nc
-        dry = stop - 2 * model.nv
-        normal, tangent = answer.impulse[2 * place], answer.impulse[2 * place + 1]
-        if dry >= 0:
-            reaction.friction_torque[memory.dry_joint[dry]] = tangent / step
+        force[contact, 0] = answer.impulse[2 * place] / step
+        force[contact, 1] = answer.impulse[2 * place + 1] / step
+        reaction.slip[contact] = answer.velocity[2 * place + 1]
+        reaction.mode[contact] = answer.mode[place]
+    for place in range(near, count):
+        stop = memory.assembly.candidate[place] - model.nc
+        other = stop - 2 * model.nv
+        dry = other - model.nc
+        loop = dry - memory.dry_joint.shape[0]
+        if loop >= 0:
+            note_loop(model, loop, answer.impulse[2 * place] / step, memory.loops)
+        elif dry >= 0:
+            reaction.friction_torque[memory.dry_joint[dry]] = answer.impulse[2 * place + 1] / step
             reaction.dry_mode[dry] = answer.mode[place]
-        elif stop >= 0:
+        elif other >= 0:
+            corner.contacts.force[other, 0] = answer.impulse[2 * place] / step
+            corner.contacts.force[other, 1] = answer.impulse[2 * place + 1] / step
+            corner.mode[other] = answer.mode[place]
+        else:
+            normal = answer.impulse[2 * place]
             reaction.stop_torque[stop // 2] += (1.0 - 2.0 * (stop % 2)) * normal / step
             reaction.stop_mode[stop // 2, stop % 2] = answer.mode[place] != 0
-        else:
-            force[contact, 0] = normal / step
-            force[contact, 1] = tangent / step
-            reaction.slip[contact] = answer.velocity[2 * place + 1]
-            reaction.mode[contact] = answer.mode[place]
 
 
 @dissolved_kernel
@@ -631,10 +851,13 @@ def decide(
 ) -> int:
     """Find the velocity at the end of the step, and note what happens in it."""
     model = scene.model
-    free_velocity(model, work, clock.time, memory)
-    solved = solve_contacts(model, work, memory)
+    solved = solve_step(model, clock.time, work, memory)
     note_extremes(model, memory)
+    if work.impact.relaxed == 1:
+        note_wedge(model, clock.time, memory, work.impact, record)
+    first = record.events
     note_events(model, clock.time, work.step, memory, record)
+    react(model, first, memory.q, record, memory.loops)
     return DONE if solved else SOLVER_FAILED
 
 
@@ -658,13 +881,17 @@ def move(
         for i in range(model.nv):
             v[i] += next_v[i]
         integrate(model, q, v, 0.5 * work.step, q)
+    elif work.impact.happens == 1:
+        integrate(model, q, work.impact.arriving, work.step, q)
+    elif work.scheme == PAPER_EXPLICIT:
+        integrate(model, q, v, work.step, q)
     else:
-        along = v if work.scheme == PAPER_EXPLICIT else next_v
-        if work.impact.happens == 1:
-            along = work.impact.arriving
-        integrate(model, q, along, work.step, q)
+        integrate(model, q, next_v, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
+    has_loops = memory.loops.unknown.shape[0] > 0
+    if has_loops and not close_loops(model, memory.equations, memory.loops, q):
+        return DIVERGED
     clock.time = clock.start + (clock.index + 1) * work.step
     return DONE
 

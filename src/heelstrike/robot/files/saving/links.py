@@ -77,6 +77,10 @@ def warn_of_loss(
     discs = set(seen)  # which are spheres there
     if any((o.link, *map(tuple, o.corners), o.radius) not in discs for o in robot.outlines):
         said.append("outlines, for pictures")
+    if model.latches:
+        said.append(f"latches of {', '.join(robot.latch_names)}")
+    if model.loops:
+        said.append(f"closed loops ({', '.join(robot.loop_names)})")
     if said:
         warn(
             f"{robot.name}: {kind} cannot hold everything this robot has. Left out: "

@@ -8,6 +8,7 @@ import numpy as np
 
 from heelstrike.robot.assembly import link_origins
 from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
+from heelstrike.robot.files.links import LATCH
 from heelstrike.robot.files.saving.text import (
     POINT_RADIUS,
     SMALLEST_INERTIA,
@@ -36,6 +37,13 @@ def mjcf(robot: Robot) -> Element:
     for name, joint in custom:
         data = number(getattr(model, name)[joint])
         SubElement(holder, "numeric", name=f"{name}:{robot.joint_names[joint]}", data=data)
+    body_name = names_of_bodies(robot)
+    for joint, side, release in zip(
+        model.latch_joint, model.latch_side, model.latch_release, strict=True
+    ):
+        name = f"{LATCH}:{robot.joint_names[joint]}"
+        name += f":{body_name[release]}" if release >= 0 else ""
+        SubElement(holder, "numeric", name=name, data=str(side))
     SubElement(holder, "numeric", name=COUNT, data=str(len(robot.outlines)))
     for count, outline in enumerate(robot.outlines):
         name = f"{PREFIX}:{count}:{robot.joint_names[outline.link]}"
@@ -47,6 +55,7 @@ def mjcf(robot: Robot) -> Element:
     SubElement(world, "light", pos="0 -3 4", dir="0 0.6 -0.8")
     floor = {"name": "floor", "type": "plane", "size": "20 2 0.1", "conaffinity": "1"}
     SubElement(world, "geom", floor | {"rgba": "0.85 0.85 0.82 1"})
+    _write_sites(robot, -1, world)
     _write_bodies(robot, world)
     if robot.nu:
         actuators = SubElement(root, "actuator")
@@ -54,6 +63,8 @@ def mjcf(robot: Robot) -> Element:
             motor = {"name": robot.actuator_names[i], "joint": robot.joint_names[joint]}
             low, high = model.torque_lower[i], model.torque_upper[i]
             SubElement(actuators, "motor", motor | range_of("ctrlrange", low, high))
+    if model.loops or model.couplings:
+        _write_loops(robot, SubElement(root, "equality"))
     return root
 
 
@@ -61,11 +72,9 @@ def _write_bodies(robot: Robot, world: Element) -> None:
     """Write the tree. A massless link with one child is a joint more on the body of that child."""
     model = robot.model
     origin = link_origins(model)
-    last = body_links(robot)
+    label = names_of_bodies(robot)
     body_of: dict[int, Element] = {}
-    names = unique(robot.link_names[link] for link in last)
-    label = dict(zip(last, names, strict=True))
-    for link in last:
+    for link in label:
         joints = [link]
         while (above := int(model.parent[joints[0]])) >= 0 and above not in label:
             joints.insert(0, above)
@@ -81,6 +90,40 @@ def _write_bodies(robot: Robot, world: Element) -> None:
             _write_joint(robot, joint, origin[joint] - origin[link], body)
         _write_inertia(robot, link, body)
         _write_shapes(robot, link, origin, body)
+        _write_sites(robot, link, body)
+
+
+def _write_loops(robot: Robot, equality: Element) -> None:
+    """Write loops as connected sites, and couplings of joints."""
+    model = robot.model
+    for loop in range(model.loops):
+        ends = {f"site{k + 1}": loop_site(loop, k) for k in range(2)}
+        SubElement(equality, "connect", ends)
+    for (joint, leader), factors in zip(
+        model.coupling_joint, model.coupling_polynomial, strict=True
+    ):
+        joints = {"joint1": robot.joint_names[joint]}
+        joints |= {"joint2": robot.joint_names[leader]} if leader >= 0 else {}
+        SubElement(equality, "joint", joints, polycoef=numbers(factors))
+
+
+def loop_site(loop: int, end: int) -> str:
+    """Name of the site at an end of a loop."""
+    return f"loop_{loop}_{'ab'[end]}"
+
+
+def _write_sites(robot: Robot, link: int, body: Element) -> None:
+    """Write the ends of loops on a link, -1 for the world."""
+    model = robot.model
+    for loop, end in np.argwhere(model.loop_link == link).tolist():
+        place = point(model.loop_position[loop, end])
+        SubElement(body, "site", name=loop_site(loop, end), pos=place)
+
+
+def names_of_bodies(robot: Robot) -> dict[int, str]:
+    """Names of the bodies that links become."""
+    last = body_links(robot)
+    return dict(zip(last, unique(robot.link_names[link] for link in last), strict=True))
 
 
 def body_links(robot: Robot) -> list[int]:
@@ -89,6 +132,8 @@ def body_links(robot: Robot) -> list[int]:
     children = np.bincount(model.parent[model.parent >= 0], minlength=robot.nv)
     merged = (model.mass == 0.0) & (model.inertia == 0.0) & (children == 1)
     merged[model.contact_link] = False
+    merged[model.loop_link[model.loop_link >= 0]] = False
+    merged[model.latch_release[model.latch_release >= 0]] = False
     return np.flatnonzero(~merged).tolist()
 
 

@@ -40,7 +40,8 @@ def sdf(robot: Robot) -> Element:
     floating base hangs on the world by its three joints, with massless links between them.
     """
     model = robot.model
-    warn_of_loss(robot, "an SDF file", tuple(name for name in PROPERTIES if name not in LOST))
+    held = tuple(name for name in PROPERTIES if name not in LOST)
+    warn_of_loss(robot, "an SDF file", held, {"couplings": model.coupling_joint[:, 0]})
     root = Element("sdf", {"version": VERSION, DRAKE: "drake.mit.edu"})
     holder = root
     if tuple(model.gravity) != STANDARD_GRAVITY:  # which is the world's

@@ -41,7 +41,12 @@ def urdf(robot: Robot) -> Element:
     """
     model = robot.model
     idle = np.setdiff1d(joints_with(robot, "armature"), model.actuator_joint)
-    warn_of_loss(robot, "a URDF file", HELD, {"armature (motor inertia)": idle})
+    curved = np.any(model.coupling_polynomial[:, 2:], axis=1) | (model.coupling_joint[:, 1] < 0)
+    lost = {
+        "armature (motor inertia)": idle,
+        "couplings that are not straight": model.coupling_joint[curved, 0],
+    }
+    warn_of_loss(robot, "a URDF file", HELD, lost)
     root = Element("robot", name=robot.name)
     if tuple(model.gravity) != STANDARD_GRAVITY:  # URDF has none; MuJoCo's extension does
         option = SubElement(SubElement(root, "mujoco"), "option")
@@ -100,6 +105,19 @@ def _write_urdf_joint(robot: Robot, joint: int, parent: str, child: str, root: E
         damping=number(model.damping[joint]),
         friction=number(model.dry_friction[joint]),
     )
+    for coupling in np.flatnonzero(model.coupling_joint[:, 0] == joint):
+        leader = model.coupling_joint[coupling, 1]
+        offset, slope, *curved = model.coupling_polynomial[coupling]
+        if leader >= 0 and not any(curved):
+            # URDF couples the coordinates themselves, not their ways from the reference.
+            offset += model.reference[joint] - slope * model.reference[leader]
+            SubElement(
+                element,
+                "mimic",
+                joint=robot.joint_names[leader],
+                multiplier=number(slope),
+                offset=number(offset),
+            )
 
 
 def _write_transmissions(robot: Robot, root: Element) -> None:

@@ -1,0 +1,69 @@
+"""How far robots on point feet walk under virtual constraints.
+
+``python benchmarks/endless_walk.py --event-driven 100000 --time-stepping 10000`` walks rabbit and
+rabbit_optimtraj so many steps and says whether they still walk as at first, and what a step costs.
+A walk is simulated in parts; each goes on from the end of the one before, bit by bit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+
+import heelstrike as hs
+
+FRICTION = 0.75
+PART = 500  # steps simulated in one call
+GAITS = {"rabbit": (0.21, 0.58), "rabbit_optimtraj": (0.40, 0.60)}
+"""Step length (m) and duration (s) by robot."""
+
+
+def walk(zero: hs.ZeroDynamics, method: hs.EventDriven | hs.TimeStepping, steps: int) -> str:
+    """Walk so many steps; return what happened, in a line."""
+    robot = zero.gait.robot
+    law = hs.VirtualConstraints(zero.gait, kp=900.0, kd=60.0)
+    state: hs.State | hs.Snapshot = zero.initial_state
+    taken, worst, clock = 0, 0.0, time.process_time()
+    while taken < steps:
+        part = min(PART, steps - taken)
+        run = hs.simulate(
+            robot, law, state=state, duration=part * zero.period, method=method,
+            ground=hs.Ground(friction=FRICTION),
+        )  # fmt: skip
+        if not run.completed:
+            return f"{run.status.value} after {taken} to {taken + part} steps: {run.message}"
+        speed = (run.position[-1, 0] - run.position[0, 0]) / (run.time[-1] - run.time[0])
+        worst = max(worst, abs(speed * zero.period / zero.step_length - 1.0))
+        state, taken = run.final, taken + part
+    cost = (time.process_time() - clock) / taken
+    return (
+        f"{taken} steps, {run.position[-1, 0]:.1f} m; mean speed of {PART} steps within "
+        f"{worst:.1e} of the quadrature's; {1e3 * cost:.2f} ms of CPU a step"
+    )
+
+
+def main() -> None:
+    """Walk."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--robot", choices=GAITS, action="append", help="by default both")
+    options.add_argument("--event-driven", type=int, default=1000, metavar="STEPS")
+    options.add_argument("--time-stepping", type=int, default=100, metavar="STEPS")
+    given = options.parse_args()
+    for name in given.robot or GAITS:
+        robot = hs.load_robot(name)
+        length, duration = GAITS[name]
+        gait = hs.optimize_gait(
+            robot, step_length=length, step_duration=duration, clearance=0.02, friction=0.6
+        )
+        zero = hs.zero_dynamics(hs.PhasedGait.from_gait(robot, gait))
+        methods = (
+            (hs.EventDriven(output_period=duration), given.event_driven),
+            (hs.TimeStepping(step=1e-3), given.time_stepping),
+        )
+        for method, steps in methods:
+            if steps > 0:
+                print(f"{name}, {type(method).__name__}: {walk(zero, method, steps)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

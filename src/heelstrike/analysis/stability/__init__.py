@@ -1,0 +1,1 @@
+"""Stability of walking as numbers: zero dynamics, jumps at impacts, what a walk stands."""

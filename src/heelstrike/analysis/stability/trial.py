@@ -1,0 +1,165 @@
+"""A walk that is disturbed, and whether it recovers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from heelstrike.analysis.recovery import Recovery, recovery
+from heelstrike.contact.ground import Ground
+from heelstrike.control import Law
+from heelstrike.errors import SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.method import Method
+from heelstrike.sim.push import Push
+from heelstrike.sim.run import Run
+from heelstrike.sim.simulation import simulate
+from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.whole_run import whole
+
+# Steps of the method between two rows, of which a verdict needs few.
+ROWS = 5
+# Time (s) simulated beyond the verdict: methods with steps end on one.
+BEYOND = 0.02
+# Part of the speed that may differ after a push, and on other ground.
+NORMAL = 0.25
+GETS_ON = 0.7
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trial:
+    """A walk to be disturbed.
+
+    Attributes
+    ----------
+    robot : Robot
+        A floating robot.
+    controller : object with ``torque(t, state, contacts)``, or None
+        What makes it walk. One in Python that remembers must forget at time 0.
+    state : State
+        Where it begins, on a walk that repeats.
+    step_length, step_duration : float
+        Of a step of that walk, in m and s.
+    method : Method
+        Way through time; ``TimeStepping(step=1e-3)`` by default.
+    ground : Ground
+        The ground it walks on undisturbed, level.
+    undisturbed : int
+        Steps before a disturbance.
+    settling : float
+        How long after a disturbance the walk has to be normal again, in s.
+    pitch : float
+        Largest angle of the trunk from the upright, in rad.
+    control_period : float or None
+        As of :func:`~heelstrike.simulate`.
+
+    Raises
+    ------
+    SimulationError
+        If the robot does not float, or a number is not positive.
+    """
+
+    robot: Robot
+    controller: Controller | Law | None
+    state: State
+    step_length: float
+    step_duration: float
+    method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
+    ground: Ground = field(default_factory=Ground)
+    undisturbed: int = 2
+    settling: float = 7.0
+    pitch: float = 0.6
+    control_period: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.robot.floating:
+            raise SimulationError(
+                f"trials of balance need a robot with a trunk that floats; {self.robot.name!r} is "
+                "none"
+            )
+        for name in ("step_length", "step_duration", "settling", "pitch"):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value > 0.0):
+                raise SimulationError(f"{name} of a trial must be positive, got {value!r}")
+
+    @property
+    def speed(self) -> float:
+        """Speed of the walk, in m/s."""
+        return self.step_length / self.step_duration
+
+    @property
+    def begins(self) -> float:
+        """When a disturbance may begin, in s."""
+        return self.undisturbed * self.step_duration
+
+    def run(
+        self, until: float, *, pushes: Sequence[Push] = (), ground: Ground | None = None
+    ) -> Run:
+        """Walk for as long as it takes to settle after an instant.
+
+        Parameters
+        ----------
+        until : float
+            When the disturbance is over, in s.
+        pushes : sequence of Push
+            What pushes the robot.
+        ground : Ground, optional
+            What lies there instead of the trial's own ground.
+
+        Returns
+        -------
+        Run
+            The walk.
+
+        Raises
+        ------
+        SimulationError
+            If an argument is not usable.
+        """
+        return whole(
+            simulate(
+                self.robot,
+                self.controller,
+                state=self.state,
+                duration=until + self.settling + BEYOND,
+                method=self.method,
+                ground=self.ground if ground is None else ground,
+                control_period=self.control_period,
+                record_every=ROWS,
+                pushes=pushes,
+            )
+        )
+
+    def recovered(
+        self, run: Run, disturbed: tuple[float, float], *, same_speed: bool = True
+    ) -> Recovery:
+        """Judge a disturbed walk; see :func:`~heelstrike.recovery`.
+
+        Parameters
+        ----------
+        run : Run
+            The walk.
+        disturbed : (2,) float
+            When the disturbance began and ended, in s.
+        same_speed : bool
+            Whether the speed must be the old one, to a quarter; else the robot must get on at all,
+            between three and seventeen tenths of it: on other ground a walk is another one.
+
+        Returns
+        -------
+        Recovery
+            True in a condition if it recovered.
+
+        Raises
+        ------
+        SimulationError
+            If the run has no rows.
+        """
+        return recovery(
+            run, pushed=disturbed, normal_speed=self.speed, after=self.settling, pitch=self.pitch,
+            speed=NORMAL if same_speed else GETS_ON,
+        )  # fmt: skip

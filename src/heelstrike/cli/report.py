@@ -1,0 +1,196 @@
+"""``heelstrike report``: runs judged on one page, from their files or walked for it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.compare import Way
+from heelstrike.cli.options import (
+    AsJson,
+    Averaged,
+    Debug,
+    Floating,
+    Forward,
+    Friction,
+    OnGround,
+    Packages,
+    Pose,
+    Projected,
+    Pushed,
+    SavedGait,
+    Steps,
+    method_called,
+    reading,
+)
+from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.terminal import (
+    FAILED,
+    output,
+    spoken,
+    stage,
+    tell,
+    tell_interruption,
+    this_command,
+    wrote,
+)
+from heelstrike.cli.values import ground_called, pushes_called
+
+if TYPE_CHECKING:
+    from heelstrike.gait import Gait
+    from heelstrike.sim import Run
+
+OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "floating", "projected",
+             "forward", "pose", "mirror", "package_path")  # fmt: skip
+"""Options that say how a robot walks, and nothing to a run that is read."""
+
+FIRST_TIME = "(compiling the simulator, once: about 20 s)"
+
+
+# As many arguments as the command has options: a person's, none of which is handed on one by one.
+@spoken
+def report(
+    context: typer.Context,
+    what: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ROBOT|RUN.nc...",
+            help="A robot that is walked for it, by its name or file; or the files of runs.",
+        ),
+    ],
+    out: Annotated[Path, typer.Option(dir_okay=False, help="Page to write.")] = Path("report.html"),
+    gait: SavedGait = None,
+    steps: Steps = 10,
+    method: Annotated[
+        list[Way] | None,
+        typer.Option(
+            help="Way through time; repeat the option to see several side by side.",
+            show_default="time-stepping; event-driven without motors",
+        ),
+    ] = None,
+    step: Annotated[
+        float, typer.Option(help="Time step in s of the methods that have one.")
+    ] = 1e-3,
+    ground: OnGround = "flat",
+    friction: Friction = 0.75,
+    push: Pushed = None,
+    floating: Floating = False,
+    projected: Projected = False,
+    forward: Forward = None,
+    pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
+    as_json: AsJson = False,
+    debug: Debug = False,  # noqa: ARG001 - for `spoken`
+) -> None:
+    """Judge runs on one page: the verdict first, how close to each limit, film, figures, origins.
+
+    The gait of a run that is read is the one of --gait, or of the gait.json beside it. The exit
+    status is 0 if all runs lasted to their end, 1 if not.
+    """
+    from heelstrike.experiments.walk import walk
+    from heelstrike.gait import Gait
+    from heelstrike.robot import load_robot
+    from heelstrike.view.page.page import check_page
+    from heelstrike.view.report import report
+
+    check_page(out)
+    files = [each for each in what if each.endswith(".nc")]
+    if files and len(files) < len(what):
+        raise typer.BadParameter(
+            "files of runs are reported side by side, or one robot is walked; not both"
+        )
+    if files:
+        _refuse_options_of_a_walk(context)
+        runs, followed = _read(files, gait)
+    elif len(what) > 1:
+        raise typer.BadParameter("one robot is walked at a time; repeat --method for several ways")
+    else:
+        surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
+        machine = load_robot(
+            what[0], **reading(floating, projected, forward, pose, mirror, package_path)
+        )
+        for each in pushes:
+            each.place(machine)
+        ways = method or [Way.TIME_STEPPING if machine.nu else Way.EVENT_DRIVEN]
+        methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
+        planned = planned_walk(machine, gait, surface)
+        followed = planned if isinstance(planned, Gait) else None
+        runs = {}
+        for name, through in methods.items():
+            with stage(f"walking {steps} steps ({name})", when_slow=FIRST_TIME) as walking:
+                runs[name] = walk(
+                    machine,
+                    planned,
+                    steps=steps,
+                    method=through,
+                    ground=surface,
+                    pushes=pushes,
+                    progress=walking.reached,
+                )
+    _stop_if_interrupted(runs)
+    with stage("writing the report"):
+        only = next(iter(runs.values()))
+        shown = runs if len(runs) > 1 else only
+        wrote(report(shown, out, gait=followed, command=this_command()))
+    _tell(runs, followed, out, as_json=as_json)
+
+
+def _refuse_options_of_a_walk(context: typer.Context) -> None:
+    for name in OF_A_WALK:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise typer.BadParameter(
+                "it says how a robot walks, and a run that is read has walked",
+                param_hint=f"--{name.replace('_', '-')}",
+            )
+
+
+def _read(files: list[str], gait: Path | None) -> tuple[dict[str, Run], Gait | None]:
+    """Load runs by the names of their files, and the gait that they followed, if it is known."""
+    from heelstrike.gait import load_gait
+    from heelstrike.sim import load_run
+
+    with stage("reading"):
+        short = len({Path(each).stem for each in files}) == len(files)
+        runs = {Path(each).stem if short else each: load_run(each) for each in files}
+        if gait is None:
+            beside = {
+                path for each in files if (path := Path(each).with_name("gait.json")).exists()
+            }
+            gait = beside.pop() if len(beside) == 1 else None
+            if gait is not None:
+                tell(f"the gait is the one of {gait}")
+        robot = next(iter(runs.values())).robot
+        return runs, None if gait is None else load_gait(gait, robot)
+
+
+def _stop_if_interrupted(runs: dict[str, Run]) -> None:
+    from heelstrike.sim import RunStatus
+
+    for run in runs.values():
+        if run.status is RunStatus.INTERRUPTED and run.final is not None:
+            tell_interruption("walking")
+            raise typer.Exit(INTERRUPTED)
+
+
+def _tell(runs: dict[str, Run], gait: Gait | None, out: Path, *, as_json: bool) -> None:
+    from heelstrike.analysis.summary import plain
+    from heelstrike.view.page import judge
+
+    verdicts = {name: judge(run, gait) for name, run in runs.items()}
+    if as_json:
+        told = {name: plain(asdict(verdict)) for name, verdict in verdicts.items()}
+        typer.echo(json.dumps(told, indent=2, ensure_ascii=False))
+    else:
+        for name, verdict in verdicts.items():
+            label = f"{name}: " if len(verdicts) > 1 else ""
+            output().print(f"{label}{verdict.headline}", markup=False, soft_wrap=True)
+    tell(f"{out}: the report, for any browser, which prints it to PDF")
+    if not all(run.completed for run in runs.values()):
+        raise typer.Exit(FAILED)

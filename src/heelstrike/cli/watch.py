@@ -1,0 +1,121 @@
+"""``heelstrike watch``: a robot walks in the browser, to be looked at and pushed."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from heelstrike.cli import INTERRUPTED
+from heelstrike.cli.options import (
+    Averaged,
+    Debug,
+    Floating,
+    Forward,
+    Friction,
+    OnGround,
+    Packages,
+    Pose,
+    Projected,
+    RobotName,
+    SavedGait,
+    method_called,
+    reading,
+)
+from heelstrike.cli.terminal import spoken, stage, tell
+from heelstrike.cli.values import ground_called
+from heelstrike.cli.walk import Method, Scheme
+from heelstrike.interruption import acknowledge
+
+if TYPE_CHECKING:
+    from heelstrike.contact.ground import Ground
+
+METHODS = (
+    Scheme.IMPACT_RESOLVED.value,
+    Method.EVENT_DRIVEN.value,
+    Method.COMPLIANT.value,
+    *(scheme.value for scheme in Scheme if scheme is not Scheme.IMPACT_RESOLVED),
+)
+"""Names that :func:`~heelstrike.cli.options.method_called` knows, the usual one first."""
+
+
+# As many arguments as the command has options: a person's.
+@spoken
+def watch(
+    robot: RobotName = "bravo7",
+    gait: SavedGait = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            metavar="|".join(METHODS),
+            help="Way through time, or discretisation of time stepping.",
+            show_default=f"{METHODS[0]}; {Method.EVENT_DRIVEN} without motors",
+        ),
+    ] = None,
+    step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
+    ground: OnGround = "flat",
+    friction: Friction = 0.75,
+    speed: Annotated[float, typer.Option(help="Simulated seconds a second, at first.")] = 1.0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="Port of 127.0.0.1.", show_default="a free one")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
+    ] = True,
+    floating: Floating = False,
+    projected: Projected = False,
+    forward: Forward = None,
+    pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
+    debug: Debug = False,  # noqa: ARG001 - for `spoken`
+) -> None:
+    """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
+
+    Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, to whoever has
+    the address that is printed. Ctrl-C ends it.
+    """
+    if method is not None and method not in METHODS:
+        raise typer.BadParameter(
+            f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method"
+        )
+    with stage("loading"):
+        from heelstrike.view.live.server import check_installed
+
+        check_installed()
+        from heelstrike.experiments.watching import First, WalkStage
+        from heelstrike.view.live.viewer import view
+
+        # All that is cheap to refuse is refused before anything is served.
+        surface = ground_called(ground, friction=friction)
+        for name in METHODS if method is None else (method,):
+            method_called(name, step)
+        first = First(
+            method=method, step=step, gait=gait, friction=friction, **_shape(ground, surface)
+        )
+        how = reading(floating, projected, forward, pose, mirror, package_path)
+        walks = WalkStage(robot, method_called, METHODS, first, **how)
+        viewer = view(stage=walks, rate=speed, port=port)
+    tell(f"watch at {viewer.url}")
+    try:
+        if browser and not viewer.open():
+            tell("no browser could be opened here: open the address yourself")
+        tell("Ctrl-C ends it")
+        viewer.wait()
+    except KeyboardInterrupt as interrupt:
+        acknowledge(interrupt)
+        tell("closed")
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def _shape(words: str, surface: Ground) -> dict[str, Any]:
+    """What of a ground can be set by viewers; stairs and files are as they are."""
+    kind, *shape = words.split(":")
+    if kind == "flat":
+        return {}
+    if kind == "slope":
+        return {"slope": math.degrees(surface.slope)}
+    if kind == "rough":
+        return {"roughness": float(shape[0]), "seed": int(shape[1])}
+    return {"ground": surface}

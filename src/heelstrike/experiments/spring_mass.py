@@ -1,0 +1,221 @@
+"""The spring-loaded inverted pendulum: a point mass that walks and runs on massless springs.
+
+A leg touches down at its rest length and at one angle to the ground, and pushes along the line from
+foothold to mass until it is long again. Both gaits follow from angle, stiffness and energy (H.
+Geyer, A. Seyfarth, R. Blickhan, *Compliant leg behaviour explains basic dynamics of walking and
+running*, Proceedings of the Royal Society B 273, 2006). A massless leg has no place among the links
+of a robot, whose dynamics need mass; it is a force between the mass and its foothold.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+
+from heelstrike.errors import LimitCycleError
+
+Floats = NDArray[np.float64]
+
+RTOL, ATOL = 1e-13, 1e-14
+LONGEST = 3.0  # s; a phase that lasts longer leads to no step
+DISTURBANCE = 3e-5  # m, rad; of the differences of fourth order that make multipliers
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cycle:
+    """A gait that repeats.
+
+    Attributes
+    ----------
+    state : (n,) float
+        Walking: height (m) and direction of the velocity (rad, up) where the foot is below the
+        mass. Running: height of the apex (m).
+    multipliers : (n,) complex
+        Floquet multipliers of a step.
+    period, length : float
+        Of a step, in s and m.
+    contact : float
+        Running: how long a foot is on the ground. Walking: how long both are (s).
+    """
+
+    state: Floats
+    multipliers: NDArray[np.complex128]
+    period: float
+    length: float
+    contact: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringMass:
+    """A point mass on massless springs.
+
+    Parameters
+    ----------
+    stiffness : float
+        Of a leg, in N/m.
+    angle : float
+        Angle of attack: of a leg to the ground at touchdown, in rad.
+    energy : float
+        In J; nothing is lost.
+    mass, leg, gravity : float
+        In kg, m and m/s².
+    """
+
+    stiffness: float
+    angle: float
+    energy: float
+    mass: float = 80.0
+    leg: float = 1.0
+    gravity: float = 9.81
+
+    @property
+    def touchdown_height(self) -> float:
+        """Height of the mass when a leg touches down, in m."""
+        return float(self.leg * np.sin(self.angle))
+
+    def walking(self, guess: Sequence[float]) -> Cycle:
+        """Find a walk that repeats near a state.
+
+        Parameters
+        ----------
+        guess : (2,) float
+            Height (m) and direction of the velocity (rad).
+
+        Returns
+        -------
+        Cycle
+
+        Raises
+        ------
+        LimitCycleError
+            If there is none near.
+        """
+        return self._cycle(self._walking_step, guess)
+
+    def running(self, guess: float) -> Cycle:
+        """Find a run that repeats near an apex.
+
+        Parameters
+        ----------
+        guess : float
+            Height of the apex (m).
+
+        Returns
+        -------
+        Cycle
+
+        Raises
+        ------
+        LimitCycleError
+            If there is none near.
+        """
+        return self._cycle(self._running_step, [guess])
+
+    def _cycle(
+        self, step: Callable[[Floats], tuple[Floats, float, float, float]], guess: Sequence[float]
+    ) -> Cycle:
+        found = root(lambda x: step(x)[0] - x, guess, tol=1e-13)
+        state = np.asarray(found.x, dtype=np.float64)
+        image, period, length, contact = step(state)
+        if not np.abs(image - state).max() < 1e-10:
+            raise LimitCycleError(
+                f"no gait of the spring-mass model repeats near {tuple(guess)}: its state still "
+                f"changes by {np.abs(image - state).max():.3g} a step"
+            )
+        columns = [
+            (4.0 * (step(state + h)[0] - step(state - h)[0]))
+            - 0.5 * (step(state + 2.0 * h)[0] - step(state - 2.0 * h)[0])
+            for h in DISTURBANCE * np.eye(len(state))
+        ]
+        slope = np.array(columns).T / (6.0 * DISTURBANCE)
+        multipliers = np.linalg.eigvals(slope).astype(np.complex128)
+        return Cycle(
+            state=state, multipliers=multipliers, period=period, length=length, contact=contact
+        )
+
+    def _walking_step(self, state: Floats) -> tuple[Floats, float, float, float]:
+        """From above one foot to above the next."""
+        height, direction = state
+        pressed = 0.5 * self.stiffness * (self.leg - height) ** 2
+        speed = np.sqrt(
+            2.0 * (self.energy - self.mass * self.gravity * height - pressed) / self.mass
+        )
+        start = np.array([0.0, height, speed * np.cos(direction), speed * np.sin(direction)])
+        rear = 0.0
+        landing, first = self._until(start, (rear,), self._lands)
+        front = landing[0] + self.leg * np.cos(self.angle)
+        leaving, both = self._until(landing, (rear, front), self._leaves(rear))
+        end, last = self._until(leaving, (front,), self._above(front))
+        image = np.array([end[1], np.arctan2(end[3], end[2])])
+        return image, first + both + last, front, both
+
+    def _running_step(self, state: Floats) -> tuple[Floats, float, float, float]:
+        """From apex to apex."""
+        (height,) = state
+        energy = self.energy - self.mass * self.gravity * height
+        start = np.array([0.0, height, np.sqrt(2.0 * energy / self.mass), 0.0])
+        landing, first = self._until(start, (), self._lands)
+        foot = landing[0] + self.leg * np.cos(self.angle)
+        leaving, contact = self._until(landing, (foot,), self._leaves(foot))
+        end, last = self._until(leaving, (), self._apex)
+        return end[1:2], first + contact + last, float(end[0]), contact
+
+    def _rate(self, feet: Sequence[float]) -> Callable[[float, Floats], Floats]:
+        def rate(_: float, x: Floats) -> Floats:
+            force = np.array([0.0, -self.mass * self.gravity])
+            for foot in feet:
+                line = np.array([x[0] - foot, x[1]])
+                length = np.hypot(*line)
+                force += self.stiffness * (self.leg - length) / length * line
+            return np.array([x[2], x[3], *(force / self.mass)])
+
+        return rate
+
+    def _until(
+        self, start: Floats, feet: Sequence[float], event: Callable[[float, Floats], float]
+    ) -> tuple[Floats, float]:
+        """State at an event, a value that falls through zero, and when it was."""
+
+        def falling(t: float, x: Floats) -> float:
+            return event(t, x)
+
+        falling.terminal, falling.direction = True, -1.0  # type: ignore[attr-defined]
+        run = solve_ivp(
+            self._rate(feet), (0.0, LONGEST), start, method="DOP853", rtol=RTOL, atol=ATOL,
+            events=falling,
+        )  # fmt: skip
+        if not len(run.t_events[0]):
+            raise LimitCycleError("the spring-mass model falls, or flies on: no step is completed")
+        # Newton's method on the length of the last phase: events of dense output are less exact.
+        return self._refined(start, feet, event, float(run.t_events[0][0]))
+
+    def _refined(
+        self, start: Floats, feet: Sequence[float], event: Callable[[float, Floats], float],
+        time: float,
+    ) -> tuple[Floats, float]:  # fmt: skip
+        rate = self._rate(feet)
+        for _ in range(3):
+            end = solve_ivp(rate, (0.0, time), start, method="DOP853", rtol=RTOL, atol=ATOL).y[
+                :, -1
+            ]
+            h = 1e-6
+            slope = event(0.0, end + h * rate(0.0, end)) - event(0.0, end - h * rate(0.0, end))
+            time -= event(0.0, end) / (slope / (2.0 * h))
+        return end, time
+
+    def _lands(self, _: float, x: Floats) -> float:
+        return float(x[1] - self.touchdown_height)
+
+    def _leaves(self, foot: float) -> Callable[[float, Floats], float]:
+        return lambda _, x: float(self.leg - np.hypot(x[0] - foot, x[1]))
+
+    def _above(self, foot: float) -> Callable[[float, Floats], float]:
+        return lambda _, x: float(foot - x[0])
+
+    def _apex(self, _: float, x: Floats) -> float:
+        return float(x[3])

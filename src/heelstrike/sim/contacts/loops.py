@@ -1,0 +1,170 @@
+"""Closed loops and coupled joints as contacts that never part.
+
+Their equations (:mod:`heelstrike.dynamics.loops`) are rows of the contact problem like those of
+points and stops, with the whole line as the set of their forces. They come last among the
+candidates, one a row, on the normal; the tangent is empty. Accelerations that solve the problem
+keep ``J v̇ + J̇ v`` at zero, velocities after an impact ``J v``. Those of a time step h keep
+``J v⁺ + h/2 J̇ v`` at zero: to second order that is the chord between two poses that fit the loops,
+as in the method SHAKE. With the tangent of either pose in its place, loops would brake or drive
+what turns in them, by h times the cube of its speed. (The first step of a motion that begins
+along the tangent has therefore half of the centripetal force.)
+
+No error of the positions is added to these: positions are put back on the equations by themselves
+(:func:`close_loops`), along the way that is shortest by the masses. So nothing drifts, and the
+forces are those of the motion alone.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+from heelstrike.contact.modes import STICK
+from heelstrike.contact.sets import LINE
+from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
+from heelstrike.dynamics.loops import find_rows
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.geometry import EVERYWHERE, solve_mass_matrix, weigh
+from heelstrike.sim.memory import Assembly, Equations, Loops
+
+CLOSED = 1e-14
+"""A loop is closed when its ends are no further apart than this (m, rad) …"""
+
+ROUNDING = 1e-11
+"""… or no further than this, and come no nearer."""
+
+ATTEMPTS = 20
+"""Newton's method takes three steps from where a simulation is."""
+
+
+@dissolved_kernel
+def append_loops(first: int, count: int, loops: Loops, assembly: Assembly) -> int:
+    """Append the rows of the loops to the candidates, numbered from `first`; return how many."""
+    for row in range(loops.unknown.shape[0]):
+        append_loop(first, row, count, loops, assembly)
+        count += 1
+    return count
+
+
+@dissolved_kernel
+def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: Assembly) -> None:
+    """Write the free terms J x + t J̇ v of the rows of the loops, the last of `count` candidates.
+
+    Of accelerations x the time t is 1, of the velocities of an impact 0, of those of a time step
+    half of it.
+    """
+    first = count - loops.unknown.shape[0]
+    for place in range(first, count):
+        row = place - first
+        ahead = time * loops.rows.bias[row]
+        assembly.problem.free[2 * place] = speed_along(row, loops, rate) + ahead
+
+
+@kernel
+def append_loop(first: int, row: int, count: int, loops: Loops, assembly: Assembly) -> None:
+    """Write what a row of the loops brings to the contact problem, but for its free term."""
+    jacobian, problem = assembly.jacobian, assembly.problem
+    for j in range(jacobian.shape[1]):
+        jacobian[2 * count, j] = loops.rows.jacobian[row, j]
+        jacobian[2 * count + 1, j] = 0.0
+    problem.free[2 * count + 1] = 0.0
+    problem.set[count] = LINE
+    problem.friction[count] = 0.0
+    assembly.leaf[count] = EVERYWHERE
+    assembly.answer.mode[count] = STICK
+    assembly.candidate[count] = first + row
+
+
+@kernel
+def speed_along(row: int, loops: Loops, v: Floats) -> float:
+    """Velocity, or acceleration, of the coordinates along a row of the loops."""
+    total = 0.0
+    for j in range(v.shape[0]):
+        total += loops.rows.jacobian[row, j] * v[j]
+    return total
+
+
+@dissolved_kernel
+def note_loops(model: Model, count: int, impulse: Floats, loops: Loops) -> None:
+    """Keep the forces of the loops, whose rows end with the first `count` candidates."""
+    rows = loops.unknown.shape[0]
+    for row in range(rows):
+        note_loop(model, row, impulse[2 * (count - rows + row)], loops)
+
+
+@dissolved_kernel
+def note_loop(model: Model, row: int, force: float, loops: Loops) -> None:
+    """Keep the force of a row."""
+    if row < 2 * model.loops:
+        loops.loop_force[row // 2, row % 2] = force
+    else:
+        loops.coupling_force[row - 2 * model.loops] = force
+
+
+@kernel
+def respond(model: Model, equations: Equations, loops: Loops) -> None:
+    """What unit forces of the loops do to the coordinates, A⁻¹ Jᵀ, and to the loops, J A⁻¹ Jᵀ.
+
+    What the mass matrix is solved with is there.
+    """
+    response, system = loops.response, loops.system
+    rows = response.shape[0]
+    for row in range(rows):
+        for j in range(model.nv):
+            response[row, j] = loops.rows.jacobian[row, j]
+        solve_mass_matrix(model, equations, response[row])
+    for row in range(rows):
+        for other in range(rows):
+            system[row, other] = speed_along(row, loops, response[other])
+
+
+@kernel
+def push_loops(loops: Loops, v: Floats) -> None:
+    """Solve for the forces of the loops, and add what they do to velocities or accelerations.
+
+    The right-hand side is the last column of the system, after :func:`respond`.
+    """
+    rows = loops.unknown.shape[0]
+    solve_to_rank(rows, loops.system, loops.order, loops.unknown)
+    for row in range(rows):
+        for j in range(v.shape[0]):
+            v[j] += loops.unknown[row] * loops.response[row, j]
+
+
+@kernel
+def close_loops(model: Model, equations: Equations, loops: Loops, q: Floats) -> bool:
+    """Move positions to where all loops are closed, the shortest way by the masses.
+
+    Returns whether there is such a place nearby.
+    """
+    tree, displacement = equations.tree, loops.rows.displacement
+    before = 0.0
+    for attempt in range(ATTEMPTS):
+        forward_kinematics(model, q, tree)
+        find_rows(model, q, tree.zero, tree, loops.rows)
+        worst = 0.0
+        for row in range(displacement.shape[0]):
+            worst = max(worst, abs(displacement[row]))
+        if worst <= CLOSED or (attempt > 0 and worst > 0.5 * before):
+            return worst <= ROUNDING
+        before = worst
+        weigh(model, equations)
+        respond(model, equations, loops)
+        for row in range(displacement.shape[0]):
+            loops.system[row, displacement.shape[0]] = -displacement[row]
+        push_loops(loops, q)
+    return False
+
+
+@kernel
+def steady_loops(model: Model, q: Floats, equations: Equations, loops: Loops, v: Floats) -> None:
+    """Take from velocities what tears at the loops, as an impact would."""
+    tree = equations.tree
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    find_rows(model, q, v, tree, loops.rows)
+    weigh(model, equations)
+    respond(model, equations, loops)
+    rows = loops.unknown.shape[0]
+    for row in range(rows):
+        loops.system[row, rows] = -speed_along(row, loops, v)
+    push_loops(loops, v)

@@ -1,0 +1,395 @@
+"""Bridges: impulsive steps where events pile up and time does not move on.
+
+Chatter, contact forces that no mode explains, modes that contradict each other within rounding: in
+all of these the motion goes on, but not as smooth phases between events. One step of time stepping
+does not ask for modes. At its end, contacts that touch must not approach, others not go through::
+
+    w = G λ + b,   b = J v + h (J a_f + J̇ v),   b_n more by e J_n v,  or by gap / h where it is open
+
+with a_f the acceleration that the known forces lead to. It is kept as short as suffices: each
+further one without progress is longer. The impulses act at its beginning, as those of an impact;
+then the robot moves on freely to its end, where a smooth phase begins again. Impulses that make
+energy are refused, with restitution first and then without. Two bridges of half the length tell how
+far a bridge may be wrong: its order is one.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel
+from heelstrike.contact.modes import OPEN, SOLVED, STICK
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.geometry import (
+    add_impulse,
+    assemble_delassus,
+    evaluate_equations,
+    row_product,
+)
+from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
+from heelstrike.sim.event_driven.faces import (
+    NO_FACE,
+    closes_corner,
+    distance_to,
+    locate,
+    locate_on_face,
+    nearest_face,
+)
+from heelstrike.sim.event_driven.gaps import (
+    free_gap_acceleration,
+    gap_now,
+    gap_rows,
+    gap_velocity,
+)
+from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
+from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.rows import write_row
+from heelstrike.sim.frame import Scene
+from heelstrike.sim.memory import Assembly, Memory, Reported
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
+
+BRIDGE = int(EventKind.BRIDGE)
+
+# Length (s) of the first bridge of a series, how much longer each further one is, and how many
+# there may be; progress (s) that ends a series.
+SHORTEST_BRIDGE = 1e-6
+LONGER = 4.0
+MOST_BRIDGES = 10
+PROGRESS = 1e-3
+# Gap (m) up to which a contact touches; speed (m/s, rad/s) at which another might within a bridge.
+TOUCHING = 1e-9
+CLOSING_SPEED = 20.0
+# Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
+SLOW = 1e-3
+# The two halves of a bridge of order one are half as wrong as the whole.
+SAFETY = 2.0
+# Slopes of the step to come, where states can be kept until then.
+HERE, HALVED = 2, 3
+
+
+@kernel
+def write_free(
+    gap: float, length: float, contact: int, place: int, model: Model, phase: Phase, memory: Memory
+) -> None:
+    """Make a contact a candidate: what is left of its gap may still close, at leisure.
+
+    The free acceleration is in ``equations.rate``. What is no velocity of the normal free term
+    goes to ``phase.lean``, too.
+    """
+    assembly, v = memory.assembly, phase.begin[model.nq :]
+    free, jacobian = assembly.problem.free, assembly.jacobian
+    free_gap_acceleration(model, memory.contacts, memory.equations, contact, place, phase, assembly)
+    for row in range(2 * place, 2 * place + 2):
+        free[row] = row_product(jacobian, row, v) + length * free[row]
+    phase.lean[place] = gap / length if gap > TOUCHING else 0.0
+    free[2 * place] += phase.lean[place]
+    if contact >= phase.first_dry:
+        assembly.problem.bound[place] *= length
+    assembly.candidate[place] = contact
+
+
+@kernel
+def gather_near(model: Model, length: float, bouncing: bool, phase: Phase, memory: Memory) -> int:
+    """List what could touch within a bridge, and dry joints, with Jacobian rows and free terms.
+
+    The free velocity is in ``phase.trial``. Returns how many.
+    """
+    assembly, state, trial = memory.assembly, phase.begin, phase.trial
+    jacobian, restitution = assembly.jacobian, memory.surface.restitution
+    count = 0
+    for contact in range(phase.closed.shape[0]):
+        if contact < model.nc and phase.passing[contact] == 1:
+            continue
+        gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
+        if contact >= phase.first_dry:
+            write_free(0.0, length, contact, count, model, phase, memory)
+            count += 1
+            continue
+        gap = gap_now(contact, memory.contacts, phase, state)
+        normal = row_product(jacobian, 2 * count, trial[model.nq :])
+        if gap > length * max(CLOSING_SPEED, -2.0 * normal):
+            continue
+        write_free(gap, length, contact, count, model, phase, memory)
+        came = row_product(jacobian, 2 * count, state[model.nq :])
+        if bouncing and gap <= TOUCHING and came < -SLOW:
+            phase.lean[count] = restitution[contact] * came
+            assembly.problem.free[2 * count] += phase.lean[count]
+        count += 1
+    return count
+
+
+@kernel
+def gather_corners(
+    model: Model, ground: GroundModel, length: float, count: int, memory: Memory, phase: Phase
+) -> int:
+    """Add the other faces of concave corners that candidates are in, as far as there is room.
+
+    The face of each goes to ``phase.row``. Returns how many candidates there are then.
+    """
+    assembly, contacts, surface = memory.assembly, memory.contacts, memory.surface
+    tree, scratch = memory.equations.tree, phase.scratch[0]
+    first = count
+    room = assembly.candidate.shape[0] - memory.loops.unknown.shape[0]
+    for place in range(first):
+        contact = assembly.candidate[place]
+        if contact >= model.nc:
+            continue
+        radius, position = model.contact_radius[contact], contacts.position[contact]
+        normal = contacts.normal[contact]
+        scratch[0], scratch[1] = normal[0], normal[1]
+        x, z = position[0] + radius * normal[0], position[1] + radius * normal[1]
+        gap, friction = contacts.gap[contact], surface.friction[contact]
+        restitution, face = surface.restitution[contact], phase.face[contact]
+        if face == NO_FACE:
+            face = nearest_face(ground, x, z, radius)
+        for other in range(ground.friction.shape[0]):
+            far = distance_to(ground, other, x, z) - radius > length * CLOSING_SPEED
+            if far or count == room:
+                continue
+            if closes_corner(ground, face, other, x, z, radius):
+                locate_on_face(model, ground, tree, contact, 2 * other, contacts, surface)
+                gap_rows(model, tree, contacts, phase, contact, count, assembly)
+                gap_there = contacts.gap[contact]
+                write_free(gap_there, length, contact, count, model, phase, memory)
+                phase.row[count] = 2 * other
+                count += 1
+        normal[0], normal[1] = scratch[0], scratch[1]
+        position[0], position[1] = x - radius * normal[0], z - radius * normal[1]
+        contacts.gap[contact] = gap
+        surface.friction[contact] = friction
+        surface.restitution[contact] = restitution
+    return count
+
+
+@kernel
+def collect_impulses(
+    ground: GroundModel, first: int, count: int, memory: Memory, phase: Phase
+) -> None:
+    """Write what the bridge found: impulses in the frames of the contact points, and modes.
+
+    From candidate `first` on they are other faces of points in corners.
+    """
+    assembly, mode = memory.assembly, memory.reaction.mode
+    normals, nv = memory.contacts.normal, phase.begin.shape[0] // 2
+    for place in range(count):
+        contact, found = assembly.candidate[place], assembly.answer.mode[place]
+        press, rub = assembly.answer.impulse[2 * place], assembly.answer.impulse[2 * place + 1]
+        if place >= first:
+            own, its = normals[contact], ground.normal[phase.row[place] // 2]
+            cosine, sine = own[0] * its[0] + own[1] * its[1], own[0] * its[1] - own[1] * its[0]
+            press, rub = cosine * press + sine * rub, cosine * rub - sine * press
+        phase.impulse[contact, 0] += press
+        phase.impulse[contact, 1] += rub
+        leaves = row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING
+        if mode[contact] == OPEN and not leaves:
+            mode[contact] = found
+
+
+@kernel
+def made_energy(count: int, assembly: Assembly, phase: Phase) -> bool:
+    """Whether the impulses, beside what the known forces did, made energy."""
+    delassus, impulse = assembly.problem.delassus, assembly.answer.impulse
+    made = 0.0
+    through = 0.0
+    for row in range(2 * count):
+        before = assembly.problem.free[row]
+        if row % 2 == 0:
+            before -= phase.lean[row // 2]
+        after = before
+        for column in range(2 * count):
+            after += delassus[row, column] * impulse[column]
+        made += impulse[row] * (before + after)
+        through += abs(impulse[row]) * (abs(before) + abs(after))
+    return made > NOTICEABLE * through
+
+
+@kernel
+def find_impulses(
+    scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase
+) -> bool:
+    """Find a bridge of some length from ``phase.begin`` to ``phase.end``; return success.
+
+    The velocities behind the impulses of the contacts go to ``phase.trial``, the impulses to
+    ``phase.impulse``, what the contacts do at the end of it to ``memory.reaction.mode``.
+    """
+    model, equations, assembly = scene.model, memory.equations, memory.assembly
+    begin, end, trial, answer = phase.begin, phase.end, phase.trial, memory.assembly.answer
+    evaluate(scene, phase.time, begin, control, memory, phase, phase.slopes[0])
+    for contact in range(phase.first_dry, phase.closed.shape[0]):
+        phase.slide[contact] = 0
+    free_acceleration(model, begin, memory.torque, phase, memory.pushes, equations)
+    for i in range(model.nv):
+        trial[model.nq + i] = begin[model.nq + i] + length * equations.rate[i]
+        end[model.nq + i] = trial[model.nq + i]
+    for contact in range(phase.closed.shape[0]):
+        memory.reaction.mode[contact] = OPEN
+        phase.impulse[contact, 0] = 0.0
+        phase.impulse[contact, 1] = 0.0
+    first = gather_near(model, length, bouncing, phase, memory)
+    count = gather_corners(model, scene.ground, length, first, memory, phase)
+    total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
+    free_loops(total, memory.loops, trial[model.nq :], 0.5 * length, assembly)
+    for place in range(count, total):
+        phase.lean[place] = 0.0
+    if total > 0:
+        assemble_delassus(model, total, equations, assembly)
+        guess, friction = memory.reaction.mode, memory.surface.friction
+        status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
+        note_residual(answer.residual, memory.tally)
+        if status != SOLVED:
+            return False
+        if made_energy(total, assembly, phase):
+            return False
+        add_impulse(model, assembly, total, equations, end[model.nq :])
+    collect_impulses(scene.ground, first, count, memory, phase)
+    for place in range(count):
+        if assembly.candidate[place] >= phase.first_dry:  # a finite force works on the way
+            answer.impulse[2 * place] = 0.0
+            answer.impulse[2 * place + 1] = 0.0
+    finite = True
+    for i in range(model.nv):
+        end[i] = begin[i] + length * end[model.nq + i]
+        finite = finite and np.isfinite(end[i])
+        trial[i] = begin[i]
+        trial[model.nq + i] = begin[model.nq + i]
+    if total > 0:
+        add_impulse(model, assembly, total, equations, trial[model.nq :])
+    return finite
+
+
+@kernel
+def copy_state(source: Floats, state: Floats) -> None:
+    """Copy a state (q, v)."""
+    for i in range(source.shape[0]):
+        state[i] = source[i]
+
+
+@kernel
+def halves_end(
+    scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase,
+    end: Floats,
+) -> bool:  # fmt: skip
+    """Write where two bridges of half the length end; return whether there are such."""
+    here = phase.slopes[HERE]
+    copy_state(phase.begin, here)
+    found = True
+    for _ in range(2):
+        found = found and find_impulses(scene, 0.5 * length, bouncing, control, memory, phase)
+        copy_state(phase.end, phase.begin)
+    copy_state(phase.begin, end)
+    copy_state(here, phase.begin)
+    return found
+
+
+@kernel
+def find_bridge(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> tuple[bool, float]:
+    """Find a bridge of some length; return success, and how far its end may be wrong."""
+    other = phase.slopes[HALVED]
+    for attempt in range(2):
+        bouncing = attempt == 0
+        sure = halves_end(scene, length, bouncing, control, memory, phase, other)
+        if find_impulses(scene, length, bouncing, control, memory, phase):
+            wrong = 0.0
+            for i in range(other.shape[0]):
+                apart = phase.end[i] - (other[i] if sure else phase.begin[i])
+                wrong = max(wrong, SAFETY * abs(apart))
+            return True, wrong
+    return False, 0.0
+
+
+@kernel
+def report_impulses(
+    model: Model, wrong: float, phase: Phase, reported: Reported, record: Record
+) -> None:
+    """Append the bridge to the events, and the impulses of the contacts."""
+    log_event(phase.time, BRIDGE, 0, phase.length, wrong, record)
+    for contact in range(phase.first_dry):
+        normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
+        if not normal > 0.0:
+            continue
+        if contact >= model.nc:
+            joint = phase.stop_joint[contact - model.nc]
+            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
+            reported.closed[contact] = 1
+            continue
+        kind = IMPACT
+        if reported.closed[contact] == 0:
+            kind = TOUCHDOWN
+            reported.closed[contact] = 1
+            reported.slipping[contact] = 0
+        log_event(phase.time, kind, contact, normal, tangent, record)
+
+
+@kernel
+def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:
+    """Let the contacts do at the end of the bridge what it found."""
+    tree, contacts, mode = memory.equations.tree, memory.contacts, memory.reaction.mode
+    evaluate_equations(model, phase.begin[: model.nq], phase.begin[model.nq :], memory.equations)
+    for contact in range(model.nc):
+        phase.face[contact] = NO_FACE
+    locate(model, ground, tree, phase, contacts, memory.surface)
+    for contact in range(phase.closed.shape[0]):
+        phase.stuck[contact] = 0
+        phase.slide[contact] = 0
+        if contact >= phase.first_dry:
+            if mode[contact] != STICK:
+                joint = phase.dry_joint[contact - phase.first_dry]
+                phase.slide[contact] = heading(phase.begin[model.nq + joint])
+            continue
+        touches = gap_now(contact, contacts, phase, phase.begin) <= TOUCHING
+        phase.closed[contact] = 1 if touches and mode[contact] != OPEN else 0
+        if phase.closed[contact] == 1 and mode[contact] != STICK:
+            _, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
+            phase.slide[contact] = heading(tangent)
+
+
+@kernel
+def cross(
+    scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, record: Record
+) -> bool:
+    """Lay a bridge from now on, to `stop` at the longest; return success.
+
+    ``phase.begin`` becomes the state at its end, ``phase.length`` its length.
+    """
+    model = scene.model
+    if phase.last_row < phase.time:
+        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    if phase.time - phase.series >= PROGRESS:
+        phase.series = phase.time
+        phase.bridges = 0
+    found = False
+    wrong = 0.0
+    while not found and phase.bridges < MOST_BRIDGES:
+        wish = SHORTEST_BRIDGE * LONGER**phase.bridges
+        phase.length = min(wish, stop - phase.time)
+        found, wrong = find_bridge(scene, phase.length, control, memory, phase)
+        if phase.length == wish or not found:
+            phase.bridges += 1
+    if not found:
+        return False
+    report_impulses(model, wrong, phase, memory.reported, record)
+    for contact in range(phase.closed.shape[0]):
+        if contact < phase.first_dry:
+            phase.closed[contact] = 0
+        phase.carrier[contact] = 0
+        phase.holder[contact] = 0
+    for i in range(model.nv):
+        phase.begin[model.nq + i] = phase.trial[model.nq + i]
+    row = record.rows
+    write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    for dry in range(phase.dry_joint.shape[0]):
+        torque = phase.impulse[phase.first_dry + dry, 1] / phase.length
+        record.friction_torque[row, phase.dry_joint[dry]] = torque
+    for i in range(phase.begin.shape[0]):
+        phase.begin[i] = phase.end[i]
+    adopt_end(model, scene.ground, memory, phase)
+    phase.bridging = 0
+    return True

@@ -1,0 +1,121 @@
+"""Rows of the record of an event-driven run: at events, and in between from the dense output."""
+
+from __future__ import annotations
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.contacts.loops import note_loops
+from heelstrike.sim.controller.control import Control
+from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
+from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
+from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.frame import Scene
+from heelstrike.sim.memory import Memory
+from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import note_residual, note_row
+
+# Rows that an instant may add: one due before it, two of an event, one at the end.
+ROWS_OF_AN_INSTANT = 4
+
+
+@kernel
+def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
+    """Write a state to a row, where no force acts as yet."""
+    for i in range(model.nv):
+        record.position[row, i] = state[i]
+        record.velocity[row, i] = state[model.nq + i]
+        record.stop_torque[row, i] = 0.0
+        record.friction_torque[row, i] = 0.0
+    for contact in range(model.nc):
+        record.contact_force[row, contact, 0] = 0.0
+        record.contact_force[row, contact, 1] = 0.0
+        record.slip_velocity[row, contact] = 0.0
+
+
+@kernel
+def write_row(
+    scene: Scene, time: float, state: Floats, control: Control, memory: Memory, phase: Phase,
+    record: Record,
+) -> None:  # fmt: skip
+    """Append a state, put on its constraints, with the certified contact forces in it."""
+    model, contacts, assembly = scene.model, memory.contacts, memory.assembly
+    trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
+    for i in range(state.shape[0]):
+        trial[i] = state[i]
+    project(model, scene.ground, memory, phase, trial)
+    if not explained(state, trial, INTERPOLATED, phase):
+        for i in range(state.shape[0]):
+            trial[i] = state[i]
+    evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
+    for k in range(3):
+        residual[k] = 0.0
+    count, loops = phase.closed_count, memory.loops.unknown.shape[0]
+    if count + loops > 0:
+        friction, guess = memory.surface.friction, memory.reaction.mode
+        solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
+        note_residual(residual, memory.tally)
+        note_loops(model, count + loops, impulse, memory.loops)
+    row, friction_torque = record.rows, record.friction_torque[record.rows]
+    note_row(time, memory, record)
+    note_state(model, row, trial, record)
+    slide = phase.slide[phase.first_dry :]
+    dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
+    for contact in range(model.nc):
+        if phase.passing[contact] == 0:
+            memory.tally.penetration = max(memory.tally.penetration, -contacts.gap[contact])
+    for place in range(count):
+        contact = assembly.candidate[place]
+        normal, tangent = impulse[2 * place], impulse[2 * place + 1]
+        if contact >= phase.first_dry:
+            friction_torque[phase.dry_joint[contact - phase.first_dry]] = tangent
+        elif contact >= model.nc:
+            stop = contact - model.nc
+            record.stop_torque[row, phase.stop_joint[stop]] += phase.stop_side[stop] * normal
+        else:
+            record.contact_force[row, contact, 0] = normal
+            record.contact_force[row, contact, 1] = tangent
+            _, record.slip_velocity[row, contact] = contact_velocity(
+                model, memory.equations.tree, contacts, contact
+            )
+    phase.last_row = time
+    period = phase.output_period * phase.row_every
+    if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:
+        phase.next_row += 1
+
+
+@kernel
+def write_rows_within(
+    scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
+) -> bool:
+    """Append the rows due within the finished step; return whether there was room for all.
+
+    An event at its end has rows of its own, one before it if velocities may jump.
+    """
+    period = phase.output_period * phase.row_every
+    last = phase.time + phase.length
+    touch = False
+    if phase.has_fired == 1:
+        last -= 1e-12
+        for contact in range(phase.closed.shape[0]):
+            touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+    state = phase.slopes[SLOPES - 1]
+    while True:
+        time = phase.next_row * period
+        part = (time - phase.time) / phase.length
+        if not (period > 0.0 and time <= last):
+            if not touch:
+                return True
+            touch = False
+            time = phase.time + phase.length
+            part = 1.0
+        if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
+            return False
+        if part < 1.0:
+            interpolate(part, phase.begin, phase.dense, state)
+        else:  # the end has been put on its constraints, and on the event
+            for i in range(state.shape[0]):
+                state[i] = phase.end[i]
+        write_row(scene, time, state, control, memory, phase, record)

@@ -1,0 +1,101 @@
+"""The second face that a contact point touches in a concave corner of the ground.
+
+A point has one gap and one normal, those of the nearest face. Where the ground turns upwards, it is
+held by two: so there the contact problem has a second group of rows for it. What both faces push
+with is recorded as one force, in the frame of the nearest face, at the place where the resultant's
+line of action leaves the disc.
+
+Corners are numbered on from the joint stops. Convex ground has none.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.ground import GroundModel, second_contact
+from heelstrike.dynamics.frames import into_frame, out_of_frame
+from heelstrike.dynamics.kernels import point_position
+from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.interface import Contacts
+
+Floats = NDArray[np.float64]
+
+
+class Corner(Bundle):
+    """The second faces of the contact points.
+
+    Attributes
+    ----------
+    near, count : int
+        How many points have one now; how many of these take part in the step.
+    contacts : Contacts
+        The points on them; the gap is infinite where there is none.
+    friction, restitution : (nc,) float
+    mode : (nc,) int
+        Contact mode of the last solve, the guess of the next.
+    """
+
+    near: int = cell(int)
+    count: int = cell(int)
+    contacts: Contacts = part(Contacts)
+    friction: Floats = array("nc")
+    restitution: Floats = array("nc")
+    mode: Integers = array("nc", of=int)
+
+
+def allocate_corner(robot: Robot) -> Corner:
+    """Allocate it for a robot, of which no point is in a corner."""
+    extents = {**robot.model.extents, "components": 2}
+    contacts = Contacts.allocate(extents, gap=np.full(robot.nc, np.inf))
+    return Corner.allocate(extents, contacts=contacts)
+
+
+@kernel
+def locate_corners(model: Model, ground: GroundModel, tree: Workspace, corner: Corner) -> None:
+    """Find the second faces of the contact points."""
+    contacts = corner.contacts
+    corner.near = 0
+    for i in range(model.nc):
+        point, normal, radius = contacts.position[i], contacts.normal[i], model.contact_radius[i]
+        point_position(tree, model.contact_link[i], model.contact_position[i], point)
+        contacts.gap[i], corner.friction[i], corner.restitution[i] = second_contact(
+            ground, point[0], point[1], radius, normal
+        )
+        point[0] -= radius * normal[0]
+        point[1] -= radius * normal[1]
+        corner.near += contacts.gap[i] < np.inf
+        contacts.force[i, 0] = 0.0
+        contacts.force[i, 1] = 0.0
+
+
+@kernel
+def join_forces(model: Model, corner: Corner, contacts: Contacts) -> None:
+    """Put the forces of both faces of every point into one, and that where it acts.
+
+    About the centre of the disc only friction has a moment, r λ_t of either face. The resultant of
+    forces that nearly cancel each other, as those of a wedge, may act off the disc.
+    """
+    for i in range(model.nc):
+        other = corner.contacts.force[i]
+        if other[0] == 0.0 and other[1] == 0.0:
+            continue
+        normal, force, point = contacts.normal[i], contacts.force[i], contacts.position[i]
+        radius = model.contact_radius[i]
+        own_x, own_z = out_of_frame(normal, (force[0], force[1]))
+        x, z = out_of_frame(corner.contacts.normal[i], (other[0], other[1]))
+        x, z = own_x + x, own_z + z
+        moment = radius * (force[1] + other[1])
+        size = math.sqrt(x * x + z * z)
+        if size > 0.0:
+            lever = moment / size
+            depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
+            point[0] += radius * normal[0] + (lever * z - depth * x) / size
+            point[1] += radius * normal[1] + (-lever * x - depth * z) / size
+        force[0], force[1] = into_frame(normal, (x, z))

@@ -1,0 +1,259 @@
+"""What a viewer gets of an instant: one vector of numbers, whose layout it is told once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.friction import friction_use
+from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
+from heelstrike.analysis.motion import Motion, in_world, run_motion
+from heelstrike.analysis.support import foot_sums
+from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.push import Push
+from heelstrike.sim.run import QUANTITIES, Run
+from heelstrike.view.drawing import legs
+from heelstrike.view.live.history import SAME
+from heelstrike.view.page.motion import frames as drawn
+from heelstrike.view.style import in_words
+
+Floats = NDArray[np.float64]
+
+MOST_PUSHES = 4
+"""Pushes that are drawn at once."""
+DASHED, DOTTED = 1, 2
+SIDES = ("left", "right")
+ROOM = 0.15
+"""Share of a sole's length that its plot shows beyond either end."""
+
+
+class Layout:
+    """Where in the vector of a frame each quantity of a robot is.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        nc, feet = robot.nc, len(robot.feet)
+        self.robot = robot
+        self.joints = robot.model.actuator_joint if robot.nu else np.arange(robot.nq)
+        self.widths = {
+            "time": 1, "pose": 3 * robot.nl, "point": 2 * nc, "normal": 2 * nc, "force": 2 * nc,
+            "friction": nc, "center": 2, "capture": 2, "pressure": 2, "support": 4,
+            "push": 4 * MOST_PUSHES, "joint": len(self.joints), "torque": robot.nu,
+            "ahead": feet, "pressing": feet, "dragging": feet, "used": feet,
+            "energy": 3,
+        }  # fmt: skip
+        self.width = sum(self.widths.values())
+        ends = np.cumsum(list(self.widths.values())).tolist()
+        self.begin = {
+            name: end - self.widths[name] for name, end in zip(self.widths, ends, strict=True)
+        }
+
+    def described(self) -> dict[str, Any]:
+        """Return where each quantity begins and how many numbers it has, and what is plotted."""
+        return {
+            "width": self.width,
+            "fields": {name: [self.begin[name], wide] for name, wide in self.widths.items()},
+            "panels": self._panels(),
+        }
+
+    def frames(self, run: Run, rows: Sequence[int], pushes: Iterable[Push]) -> Floats:
+        """Return the frames of some rows but the first, (len(rows) − 1, width).
+
+        Contact forces are means since the row before, impulses of impacts included, so that what
+        pushes for one step is seen; where there is no time between, those of the row itself, which
+        act from it on.
+
+        Parameters
+        ----------
+        run : Run
+            Rows and events.
+        rows : sequence of int
+            Their indices, in order; the first is where the means begin.
+        pushes : iterable of Push
+            What pushes the robot.
+        """
+        rows_shown = np.asarray(rows[1:], dtype=np.int64)
+        each = _only(run, rows_shown, mean_forces(run, np.asarray(rows, dtype=np.int64)))
+        every = np.arange(len(rows_shown))
+        motion = run_motion(each)
+        zmp = zero_moment_point(each, motion=motion)
+        sums = foot_sums(each, each.contact_force)
+        found = {
+            **drawn(each, every, motion, zmp),
+            "time": each.time,
+            "force": each.world_force,
+            "push": self._pushes(run.time[np.asarray(rows[:-1])], each.time, motion, pushes),
+            "joint": each.position[:, self.joints],
+            "torque": each.torque,
+            "ahead": zmp.foot,
+            "pressing": sums[..., 0] if sums.size else np.zeros((len(every), 0)),
+            "dragging": sums[..., 1] if sums.size else np.zeros((len(every), 0)),
+            "used": friction_use(each).foot,
+            "energy": np.stack(
+                (motion.kinetic, motion.potential, motion.kinetic + motion.potential), axis=-1
+            ),
+        }
+        table = np.empty((len(every), self.width))
+        for name, begin in self.begin.items():
+            wide = self.widths[name]
+            table[:, begin : begin + wide] = found[name].reshape(len(every), wide)
+        return table
+
+    def _pushes(
+        self, since: Floats, until: Floats, motion: Motion, pushes: Iterable[Push]
+    ) -> Floats:
+        """Where those pushes act that did between some times, (n, 4 a push) in m and N, or NaN."""
+        table = np.full((len(until), MOST_PUSHES, 4), np.nan)
+        used = np.zeros(len(until), dtype=np.int64)
+        for push in pushes:
+            if push.end <= since[0] or push.start >= until[-1]:
+                continue
+            acted = (push.start < until - SAME) & (push.end > since + SAME)
+            for row in np.flatnonzero(acted & (used < MOST_PUSHES)).tolist():
+                link, place = push.place(self.robot)
+                pose = motion.link_origin[row, link], motion.link_angle[row, link]
+                table[row, used[row]] = (*in_world(*pose, np.array(place)), *push.force)
+                used[row] += 1
+        return table
+
+    def _panels(self) -> list[dict[str, Any]]:
+        """Plots beside the picture, each curve with its place in a frame."""
+        robot = self.robot
+        found = [*self._of_joints("joint", "rad", "m", self.joints)]
+        if robot.nu:
+            found += self._of_joints("torque", "N m", "N", self.joints)
+        if robot.feet:
+            heel, toe = zero_moment_point_limits(robot)
+            room = ROOM * max(toe - heel, 1e-3)
+            span = {"span": [heel - room, toe + room]} if toe > heel else {}
+            found += [
+                {
+                    "title": "zero moment point, from ankle", "unit": "m", "group": "feet",
+                    "curves": self._of_feet("ahead"), **span,
+                    "limits": [{"label": "heel", "level": heel}, {"label": "toe", "level": toe}],
+                },
+                {
+                    "title": "normal force", "unit": "N", "group": "feet",
+                    "curves": self._of_feet("pressing"),
+                    "limits": [{"label": "weight", "level": robot.weight}],
+                },
+                {
+                    "title": "tangential force", "unit": "N", "group": "feet",
+                    "curves": self._of_feet("dragging"), "limits": [],
+                },
+                {
+                    "title": "friction, share of cone", "unit": "1", "group": "feet",
+                    "curves": self._of_feet("used"), "span": [-0.05, 1.1],
+                    "limits": [{"label": "edge of the cone", "level": 1.0}],
+                },
+            ]  # fmt: skip
+        begin = self.begin["energy"]
+        look = {"foot": -1, "dash": 0}
+        kinetic = [look | {"label": "", "color": 0, "at": begin}]
+        others = [
+            look | {"label": "potential", "dash": DASHED, "color": 1, "at": begin + 1},
+            look | {"label": "mechanical", "at": begin + 2},
+        ]
+        found += [
+            {"title": title, "unit": "J", "group": "energy", "curves": curves, "limits": []}
+            for title, curves in (
+                ("kinetic energy", kinetic),
+                ("potential and mechanical energy", others),
+            )
+        ]
+        return found
+
+    def _of_joints(
+        self, field: str, angular: str, linear: str, joints: Sequence[int] | NDArray[np.int64]
+    ) -> list[dict[str, Any]]:
+        """One panel for the joints that differ by their side only, such as both knees."""
+        robot, model = self.robot, self.robot.model
+        names = robot.actuator_names if robot.nu else robot.joint_names
+        leg = legs(robot)
+        panels: dict[tuple[str, str], dict[str, Any]] = {}
+        for i, joint in enumerate(int(j) for j in joints):
+            words = in_words(names[i]).split()
+            alike = " ".join(word for word in words if word.lower() not in SIDES)
+            side = " ".join(word for word in words if word.lower() in SIDES)
+            unit = angular if model.axis[joint, 0] != 0.0 else linear
+            panel = panels.setdefault(
+                (alike, unit),
+                {
+                    "title": f"{alike or names[i]}{' torque' if field == 'torque' else ''}",
+                    "unit": unit,
+                    "group": f"{'torques' if field == 'torque' else 'joints'}",
+                    "curves": [],
+                    "limits": [],
+                    "steps": field == "torque",
+                },
+            )
+            foot = int(leg[joint])
+            panel["curves"].append(
+                {
+                    "label": side or " ".join(words),
+                    "foot": foot,
+                    "dash": DASHED if foot > 0 else 0,
+                    "at": self.begin[field] + i,
+                }
+            )
+            if field == "torque":
+                levels = (float(model.torque_lower[i]), float(model.torque_upper[i]))
+                known = {limit["level"] for limit in panel["limits"]}
+                panel["limits"] += [
+                    {"label": "limit", "level": level}
+                    for level in levels
+                    if np.isfinite(level) and level not in known
+                ]
+        for panel in panels.values():
+            if panel["limits"]:
+                ends = " … ".join(f"{limit['level']:g}" for limit in panel["limits"])
+                panel["title"] += f", limits {ends}".replace("-", "−")
+        return list(panels.values())
+
+    def _of_feet(self, field: str) -> list[dict[str, Any]]:
+        return [
+            {
+                "label": in_words(foot.name), "foot": i, "dash": DASHED if i else 0,
+                "at": self.begin[field] + i,
+            }
+            for i, foot in enumerate(self.robot.feet)
+        ]  # fmt: skip
+
+
+def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:
+    """Contact forces (normal, tangent) since the row before, of all of `rows` but the first, in N.
+
+    Where no time lies between two rows, those of the later one.
+    """
+    found = run.contact_force[rows[1:]].copy()
+    elapsed = np.diff(run.time[rows])
+    lasting = np.flatnonzero(elapsed > 0.0)
+    if not len(lasting):
+        return found
+    held = np.diff(run.time)[:, None, None]
+    gained = mean_over_intervals(run, run.contact_force) * held
+    if run.method.impulses_in_events:
+        jumps = event_impulse(run)
+        nx, nz = run.contact_normal[:-1, :, 0], run.contact_normal[:-1, :, 1]
+        along = jumps[..., 0] * nx + jumps[..., 1] * nz, jumps[..., 0] * nz - jumps[..., 1] * nx
+        gained = gained + np.stack(along, axis=-1)
+    impulse = np.concatenate((np.zeros((1, *gained.shape[1:])), np.cumsum(gained, axis=0)))
+    total = impulse[rows[lasting + 1]] - impulse[rows[lasting]]
+    found[lasting] = total / elapsed[lasting, None, None]
+    return found
+
+
+def _only(run: Run, rows: NDArray[np.int64], forces: Floats) -> Run:
+    """Return a run of some rows, with forces (n, nc, 2) of its own."""
+    kept = {name: getattr(run, name)[rows] for name in ("time", *QUANTITIES)}
+    return replace(run, **kept | {"contact_force": forces}, pushes=())

@@ -1,0 +1,149 @@
+"""A simulation that goes on, is pushed, and can be taken back to where it was."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+
+from heelstrike.contact.ground import Ground
+from heelstrike.errors import SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.push import Push, pushes_of_numbers
+from heelstrike.sim.run import Run
+from heelstrike.sim.simulation import CAN_GO_ON, Simulation
+from heelstrike.sim.snapshot import Snapshot
+from heelstrike.view.live.stage import snapshot_of
+
+KEEP_EVERY = 0.25
+"""Simulated seconds between two snapshots."""
+MOST_SNAPSHOTS = 400
+"""Of some 0.2 MB each."""
+MOST_PUSHES = 2000
+
+Hold = tuple[int, tuple[float, float], tuple[float, float]]
+
+
+class LiveSimulation:
+    """A simulation with its pushes and with snapshots of its past.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        The simulation; its record is taken from it piece by piece.
+
+    Attributes
+    ----------
+    held : dict
+        Link, point in its axes (m) and force (N) of what each viewer pulls at.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self.held: dict[str, Hold] = {}
+        self._given: tuple[Push, ...] | None = None
+        self._added: tuple[Push, ...] = ()
+        self._snapshots: list[Snapshot] = []
+        self._last = self.time
+        self._keep()
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.simulation.robot
+
+    @property
+    def time(self) -> float:
+        """Now, in s."""
+        return self.simulation.time
+
+    @property
+    def can_go_on(self) -> bool:
+        """Whether it has not come to its end."""
+        return self.simulation.status in CAN_GO_ON
+
+    @property
+    def returns(self) -> bool:
+        """Whether it can be taken back."""
+        return bool(self._snapshots)
+
+    @property
+    def pushes(self) -> tuple[Push, ...]:
+        """All that pushed or will, of those added the last `MOST_PUSHES`."""
+        return (*(self._given or ()), *self._added)
+
+    @property
+    def message(self) -> str:
+        """How it goes, in words."""
+        return self.simulation.message
+
+    def record(self) -> Run:
+        """Return what it has recorded since it was last asked."""
+        run = self.simulation.record
+        if self._given is None:
+            self._given = run.pushes
+        self.simulation.forget()
+        return run
+
+    def advance(self, until: float | None) -> Run | None:
+        """Go on to about a time (s), or by one step; return what was recorded.
+
+        None if the next step ends later than that.
+        """
+        method = self.simulation.method
+        if until is None:
+            until = self.time + method.row_period[1]
+        elif method.step_length is not None:
+            steps = int((until - self.time) / method.step_length + 1e-6)
+            until = self.time + steps * method.step_length
+        if until <= self.time:
+            return None
+        for link, point, force in self.held.values():
+            lasts = until - self.time
+            self.push(Push(link, force=force, start=self.time, duration=lasts, point=point))
+        self.simulation.advance(until)
+        if self.time >= self._last + KEEP_EVERY and self.can_go_on:
+            self._keep()
+        return self.record()
+
+    def push(self, push: Push) -> None:
+        """Let a push act, by the index of its link."""
+        self.simulation.apply(push)
+        self._added = (*self._added[-MOST_PUSHES:], push)
+
+    def lay(self, ground: Ground) -> None:
+        """Lay another ground."""
+        self.simulation.ground = ground
+        self._keep()
+
+    def go_back(self, time: float) -> None:
+        """Be again as at an earlier instant (s), and forget what came after.
+
+        Raises
+        ------
+        SimulationError
+            If its controller takes no part in snapshots, or that is too long ago.
+        """
+        times = [snapshot.time for snapshot in self._snapshots]
+        place = bisect_right(times, time + 1e-9) - 1
+        if place < 0:
+            raise SimulationError(
+                "it cannot go on from there: "
+                + ("that is too long ago" if times else "the controller takes no part in snapshots")
+            )
+        del self._snapshots[place + 1 :]
+        snapshot = self._snapshots[place]
+        self.simulation.restore(snapshot)
+        self._last = snapshot.time
+        self._added = tuple(push for push in self._added if push.start < time - 1e-9)
+        known = pushes_of_numbers(snapshot.part("push"))
+        self.simulation.apply([p for p in self._added if p.end > snapshot.time and p not in known])
+        if time > snapshot.time + 1e-9:
+            self.simulation.advance(time)
+        self.simulation.forget()
+
+    def _keep(self) -> None:
+        """Keep how it is now, if it can be kept."""
+        self._last = self.time
+        kept = snapshot_of(self.simulation)
+        if kept is not None:
+            self._snapshots.append(kept)
+            del self._snapshots[: max(len(self._snapshots) - MOST_SNAPSHOTS, 0)]

@@ -1,0 +1,534 @@
+"""A live simulation or a run that is looked at: what its viewers ask for, at the time they see.
+
+One thread owns the simulation. Viewers send commands, which are carried out between two updates;
+what there is to see goes to a :class:`~heelstrike.view.live.board.Board`.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+import threading
+import time as clock_time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from heelstrike.errors import HeelstrikeError
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.push import Push
+from heelstrike.sim.run import Event, Run
+from heelstrike.view.live.board import Board
+from heelstrike.view.live.frames import Layout
+from heelstrike.view.live.history import SAME, History
+from heelstrike.view.live.light import light_of
+from heelstrike.view.live.live_simulation import LiveSimulation
+from heelstrike.view.live.stage import Stage
+from heelstrike.view.page.scene import scene
+from heelstrike.view.style import in_words
+
+UPDATES = 64.0
+"""Updates a second that are offered to viewers."""
+LONGEST = 0.1
+"""Seconds of the clock that are made up for at most; what cannot keep up is slower."""
+RATES = (0.001, 100.0)
+"""Slowest and fastest, in simulated seconds a second."""
+DENSEST = 1.0 / 60.0
+"""Simulated seconds between two frames that are kept, at real time and faster."""
+IDLE = 0.25
+"""Seconds between two looks whether there is something to do, when there was not."""
+SLOW = 0.03
+"""Seconds that one update may take; what takes longer simulates less at a time."""
+WORDS_LAST = 0.5
+"""Seconds that the words of the light stay."""
+RANDOM_PUSH = (0.08, 0.25)
+"""Force of a random push, as shares of the weight."""
+RANDOM_PUSH_LASTS = 0.1
+"""Seconds."""
+
+
+class RefusedError(Exception):
+    """What a viewer asked for that cannot be done, in a person's words."""
+
+
+class Session:
+    """What is watched, and where in its course viewers look.
+
+    Parameters
+    ----------
+    board : Board
+        Where it is shown.
+    stage : Stage, optional
+        Makes the simulation.
+    run : Run, optional
+        What is looked at instead.
+    rate : float
+        Simulated seconds a second.
+    """
+
+    def __init__(
+        self,
+        board: Board,
+        *,
+        stage: Stage | None = None,
+        run: Run | None = None,
+        rate: float = 1.0,
+    ) -> None:
+        self._board, self._stage, self._run = board, stage, run
+        self.values: dict[str, Any] = {}
+        self._controls: list[dict[str, Any]] = []
+        if stage is not None:
+            self._set(stage.fitted({}))
+        self.rate = rate
+        self.playing = True
+        self.cursor = 0.0
+        self.history = History()
+        self.live: LiveSimulation | None = None
+        self._commands: queue.SimpleQueue[tuple[str, dict[str, Any]]] = queue.SimpleQueue()
+        self._closing = threading.Event()
+        self._random = np.random.default_rng(7)
+        self._layout: Layout | None = None
+        self._shown = 0.0  # time of the frame that was kept last
+        self._goal = 0.0
+        self._reached, self._span = rate, 0.05  # of one update, in s
+        self._gained = self._elapsed = 0.0
+        self._note = self._busy = ""
+        self._light, self._light_until = light_of(None), 0.0
+        self._thread = threading.Thread(target=self._go, name="heelstrike-watch", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End, soon."""
+        self._closing.set()
+        self._commands.put(("", {"do": "nothing"}))
+
+    def join(self, timeout: float) -> None:
+        """Wait until it has ended, at most so long (s)."""
+        self._thread.join(timeout)
+
+    def ask(self, viewer: str, command: dict[str, Any]) -> None:
+        """Put a command of a viewer in line; see :meth:`obey`."""
+        self._commands.put((viewer, command))
+
+    def _go(self) -> None:
+        try:
+            self._go_on()
+        except Exception as error:
+            # Of ours: viewers are told, and the terminal gets the rest.
+            self._board.state({"message": f"the view has failed: {error!r}", "playing": False})
+            raise
+
+    def _go_on(self) -> None:
+        self.begin()
+        before = due = clock_time.perf_counter()
+        while not self._closing.is_set():
+            going = self.playing and self._board.watched
+            self._obey_until(due, wait=not going)
+            now = clock_time.perf_counter()
+            if going and self.playing:
+                self.update(now - before)
+                due = max(due + 1.0 / UPDATES, now)
+            else:
+                due = now
+            before = now
+
+    def _obey_until(self, due: float, *, wait: bool) -> None:
+        """Carry out commands until an update is due, or wait for one a while."""
+        while not self._closing.is_set():
+            left = IDLE if wait else due - clock_time.perf_counter()
+            try:
+                viewer, command = self._commands.get(timeout=max(left, 0.0))
+            except queue.Empty:
+                return
+            self.obey(viewer, command)
+            if wait:
+                return
+
+    def obey(self, viewer: str, command: Mapping[str, Any]) -> None:
+        """Carry out a command; what cannot be is told in the state's note.
+
+        Parameters
+        ----------
+        viewer : str
+            Who asks.
+        command : mapping
+            What to ``do``, by the name of a method below, and its arguments.
+        """
+        self._note = ""
+        what = command.get("do")
+        do = _COMMANDS.get(what) if isinstance(what, str) else None
+        try:
+            if do is None:
+                raise RefusedError(f"unknown command {what!r}")
+            if not len(self.history) and do not in _ALWAYS:
+                raise RefusedError("there is nothing to see yet")
+            do(self, viewer, command)
+        except (RefusedError, HeelstrikeError) as refused:
+            self._note = str(refused)
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
+            self._note = f"command {what!r} cannot be read: {error}"
+        self._tell()
+
+    # What viewers ask for
+
+    def _play(self, _: str, command: Mapping[str, Any]) -> None:
+        on = bool(command["on"])
+        if on and self._at_end and (self.live is None or not self.live.can_go_on):
+            if self.live is not None:
+                over = f"{self.live.message}. Begin anew, or go on from an earlier time"
+                raise RefusedError(over)
+            self._move(self.history.time[0])
+        self.playing = on
+        self._goal = self.cursor
+
+    def _step(self, _: str, command: Mapping[str, Any]) -> None:
+        self.playing = False
+        rows = 1 if int(command["rows"]) > 0 else -1
+        row = self.history.row_at(self.cursor) + rows
+        if row < len(self.history):
+            self._move(float(self.history.time[max(row, 0)]))
+        elif self.live is not None and self.live.can_go_on:
+            self._advance(None)
+        self._goal = self.cursor
+
+    def _seek(self, _: str, command: Mapping[str, Any]) -> None:
+        self.playing = False
+        self._move(_finite(command["time"]))
+
+    def _event(self, _: str, command: Mapping[str, Any]) -> None:
+        ahead = int(command["direction"]) > 0
+        kinds = {str(kind) for kind in command.get("kinds", ())}
+        times = sorted(
+            event.time for event in self.history.events if not kinds or _kind(event) in kinds
+        )
+        wanted = [t for t in times if (t > self.cursor + SAME if ahead else t < self.cursor - SAME)]
+        if not wanted:
+            raise RefusedError(
+                f"there is no {'later' if ahead else 'earlier'} event of this kind so far"
+            )
+        self.playing = False
+        self._move(wanted[0] if ahead else wanted[-1])
+        self._note = self._happened(self.cursor)
+
+    def _rate(self, _: str, command: Mapping[str, Any]) -> None:
+        self.rate = min(max(_finite(command["value"]), RATES[0]), RATES[1])
+
+    def _hold(self, viewer: str, command: Mapping[str, Any]) -> None:
+        live = self._needs_live()
+        force = (_finite(command["force"][0]), _finite(command["force"][1]))
+        place = (_finite(command["point"][0]), _finite(command["point"][1]))
+        link = int(command["link"])
+        Push(link, force=force, start=0.0, duration=0.0, point=place).place(live.robot)
+        if not self._at_end:
+            self._go_on_from_cursor()
+        live.held[viewer] = (link, place, force)
+
+    def _release(self, viewer: str, _: Mapping[str, Any]) -> None:
+        if self.live is not None:
+            self.live.held.pop(viewer, None)
+
+    def _random_push(self, *_: Any) -> None:
+        live = self._needs_live()
+        if not self._at_end:
+            self._go_on_from_cursor()
+        robot = live.robot
+        link = int(self._random.choice(np.flatnonzero(robot.model.mass > 0.0)))
+        size = self._random.uniform(*RANDOM_PUSH) * robot.weight
+        turn = self._random.choice([0.0, np.pi]) + self._random.uniform(-0.5, 0.5)
+        force = (float(size * np.cos(turn)), float(size * np.sin(turn)))
+        live.push(Push(link, force=force, start=live.time, duration=RANDOM_PUSH_LASTS))
+        self._note = (
+            f"{size:.3g} N on {in_words(robot.link_names[link])} for {RANDOM_PUSH_LASTS:g} s"
+        )
+
+    def _choose(self, _: str, command: Mapping[str, Any]) -> None:
+        stage = self._needs_stage()
+        name, value = str(command["name"]), command["value"]
+        control = next((c for c in stage.controls(self.values) if c.name == name), None)
+        if control is None or not control.accepts(value):
+            raise RefusedError(f"{name} cannot be {value!r}")
+        kept = {each: v for each, v in self.values.items() if each not in control.resets}
+        chosen = stage.fitted(kept | {name: value})
+        if control.at_once:
+            live = self._needs_live()
+            live.lay(stage.ground(chosen, live.simulation))
+            self._set(chosen)
+        else:
+            self.begin(chosen)
+
+    def _set(self, values: dict[str, Any]) -> None:
+        """Have other values, and the controls that go with them."""
+        self.values = values
+        self._controls = [c.described() for c in self._needs_stage().controls(values)]
+
+    def _reset(self, *_: Any) -> None:
+        if self._stage is None:
+            self._move(self.history.time[0])
+        else:
+            self.begin()
+
+    def _resume(self, *_: Any) -> None:
+        self._needs_live()
+        if not self._at_end:
+            self._go_on_from_cursor()
+        self._goal = self.cursor
+        self.playing = True
+
+    def _leave(self, viewer: str, command: Mapping[str, Any]) -> None:
+        self._release(viewer, command)
+
+    def _nothing(self, *_: Any) -> None:
+        """Only look what there is."""
+
+    # What happens by itself
+
+    def begin(self, values: Mapping[str, Any] | None = None) -> None:
+        """Begin with the simulation of some values; if there is none, stay with the one before."""
+        wanted = self.values if values is None else dict(values)
+        if self._stage is None:
+            assert self._run is not None
+            self.history.take(self._run)
+            self._show_scene(self._run)
+        else:
+            try:
+                simulation = self._stage.simulation(wanted, self._tell_busy)
+                self._tell_busy("compiling the simulator, once: about 20 s")
+                live = LiveSimulation(simulation)
+                run = live.record()
+                if not len(run.time):  # a controller that is not asked but for good
+                    run = live.advance(None) or run
+            except HeelstrikeError as error:
+                self._note = str(error)
+                return
+            finally:
+                self._tell_busy("")
+            self._set(dict(wanted))
+            self.live, self.history = live, History()
+            self.history.take(run)
+            self._show_scene(run)
+        self._tell()
+
+    def _show_scene(self, run: Run) -> None:
+        """Show a course from its beginning on: of a simulation what has been of it."""
+        self._layout = Layout(run.robot)
+        times = self.history.time
+        self._board.begin(
+            {
+                "scene": scene(run.robot, run.ground),
+                "layout": self._layout.described(),
+                "events": [kind.name.lower() for kind in EventKind],
+                "method": str(run.method),
+                "live": self.live is not None,
+            }
+        )
+        if not len(times):
+            return
+        shown = np.arange(times[0], times[-1], DENSEST)
+        rows = np.unique([0, 0, *(self.history.row_at(t) for t in shown), len(times) - 1])
+        self._keep([0, *rows.tolist()], list(run.events))
+        if self.live is None:
+            self.cursor = float(times[0])
+            self._move(self.cursor)
+
+    def update(self, elapsed: float) -> None:
+        """Go on by what has passed on the clock (s)."""
+        if not len(self.history):
+            self.playing = False
+            self._tell()
+            return
+        self._goal += self.rate * min(elapsed, LONGEST)
+        end = float(self.history.time[-1])
+        if self._goal <= end + SAME:
+            self._move(self._goal)
+        elif self.live is not None and self.live.can_go_on:
+            self._simulate(elapsed)
+        else:
+            self._move(end)
+            self.playing = False
+        self._tell()
+
+    def _simulate(self, elapsed: float) -> None:
+        """Simulate up to the goal, or as much of it as leaves time for viewers."""
+        assert self.live is not None
+        before, began = self.live.time, clock_time.perf_counter()
+        step = self.live.simulation.method.row_period[1]
+        self._advance(min(self._goal, before + max(self._span, step)))
+        gained, took = self.live.time - before, clock_time.perf_counter() - began
+        self._span = gained * SLOW / took if took > SLOW else min(2.0 * self._span, 1e3)
+        self._goal = min(self._goal, self.live.time + max(self.rate * LONGEST, step))
+        self._gained, self._elapsed = self._gained + gained, self._elapsed + elapsed
+        if self._elapsed >= 0.5:
+            self._reached = self._gained / self._elapsed
+            self._gained = self._elapsed = 0.0
+
+    def _advance(self, until: float | None) -> None:
+        """Simulate until a time (s), or one step, and show it."""
+        assert self.live is not None
+        run = self.live.advance(until)
+        if run is None:
+            return
+        known = len(self.history)
+        events = self.history.take(run)
+        last = len(self.history) - 1
+        if last < 0 or known == 0:
+            return
+        interval = min(DENSEST, max(self.rate / UPDATES, 0.0))
+        count = max(int((self.history.time[-1] - self._shown) / interval - 0.5), 0)
+        between = self._shown + interval * np.arange(1, min(count, 500) + 1)
+        first = self.history.row_at(self._shown)
+        rows = np.unique([first, *(self.history.row_at(t) for t in between), last])
+        self._keep(rows.tolist() if len(rows) > 1 else [first, last], events)
+        if not self.live.can_go_on:
+            self.playing = False
+
+    def _keep(self, rows: list[int], events: list[Event]) -> None:
+        """Show rows of the history for good, and events with them; forces begin at the first."""
+        assert self._layout is not None
+        part = self.history.part(rows[0], rows[-1])
+        frames = self._layout.frames(part, [row - rows[0] for row in rows], self._pushes)
+        self._shown = self.cursor = float(part.time[-1])
+        told = [[event.time, int(event.kind), _contact(event)] for event in events]
+        self._board.add(frames, told)
+
+    def _move(self, time: float) -> None:
+        """Look at a time (s) of the history."""
+        times = self.history.time
+        if not len(times):
+            return
+        assert self._layout is not None
+        self.cursor = float(min(max(time, times[0]), times[-1]))
+        row = self.history.row_at(self.cursor)
+        # Forces since the picture before; standing still, those of the step that led here.
+        before = self.history.row_at(self.cursor - self.rate / UPDATES) if self.playing else row
+        since = max(min(before, row - 1), 0)
+        frame = self._layout.frames(self.history.part(since, row), [0, row - since], self._pushes)[
+            0
+        ]
+        self._goal = self.cursor
+        self._board.look(frame)
+
+    def _go_on_from_cursor(self) -> None:
+        """Let the simulation be again as it was at the cursor, and forget what came after."""
+        live = self._needs_live()
+        row = self.history.row_at(self.cursor)
+        time = float(self.history.time[row])
+        live.go_back(time)
+        self.history.cut(time)
+        self._board.cut(time)
+        self._shown = self._goal = self.cursor = time
+        self._keep([len(self.history) - 1] * 2, [])
+
+    @property
+    def _at_end(self) -> bool:
+        times = self.history.time
+        return not len(times) or self.cursor >= float(times[-1]) - SAME
+
+    @property
+    def _pushes(self) -> tuple[Push, ...]:
+        if self.live is not None:
+            return self.live.pushes
+        return () if self._run is None else self._run.pushes
+
+    def _needs_live(self) -> LiveSimulation:
+        if self.live is None:
+            raise RefusedError("this is a run that is over: there is nothing to push or set")
+        return self.live
+
+    def _needs_stage(self) -> Stage:
+        if self._stage is None:
+            raise RefusedError("this is a run that is over: there is nothing to push or set")
+        return self._stage
+
+    def _happened(self, time: float) -> str:
+        """Return in words what happened at a time (s), and where."""
+        places: dict[str, list[str]] = {}
+        for event in self.history.events:
+            if abs(event.time - time) <= SAME:
+                places.setdefault(in_words(_kind(event)), []).append(self._where(event))
+        told = [f"{kind} ({', '.join(filter(None, each))})" for kind, each in places.items()]
+        return f"at {time:.6g} s: {'; '.join(told)}".replace(" ()", "")
+
+    def _where(self, event: Event) -> str:
+        if self._layout is None or event.kind is EventKind.BRIDGE:
+            return ""
+        robot = self._layout.robot
+        names = robot.joint_names if event.kind.of_joint else robot.contact_names
+        return in_words(names[event.contact]) if 0 <= event.contact < len(names) else ""
+
+    def _tell_busy(self, what: str) -> None:
+        self._busy = what
+        self._tell()
+
+    def _tell(self) -> None:
+        """Show how things are, where that has changed."""
+        times, run = self.history.time, self.history.newest
+        self._board.state(
+            {
+                "playing": self.playing,
+                "rate": self.rate,
+                "reached": round(self._reached, 2),
+                "from": float(times[0]) if len(times) else 0.0,
+                "end": self._at_end,
+                "note": self._note,
+                "busy": self._busy,
+                "message": run.message if run is not None and self._over_here else "",
+                "over": self.live is not None and not self.live.can_go_on,
+                "light": self._lit(),
+                "returns": self.live is not None and self.live.returns,
+                "controls": self._controls,
+                "values": self.values,
+            }
+        )
+
+    def _lit(self) -> dict[str, str]:
+        """Return the light, whose words change twice a second at most."""
+        light, now = light_of(self.history.newest), clock_time.perf_counter()
+        if light["level"] != self._light["level"] or now > self._light_until:
+            self._light, self._light_until = light, now + WORDS_LAST
+        return self._light
+
+    @property
+    def _over_here(self) -> bool:
+        """Whether viewers look at the end of what cannot go on."""
+        return self._at_end and (self.live is None or not self.live.can_go_on)
+
+
+def _kind(event: Event) -> str:
+    return event.kind.name.lower()
+
+
+def _contact(event: Event) -> int:
+    of_point = not event.kind.of_joint and event.kind is not EventKind.BRIDGE
+    return event.contact if of_point else -1
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{value!r} is not a finite number")
+    return number
+
+
+_COMMANDS: dict[str, Any] = {
+    "play": Session._play,
+    "step": Session._step,
+    "seek": Session._seek,
+    "event": Session._event,
+    "rate": Session._rate,
+    "hold": Session._hold,
+    "release": Session._release,
+    "random push": Session._random_push,
+    "choose": Session._choose,
+    "reset": Session._reset,
+    "resume": Session._resume,
+    "leave": Session._leave,
+    "nothing": Session._nothing,
+}
+"""What viewers may ask for."""
+
+_ALWAYS = (Session._rate, Session._choose, Session._reset, Session._leave, Session._nothing)
+"""What can be asked for before there is anything to see."""

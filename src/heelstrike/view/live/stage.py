@@ -1,0 +1,155 @@
+"""What can be set of a live simulation, and who makes it anew when it is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from heelstrike.contact.ground import Ground
+from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.sim.simulation import Simulation
+from heelstrike.sim.snapshot import Snapshot
+
+Value = float | str
+
+
+@dataclass(frozen=True)
+class Control:
+    """Something that a viewer can set: one of several words, or a number within bounds.
+
+    Attributes
+    ----------
+    name, label : str
+        By which it is known, and what people read.
+    value : float or str
+        What it is at first.
+    options : tuple of str
+        The words; none for a number.
+    low, high, step : float
+        Bounds of a number and the distance between two that a slider offers.
+    unit : str
+    at_once : bool
+        Whether it acts at once; otherwise the simulation begins anew.
+    resets : tuple of str
+        Controls that have their first values again when this one is set.
+    """
+
+    name: str
+    label: str
+    value: Value
+    options: tuple[str, ...] = ()
+    low: float = 0.0
+    high: float = 1.0
+    step: float = 0.01
+    unit: str = ""
+    at_once: bool = False
+    resets: tuple[str, ...] = ()
+
+    def accepts(self, value: Any) -> bool:
+        """Whether a value is one that it can have."""
+        if self.options:
+            return isinstance(value, str) and value in self.options
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return number and self.low <= value <= self.high
+
+    def described(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return {**vars(self), "options": list(self.options), "resets": list(self.resets)}
+
+
+class Stage(ABC):
+    """Makes the simulation that is watched, of the values of its controls."""
+
+    @abstractmethod
+    def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
+        """What can be set, where some things are set already; with none, what there is at first."""
+
+    def fitted(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values of all controls: those given where they can be had, others as at first."""
+        controls = self.controls(values)
+        wanted = {control.name: values.get(control.name) for control in controls}
+        return {c.name: wanted[c.name] if c.accepts(wanted[c.name]) else c.value for c in controls}
+
+    @abstractmethod
+    def simulation(self, values: Mapping[str, Any], progress: Callable[[str], None]) -> Simulation:
+        """Make the simulation at its beginning.
+
+        Parameters
+        ----------
+        values : mapping of str to float or str
+            Of all controls, by name.
+        progress : callable
+            Is told in words what is going on, now and then.
+
+        Raises
+        ------
+        HeelstrikeError
+            If there is none of these values.
+        """
+
+    @abstractmethod
+    def ground(self, values: Mapping[str, Any], simulation: Simulation) -> Ground:
+        """Make the ground of the values that act at once."""
+
+
+class GivenStage(Stage):
+    """A simulation that somebody else made, watched from where it is now.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        The simulation.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation, self._begun = simulation, False
+        self._start = snapshot_of(simulation)
+        friction = float(np.min(simulation.ground.model().friction))
+        self._controls = (friction_control(friction),)
+
+    def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:  # noqa: ARG002
+        """The friction of the ground, everywhere."""
+        return self._controls
+
+    def simulation(
+        self,
+        values: Mapping[str, Any],  # noqa: ARG002
+        progress: Callable[[str], None],  # noqa: ARG002
+    ) -> Simulation:
+        """Return it as it is; when asked again, as it was then."""
+        if not self._begun:
+            self._begun = True
+        elif self._start is None:
+            raise SimulationError(
+                "its controller takes no part in snapshots, so that it cannot begin again: give "
+                "the controller methods snapshot() and restore(numbers)"
+            )
+        else:
+            self._simulation.restore(self._start)
+        return self._simulation
+
+    def ground(self, values: Mapping[str, Any], simulation: Simulation) -> Ground:
+        """Return its ground with another friction."""
+        numbers = simulation.ground.numbers()
+        return Ground.of_numbers(
+            numbers | {"friction": np.full_like(numbers["friction"], values["friction"])}
+        )
+
+
+def snapshot_of(simulation: Simulation) -> Snapshot | None:
+    """Return a snapshot; None if the controller takes no part in them."""
+    try:
+        return simulation.snapshot()
+    except ControllerError:
+        return None
+
+
+def friction_control(value: float) -> Control:
+    """Return the control of the ground's friction."""
+    return Control(
+        "friction", "friction μ", value, low=0.0, high=max(1.5, value), step=0.01, at_once=True
+    )

@@ -1,0 +1,183 @@
+"""save_html(): a run as one HTML file."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from heelstrike.analysis.motion import run_motion
+from heelstrike.analysis.summary import lines, summarize
+from heelstrike.analysis.support import support_phases
+from heelstrike.analysis.zero_moment_point import zero_moment_point
+from heelstrike.errors import GaitError, ViewError
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.run import Run
+from heelstrike.view.page.columns import TOLERANCE, packed
+from heelstrike.view.page.curves import plots
+from heelstrike.view.page.markup import data_block, document, escaped, shipped, table
+from heelstrike.view.page.motion import frames
+from heelstrike.view.page.provenance import provenance
+from heelstrike.view.page.rows import IMPACTS, shown_rows
+from heelstrike.view.page.scene import scene
+from heelstrike.view.page.verdict import judge
+from heelstrike.view.style import in_words, view_errors
+from heelstrike.whole_file import check_target, write_whole
+
+if TYPE_CHECKING:
+    from heelstrike.gait.gait import Gait
+
+MOST_EVENTS = 4000
+"""Events that a page lists."""
+MOST_PHASES = 2000
+"""Phases of support that a page shows below its timeline."""
+
+
+def save_html(
+    run: Run,
+    path: str | os.PathLike[str],
+    *,
+    gait: Gait | None = None,
+    command: str = "",
+) -> Path:
+    """Write a run as one HTML file: animation, timeline with events, curves, figures, provenance.
+
+    The file needs nothing else and asks for nothing: it opens from a disk or a mail, without a
+    network, in any browser of the last years.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    path : str or path
+        File to write, .html or .htm.
+    gait : Gait, optional
+        The gait that the run followed, for references and the tracking error.
+    command : str
+        The command that made the run, for its provenance.
+
+    Returns
+    -------
+    Path
+        The file. It appears whole or not at all.
+
+    Raises
+    ------
+    ViewError
+        If the run is empty, or the file cannot be written.
+    GaitError
+        If the gait does not fit the robot of the run.
+    """
+    target = check_page(path)
+    text = page(run, gait, command=command)
+    with view_errors():
+        return write_whole(target, text)
+
+
+def check_page(path: str | os.PathLike[str]) -> Path:
+    """Refuse what cannot be the file of a page.
+
+    Raises
+    ------
+    ViewError
+        That says why.
+    """
+    target = Path(path)
+    with view_errors():
+        check_target(target)
+    if target.suffix.lower() not in (".html", ".htm"):
+        hint = "; a browser prints it to PDF" if target.suffix.lower() == ".pdf" else ""
+        raise ViewError(f"cannot write {target}: the name of a page ends in .html{hint}")
+    return target
+
+
+def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
+    """Write the page of a run; see :func:`save_html`."""
+    if not len(run.time):
+        raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
+    check_gait(gait)
+    summary = summarize(run, gait=gait)
+    title = f"{run.robot.name}: {run.message}"
+    body = shipped("player.html")
+    parts = {
+        "title": escaped(run.robot.name),
+        "headline": escaped(judge(run, gait).headline),
+        "summary": table(dict(lines(summary)), "Summary"),
+        "certificates": table(certificates(run), "Certificates: worst values over all steps"),
+        "provenance": table(provenance(run, gait, command=command), "Where this comes from"),
+    }
+    for name, part in parts.items():
+        body = body.replace(f"<!--{name}-->", part)
+    body += data_block("run", contents(run, gait))
+    script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))
+    return document(title, body, style=shipped("page.css"), script=script)
+
+
+def check_gait(gait: object) -> None:
+    """Refuse what is no gait, such as the name of its file.
+
+    Raises
+    ------
+    GaitError
+        That says what it is.
+    """
+    from heelstrike.gait.gait import Gait
+
+    if gait is not None and not isinstance(gait, Gait):
+        raise GaitError(f"gait must be a Gait, got {gait!r}; load_gait reads one from its file")
+
+
+def certificates(run: Run) -> dict[str, str]:
+    """Return the worst values of a run's certificates, label by label."""
+    worst = run.certificates
+    return {
+        "deepest penetration": f"{worst.penetration:.3g} m",
+        "residual of complementarity": f"{worst.complementarity:.3g} of the data",
+        "residual of the friction cone": f"{worst.cone:.3g} of the data",
+        "residual of non-penetration": f"{worst.non_penetration:.3g} of the data",
+        "contact problems": str(run.solver),
+    }
+
+
+def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
+    """Return what the script of a page shows, as JSON has it.
+
+    Numbers of the rows shown are those of the run to a float32's rounding, times are exact. Forces
+    are means from each row shown to the next.
+    """
+    rows = shown_rows(run)
+    motion = run_motion(run)
+    zmp = zero_moment_point(run, motion=motion)
+    panels = plots(run, gait, rows, zmp)
+    columns = frames(run, rows, motion, zmp)
+    for i, panel in enumerate(panels):
+        for k, trace in enumerate(panel.traces):
+            columns[f"curve {i} {k}"] = trace.values
+    events = run.events[:MOST_EVENTS]
+    phases = support_phases(run)[:MOST_PHASES]
+    return {
+        "scene": scene(run.robot, run.ground),
+        "data": packed(run.time[rows], columns),
+        "plots": [panel.described() for panel in panels],
+        "events": [
+            {
+                "time": event.time,
+                "kind": event.kind.name.lower().replace("_", " "),
+                "where": _where(run, event.kind, event.contact),
+                "contact": -1 if event.kind.of_joint else event.contact,
+                "impulse": event.impulse[0] if math.isfinite(event.impulse[0]) else 0.0,
+                "impact": event.kind in IMPACTS,
+            }
+            for event in events
+        ],
+        "phases": [[phase.start, phase.end, *phase.feet] for phase in phases],
+        "left_out": len(run.events) - len(events),
+        "recorded": len(run.time),
+        "tolerance": TOLERANCE,
+    }
+
+
+def _where(run: Run, kind: EventKind, index: int) -> str:
+    names = run.robot.joint_names if kind.of_joint else run.robot.contact_names
+    return in_words(names[index]) if 0 <= index < len(names) else ""

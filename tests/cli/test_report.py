@@ -1,0 +1,90 @@
+"""``heelstrike report``: runs from files or walked for it, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+import walking
+from synthetic_runs import box, make_run
+from typer.testing import CliRunner
+
+from heelstrike.cli.main import app
+from heelstrike.sim import RunStatus
+from heelstrike.view.report import writing
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a short walk leaves: its gait and its run."""
+    folder = tmp_path_factory.mktemp("walk")
+    walking.gait().save(folder / "gait.json")
+    walking.walk(steps=2).save(folder / "run.nc")
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def one_figure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw one figure of a report only: drawing takes most of its time."""
+    monkeypatch.setattr(writing, "FIGURES", ("energy",))
+
+
+def report(*options: str) -> Any:
+    return CliRunner().invoke(app, ["report", *options])
+
+
+def test_a_run_is_reported_with_the_gait_beside_it(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    result = report(str(folder / "run.nc"), "--out", str(out))
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.startswith("bravo7 walks: 2 steps")
+    assert "gait.json" in result.stderr
+    assert "joint tracking error" in out.read_text(encoding="utf-8")
+
+
+def test_a_robot_is_walked_by_several_methods(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    gait = str(folder / "gait.json")
+    ways = ("--method", "time-stepping", "--method", "paper-symplectic")
+    result = report("bravo7", "--gait", gait, "--steps", "1", *ways, "--out", str(out))
+    assert result.exit_code == 0, result.stderr
+    assert [line.partition(":")[0] for line in result.stdout.splitlines()] == [
+        "time-stepping", "paper-symplectic"
+    ]  # fmt: skip
+    assert "Differences from time-stepping" in out.read_text(encoding="utf-8")
+
+
+def test_one_that_fell_has_its_exit_status(tmp_path: Path) -> None:
+    fallen = make_run(box(), [0.0, 0.1], status=RunStatus.FELL, message="fell")
+    path = fallen.save(tmp_path / "fallen.nc")
+    twin = shutil.copy(path, tmp_path / "twin.nc")
+    result = report(str(path), str(twin), "--json", "--out", str(tmp_path / "report.html"))
+    assert result.exit_code == 1
+    found = json.loads(result.stdout)
+    assert list(found) == ["fallen", "twin"]
+    assert found["twin"]["good"] is False
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (("run.nc", "bravo7"), "not both"),
+        (("bravo7", "rabbit"), "one robot is walked"),
+        (("run.nc", "--steps", "3"), "--steps"),
+        (("run.nc", "--package-path", "."), "--package-path"),
+        (("run.nc",), "there is no file"),
+        (("bravo7", "--out", "report.pdf"), "prints it to PDF"),
+        (("nosuch",), "nosuch"),
+    ],
+)
+def test_requests_that_make_no_sense(
+    options: tuple[str, ...], told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = report(*options)
+    assert result.exit_code == 2
+    assert told in " ".join(result.stderr.replace("│", " ").split())
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,99 @@
+"""Bridges: where events pile up the run goes on, says so, and loses nothing that it should not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mechanisms
+import numpy as np
+import pytest
+import walking
+from scenes.event_judge import judge_events
+from scenes.methods import Setting
+from scenes.scene import random_scene
+
+import heelstrike as hs
+from heelstrike.sim import Event, EventKind, RunStatus, Simulation
+
+# Random scenes that ended with events without end, or without a certified solution.
+PILED_UP = (37, 48, 55, 66, 118)
+
+
+def bridges(run: hs.Run) -> list[Event]:
+    return [event for event in run.events if event.kind is EventKind.BRIDGE]
+
+
+@pytest.mark.parametrize("seed", PILED_UP)
+def test_a_robot_on_which_events_pile_up_arrives(seed: int) -> None:
+    run = Setting.of(random_scene(seed)).run("event_driven")
+    assert run.status is RunStatus.COMPLETED, run.message
+    assert np.all(np.diff(run.time) >= 0.0)
+    assert sum(event.impulse[0] for event in bridges(run)) <= 1e-3 * run.time[-1]
+
+
+@pytest.mark.parametrize("seed", [3, 9, 10, 44])
+def test_points_that_chatter_to_rest_need_no_bridge_and_no_leap(seed: int) -> None:
+    """Several of them, within microseconds; every jump of the velocity is that of its impulses."""
+    setting = Setting.of(random_scene(seed))
+    run = setting.run("event_driven")
+    assert run.status is RunStatus.COMPLETED
+    assert not bridges(run)
+    assert not setting.judge("event_driven", run).objections
+
+
+def bridged(begin: float, longer: int) -> tuple[hs.Run, hs.Run]:
+    """A walk of bravo7 with a bridge that nothing called for, and the same walk without."""
+    law, state = hs.ComputedTorque(walking.bravo7(), walking.gait()), walking.gait().initial_state
+    runs = []
+    for forced in (True, False):
+        simulation = Simulation(
+            walking.bravo7(), law, state=state, method=hs.EventDriven(rtol=1e-11, atol=1e-13),
+            ground=hs.Ground(friction=walking.FRICTION),
+        )  # fmt: skip
+        simulation.advance(begin)
+        if forced:
+            simulation._work.bridging, simulation._work.bridges = 1, longer
+            simulation._work.series = begin
+        simulation.advance(begin + 1e-6 * 4.0**longer)
+        runs.append(simulation.record)
+    return runs[0], runs[1]
+
+
+@pytest.mark.parametrize("begin", [0.02, 0.35, 0.6])
+def test_how_wrong_a_bridge_may_be(begin: float) -> None:
+    """Its estimate covers its error, and half the length is at least half the error."""
+    errors = []
+    for longer in (1, 2, 3):
+        run, exact = bridged(begin, longer)
+        (bridge,) = bridges(run)
+        assert bridge.impulse[0] == pytest.approx(1e-6 * 4.0**longer, rel=1e-9)
+        apart = max(
+            np.abs(run.position[-1] - exact.position[-1]).max(),
+            np.abs(run.velocity[-1] - exact.velocity[-1]).max(),
+        )
+        assert apart <= bridge.impulse[1] + 1e-11
+        errors.append(apart)
+    assert errors[1] <= 0.3 * errors[2]
+
+
+def test_a_bridge_obeys_the_laws_and_is_kept_in_files(tmp_path: Path) -> None:
+    run, _ = bridged(0.35, 2)
+    assert len(bridges(run)) == 1
+    found = judge_events(run)
+    assert found.figures["bridges"] == 1
+    assert not [one for one in found.objections if "bridge" in one.law or "impact" in one.law]
+    run.save(tmp_path / "run.nc")
+    assert hs.load_run(tmp_path / "run.nc").events == run.events
+
+
+def test_a_robot_that_no_bridge_helps_is_given_up_in_words() -> None:
+    """The mass matrix of a wheel with next to no inertia is singular to working precision."""
+    half, speed = np.pi / 8.0, 1.5
+    rolling = [speed * np.cos(half), speed * np.sin(half), speed]
+    run = hs.simulate(
+        mechanisms.rimless_wheel(inertia=1e-12), state=hs.State([0.0, np.cos(half), 0.0], rolling),
+        duration=0.1, method=hs.EventDriven(), ground=hs.Ground(friction=3.0),
+        stop_when_fallen=False,
+    )  # fmt: skip
+    assert run.status is RunStatus.SOLVER_FAILED
+    assert "each four times as long as the one before" in run.message
