@@ -24,6 +24,7 @@ from heelstrike.control.computed_torque import (
 )
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
@@ -173,6 +174,7 @@ class JointPD(Law):
         kd: ArrayLike,
         feedforward: Feedforward | str = Feedforward.FULL,
     ) -> None:
+        refuse_loops(robot, "springs and dampers about a gait", ControllerError)
         pitch_of(robot)
         try:
             gait.check_joints(robot)

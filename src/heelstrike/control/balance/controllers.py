@@ -15,6 +15,7 @@ from heelstrike.control.balance.tasks import CONTACT_ROWS
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.sole import Sole, leg, sole, standing_height
+from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import Law
 
@@ -230,6 +231,7 @@ class FootstepFeedback(WholeBody):
 
 def _feet(robot: Robot, gait: Gait) -> list[Sole]:
     """Return the soles, or refuse what the law cannot control."""
+    refuse_loops(robot, "whole-body control", ControllerError)
     try:
         gait.check_joints(robot)
     except GaitError as error:
