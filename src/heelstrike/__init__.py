@@ -57,11 +57,16 @@ if TYPE_CHECKING:
     from heelstrike.control import Encoder as Encoder
     from heelstrike.control import Encoders as Encoders
     from heelstrike.control import Estimated as Estimated
+    from heelstrike.control import Feedforward as Feedforward
     from heelstrike.control import FootSensors as FootSensors
+    from heelstrike.control import FootstepFeedback as FootstepFeedback
     from heelstrike.control import InertialUnit as InertialUnit
+    from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
     from heelstrike.control import VirtualConstraints as VirtualConstraints
+    from heelstrike.control import WholeBody as WholeBody
     from heelstrike.control import controller as controller
+    from heelstrike.control import solve_quadratic_program as solve_quadratic_program
     from heelstrike.errors import ContactProblemError as ContactProblemError
     from heelstrike.errors import ControllerError as ControllerError
     from heelstrike.errors import GaitError as GaitError
@@ -122,7 +127,9 @@ _HOME = {
     "Encoders": "heelstrike.control",
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
+    "Feedforward": "heelstrike.control",
     "FootSensors": "heelstrike.control",
+    "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
     "GaitError": "heelstrike.errors",
@@ -131,6 +138,7 @@ _HOME = {
     "HuntCrossley": "heelstrike.sim",
     "InertialUnit": "heelstrike.control",
     "InfeasibleGaitError": "heelstrike.errors",
+    "JointPD": "heelstrike.control",
     "KelvinVoigt": "heelstrike.sim",
     "Largest": "heelstrike.analysis.stability.largest",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
@@ -154,6 +162,7 @@ _HOME = {
     "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",
     "VirtualConstraints": "heelstrike.control",
+    "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
     "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
     "array": "heelstrike.compiler.bundle",
@@ -183,6 +192,7 @@ _HOME = {
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
     "solve_lcp": "heelstrike.contact",
+    "solve_quadratic_program": "heelstrike.control",
     "watch": "heelstrike.view.live",
     "zero_dynamics": "heelstrike.analysis.stability.zero_dynamics",
 }

@@ -1,9 +1,14 @@
 """Controllers: the stock ones, and how to write others."""
 
 from heelstrike.control.actuation import Actuated
+from heelstrike.control.balance.controllers import FootstepFeedback, WholeBody
 from heelstrike.control.computed_torque import ComputedTorque, Encoder
 from heelstrike.control.estimation import Estimated
+from heelstrike.control.joint_pd import Feedforward, JointPD
 from heelstrike.control.preview import PreviewControl, preview_control
+from heelstrike.control.quadratic.dual_active_set import solve_or_relax
+from heelstrike.control.quadratic.program import Program
+from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadratic_program
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
@@ -18,12 +23,20 @@ __all__ = [
     "Encoder",
     "Encoders",
     "Estimated",
+    "Feedforward",
     "FootSensors",
+    "FootstepFeedback",
     "InertialUnit",
+    "JointPD",
     "Law",
     "PreviewControl",
+    "Program",
+    "QuadraticSolution",
     "Sensed",
     "VirtualConstraints",
+    "WholeBody",
     "controller",
     "preview_control",
+    "solve_or_relax",
+    "solve_quadratic_program",
 ]

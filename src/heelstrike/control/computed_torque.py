@@ -35,7 +35,52 @@ READINGS = 4
 """Samples of an encoder that a velocity is estimated from."""
 
 
-class Parameters(Bundle):
+class Landing(Bundle):
+    """When a foot that touches without coming flat counts as landed.
+
+    Attributes
+    ----------
+    landing : float
+        After this time (s).
+    """
+
+    landing: float = number(float)
+
+
+class StepTiming(Landing):
+    """When a step may end.
+
+    Attributes
+    ----------
+    earliest : float
+        A touchdown counts only after this time in a step (s).
+    """
+
+    earliest: float = number(float)
+
+
+class Stance(Bundle):
+    """The foot that stands.
+
+    Attributes
+    ----------
+    stance : int
+        Which it is.
+    start : float
+        When its step began (s).
+    landed : int
+        Whether it is past the impact that made it the stance foot.
+    samples : int
+        Encoder readings since then.
+    """
+
+    stance: int = cell(int)
+    start: float = cell(float)
+    landed: int = cell(int)
+    samples: int = cell(int)
+
+
+class Parameters(StepTiming):
     """Numbers of the law.
 
     Attributes
@@ -46,11 +91,8 @@ class Parameters(Bundle):
         Times in a step between which one polynomial holds (s).
     coefficients : (2, pieces, terms, nu) float
         For either stance foot the joints' polynomials, lowest power first.
-    earliest, latest : float
-        A touchdown counts only after this time in a step; the reference goes on along its
-        polynomials until that one (s).
-    landing : float
-        A foot that touches without coming flat counts as landed after this time (s).
+    latest : float
+        The reference goes on along its polynomials until this time in a step (s).
     on_points : int
         Whether the feet are points.
     encoder_period, encoder_resolution : float
@@ -64,9 +106,7 @@ class Parameters(Bundle):
     kd: Floats = array("nu")
     breakpoints: Floats = array("pieces + 1")
     coefficients: Floats = array(2, "pieces", "terms", "nu")
-    earliest: float = number(float)
     latest: float = number(float)
-    landing: float = number(float)
     on_points: int = number(int)
     encoder_period: float = number(float)
     encoder_resolution: float = number(float)
@@ -74,29 +114,19 @@ class Parameters(Bundle):
     pitch_sign: float = number(float)
 
 
-class Memory(Bundle):
+class Memory(Stance):
     """What the law remembers.
 
     Attributes
     ----------
-    stance : int
-        The foot that stands.
-    start : float
-        When its step began (s).
-    landed : int
-        Whether it is past the impact that made it the stance foot.
-    samples, sampled : int and float
-        Encoder readings since then; when the newest was taken (s).
+    sampled : float
+        When the newest encoder reading was taken (s).
     readings : (4, nu) float
-        These, the newest first.
+        Readings, the newest first.
     acceleration : (nu,) float
         Wanted of the joints.
     """
 
-    stance: int = cell(int)
-    start: float = cell(float)
-    landed: int = cell(int)
-    samples: int = cell(int)
     sampled: float = cell(float)
     readings: Floats = array(READINGS, "nu")
     acceleration: Floats = array("nu")
@@ -140,7 +170,7 @@ def approaching_speed(work: Workspace, contacts: Contacts, link: int, contact: i
 
 @kernel
 def restart_at_touchdown(
-    t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
+    t: float, contacts: Contacts, robot: ControlledRobot, parameters: StepTiming, memory: Stance
 ) -> None:
     """Exchange stance and swing when the swing foot has met the ground."""
     if t - memory.start < parameters.earliest:
@@ -162,8 +192,8 @@ def has_landed(
     state: ControlState,
     contacts: Contacts,
     robot: ControlledRobot,
-    parameters: Parameters,
-    memory: Memory,
+    parameters: Landing,
+    memory: Stance,
 ) -> bool:
     """Whether the stance foot is past the impact that made it the stance foot.
 
@@ -337,7 +367,7 @@ class ComputedTorque(Law):
         encoder: Encoder | None = None,
     ) -> None:
         refuse_loops(robot, "computed torque", ControllerError)
-        pitch = _pitch_of(robot)
+        pitch = pitch_of(robot)
         try:
             gait.check_joints(robot)
         except GaitError as error:
@@ -366,7 +396,7 @@ class ComputedTorque(Law):
         self.encoder = encoder
 
 
-def _pitch_of(robot: Robot) -> int:
+def pitch_of(robot: Robot) -> int:
     """Return the coordinate of the trunk's pitch, or refuse what the law cannot control."""
     model = robot.model
     actuated = set(model.actuator_joint.tolist())

@@ -1,0 +1,252 @@
+"""How much footstep feedback withstands, and what it costs.
+
+One controller with one set of gains. For pushes of 0.1 s on the trunk's centre of mass, at phases
+of a step, the impulse is raised until the robot does not recover strictly
+(:func:`heelstrike.analysis.recovery.recovery`): what is told is the last one of which it and all
+smaller ones recovered. Everything else is 100 steps from a seed: where the ground changes, its
+random heights, noise. A run counts if it completes, the hip stays above 0.65 of its height above
+the ground, the trunk within 0.6 rad, and the robot comes at least 0.7 of the way that its steps
+should take it. Seeds below 1000 were used while the controller was made.
+
+Run: python benchmarks/balance.py [price push hard command] [--robot bravo7] [--phases 20]
+     [--rise 5] [--seeds 100] [--first 1000] [--method stepping]
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import heelstrike as hs
+from heelstrike.analysis.recovery import recovery
+from heelstrike.gait.sole import sole, standing_height
+
+HEIGHT, WEIGHT = 0.9538, 75.0 * 9.81  # of bravo7
+STEPS = 100
+HIP, PITCH, WAY = 0.65, 0.6, 0.7
+METHODS: dict[str, dict[str, Any]] = {
+    "stepping": {},
+    "events": {"method": hs.EventDriven(), "control_period": 1e-3},
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Walker:
+    """A robot, its gait, its controller, and how to simulate them."""
+
+    robot: hs.Robot
+    gait: hs.Gait
+    law: hs.FootstepFeedback
+    method: dict[str, Any]
+
+    @classmethod
+    def of(cls, name: str, method: str) -> Walker:
+        """Design its gait, scaled by its height, and its controller."""
+        robot = hs.load_robot(name)
+        size = standing_height(robot, sole(robot, 0)) / HEIGHT
+        gait = hs.optimize_gait(
+            robot, step_length=round(0.30 * size, 3), step_duration=round(0.70 * size**0.5, 3)
+        )
+        return cls(robot, gait, hs.FootstepFeedback(robot, gait), METHODS[method])
+
+    def walk(self, duration: float, controller: Any = None, **options: Any) -> hs.Run:
+        """Simulate it from the beginning of its gait."""
+        law = self.law if controller is None else controller
+        robot = options.pop("robot", self.robot)
+        begin = self.gait.initial_state
+        setup = self.method | {"record_every": 10} | options
+        return hs.simulate(robot, law, state=begin, duration=duration, **setup)
+
+    def push(self, impulse: float, phase: float) -> hs.Push:
+        """Push its trunk in the third step."""
+        start = (2.0 + phase) * self.gait.step_duration
+        return hs.Push(2, force=(10.0 * impulse, 0.0), start=start, duration=0.1)
+
+
+def effort(run: hs.Run) -> float:
+    """Mean of the sum of torques squared (N²m²)."""
+    return float(np.mean(np.sum(run.torque**2, axis=1)))
+
+
+def price(walker: Walker) -> None:
+    """Tell what walking costs, unpushed on flat ground."""
+    gait, duration = walker.gait, 20 * walker.gait.step_duration
+    feedback = walker.walk(duration, record_every=1)
+    usual = walker.walk(duration, hs.ComputedTorque(walker.robot, gait), record_every=1)
+    way = feedback.position[-1, 0] - feedback.position[len(feedback.time) // 2, 0]
+    print(
+        f"mean torque² {effort(feedback):.1f} N²m², computed torque {effort(usual):.1f}, of the "
+        f"gait {gait.cost / gait.step_duration:.1f}; step {way / 10.0:.4f} m, of the gait "
+        f"{gait.step_length} m"
+    )
+
+
+def recovers(walker: Walker, impulse: float, phase: float) -> bool:
+    """Whether it recovers from a push, strictly."""
+    push = walker.push(impulse, phase)
+    run = walker.walk(push.end + 7.01, pushes=push, record_every=5)
+    return bool(recovery(run, after=7.0))
+
+
+def pushes(walker: Walker, phases: int, rise: float) -> None:
+    """Tell the largest push of which it recovers, with all smaller ones."""
+    weight = float(-walker.robot.model.mass.sum() * walker.robot.model.gravity[1])
+    size = standing_height(walker.robot, sole(walker.robot, 0)) / HEIGHT
+    rise *= weight / WEIGHT * size**0.5
+    for name, sign in (("forwards", 1.0), ("backwards", -1.0)):
+        found = []
+        for phase in range(phases):
+            count = 0
+            while count < 40 and recovers(walker, sign * rise * (count + 1), phase / phases):
+                count += 1
+            found.append(rise * count)
+        told = " ".join(f"{each:.3g}" for each in found)
+        print(f"push {name}: least {min(found):.3g} N s; by phase {told}", flush=True)
+
+
+def heavier(robot: hs.Robot, factor: float) -> hs.Robot:
+    """Return the robot with another mass of the trunk, of which the controller does not know."""
+    mass, inertia = robot.model.mass.copy(), robot.model.inertia.copy()
+    mass[2] *= factor
+    inertia[2] *= factor
+    return dataclasses.replace(robot, model=robot.model.replaced(mass=mass, inertia=inertia))
+
+
+def ground(
+    size: float, seed: int, *, slope: float = 0.0, rise: float = 0.0, rough: float = 0.0,
+    friction: float = 0.75, patch: float | None = None,
+) -> hs.Ground:  # fmt: skip
+    """Ground that changes somewhere between the third and the fifth step."""
+    rng = np.random.default_rng(seed)
+    start = size * rng.uniform(0.9, 1.5)
+    x = [start - 9.0, start]
+    z = [0.0, 0.0]
+    if rise:
+        x.append(start)
+        z.append(rise)
+    if rough:
+        bumps = np.arange(1, 280) * 0.15 * size + start
+        x += bumps.tolist()
+        z += rng.uniform(-rough, rough, len(bumps)).tolist()
+    if patch is not None:
+        x.append(start + 0.6 * size)
+        z.append(z[-1])
+    x.append(x[-1] + 2.0)
+    z.append(z[-1])
+    heights = np.array(z) + np.tan(slope) * np.maximum(np.array(x) - start, 0.0)
+    mu = np.full(len(x) - 1, friction)
+    if patch is not None:
+        mu[-2] = patch
+    return hs.Ground(friction=mu, profile=np.column_stack((x, heights)))
+
+
+def stays_up(walker: Walker, run: hs.Run, surface: hs.Ground) -> bool:
+    """Whether it walked on, hip up and trunk upright."""
+    height = run.position[:, 1] - np.array([float(surface.height(x)) for x in run.position[:, 0]])
+    upright = np.abs(run.position[:, 2]).max() < PITCH
+    way = run.position[-1, 0] - run.position[0, 0] > WAY * STEPS * walker.gait.step_length
+    return bool(run.completed and height.min() > HIP * height[0] and upright and way)
+
+
+def hard(walker: Walker, seeds: range) -> None:
+    """Tell of how many seeds it stays up, check by check."""
+    size = standing_height(walker.robot, sole(walker.robot, 0)) / HEIGHT
+    made: Callable[..., hs.Ground] = partial(ground, size)
+    degree = np.pi / 180.0
+
+    def encoders(seed: int, law: Any) -> Any:
+        return hs.Sensed(walker.robot, law, encoders=hs.Encoders(bits=14), period=1e-3, seed=seed)
+
+    def everything(seed: int) -> tuple[hs.Ground, dict[str, Any]]:
+        surface = made(seed, slope=4.0 * degree, rough=0.015 * size, friction=0.5)
+        law = hs.Actuated(encoders(seed, walker.law), delay=3e-3)
+        phase = np.random.default_rng(seed).uniform(8.0, 9.0)
+        pushed = walker.push(30.0 * (-1.0) ** seed, phase)
+        return surface, {
+            "controller": law, "robot": heavier(walker.robot, 1.1), "pushes": pushed
+        }  # fmt: skip
+
+    checks: dict[str, Callable[[int], tuple[hs.Ground, dict[str, Any]]]] = {}
+    for slope in (-12, 12):
+        checks[f"slope {slope}°"] = lambda s, a=slope: (made(s, slope=a * degree), {})
+    for rise in (-60, 40):
+        checks[f"step {rise} mm"] = lambda s, a=rise: (made(s, rise=1e-3 * a * size), {})
+    checks["rough ±30 mm"] = lambda s: (made(s, rough=0.03 * size), {})
+    checks["patch of μ 0.25"] = lambda s: (made(s, patch=0.25), {})
+    for factor in (0.8, 1.2):
+        changed = heavier(walker.robot, factor)
+        checks[f"trunk × {factor}, ±5 mm"] = lambda s, a=changed: (
+            made(s, rough=0.005 * size),
+            {"robot": a},
+        )
+    late = hs.Actuated(walker.law, delay=8e-3, period=1e-3)
+    checks["delay 8 ms, ±5 mm"] = lambda s: (made(s, rough=0.005 * size), {"controller": late})
+    checks["encoders of 14 bit, ±5 mm"] = lambda s: (
+        made(s, rough=0.005 * size),
+        {"controller": encoders(s, walker.law)},
+    )
+    checks["all at once"] = everything
+    for name, setup in checks.items():
+        fallen = []
+        for seed in seeds:
+            surface, options = setup(seed)
+            run = walker.walk(STEPS * walker.gait.step_duration, ground=surface, **options)
+            if not stays_up(walker, run, surface):
+                fallen.append(seed)
+        told = f"; not {' '.join(map(str, fallen))}" if fallen else ""
+        print(f"{name}: {len(seeds) - len(fallen)} of {len(seeds)}{told}", flush=True)
+
+
+def command(walker: Walker, seeds: range) -> None:
+    """Stand, start, walk at three speeds, stop and stand, at random times."""
+    usual = walker.gait.step_length / walker.gait.step_duration
+    good = 0
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        law = hs.FootstepFeedback(walker.robot, walker.gait, speed=0.0)
+        begin = walker.robot.reference_state()
+        simulation = hs.Simulation(walker.robot, law, state=begin, **walker.method)
+        for speed in (0.0, 0.6 * usual, usual, 1.3 * usual, 0.0):
+            simulation.parameters.speed = speed
+            if simulation.status == hs.RunStatus.COMPLETED:
+                simulation.advance(simulation.time + rng.uniform(3.0, 5.0))
+        ended = simulation.status == hs.RunStatus.COMPLETED
+        good += bool(ended and np.abs(simulation.state.v).max() < 0.05)
+    print(f"stands, starts, three speeds, stops and stands: {good} of {len(seeds)}")
+
+
+def main() -> None:
+    """Measure what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    known = ("price", "push", "hard", "command")
+    parser.add_argument("what", nargs="*", default=list(known))
+    parser.add_argument("--robot", default="bravo7")
+    parser.add_argument("--phases", type=int, default=20)
+    parser.add_argument("--rise", type=float, default=5.0, help="N s, scaled by the robot")
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--first", type=int, default=1000, help="first seed")
+    parser.add_argument("--method", choices=METHODS, default="stepping")
+    asked = parser.parse_args()
+    unknown = set(asked.what) - set(known)
+    if unknown:
+        parser.error(f"there is no {', '.join(sorted(unknown))}; there are {', '.join(known)}")
+    walker = Walker.of(asked.robot, asked.method)
+    seeds = range(asked.first, asked.first + asked.seeds)
+    print(f"{asked.robot}, {asked.method}, {walker.gait}")
+    if "price" in asked.what:
+        price(walker)
+    if "push" in asked.what:
+        pushes(walker, asked.phases, asked.rise)
+    if "hard" in asked.what:
+        hard(walker, seeds)
+    if "command" in asked.what:
+        command(walker, seeds)
+
+
+if __name__ == "__main__":
+    main()

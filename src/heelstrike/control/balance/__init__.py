@@ -1,0 +1,1 @@
+"""Walking that keeps its balance: whole-body control and footstep feedback."""

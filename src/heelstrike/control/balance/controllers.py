@@ -1,0 +1,290 @@
+"""The controllers that keep their balance, as a user makes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import sqrt
+
+import numpy as np
+
+from heelstrike.control.balance.footsteps import Planning
+from heelstrike.control.balance.law import keep_balance
+from heelstrike.control.balance.numbers import Legs, Parameters, Weights
+from heelstrike.control.balance.reference import reference_of
+from heelstrike.control.balance.tasks import CONTACT_ROWS
+from heelstrike.errors import ControllerError, GaitError
+from heelstrike.gait.gait import Gait
+from heelstrike.gait.sole import Sole, leg, sole, standing_height
+from heelstrike.robot.loops import refuse_loops
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.law import Law
+
+HEIGHT = 0.9538
+"""Standing height of bravo7 (m), with which the numbers below were found."""
+
+LINKS = 3
+"""Links of a leg: thigh, shank and foot."""
+
+
+def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, float], ...]:
+    """All numbers that may be chosen: those of bravo7, by the height and the weight of a robot.
+
+    Lengths go with the height, times with its root, forces with the weight.
+    """
+    size = standing_height(robot, feet[0]) / HEIGHT
+    pace = sqrt(size)
+    duration = gait.step_duration
+    weight = float(-robot.model.mass.sum() * robot.model.gravity[1])
+    half = min(foot.half_length for foot in feet)
+    margin = min(0.01, 0.2 * half)
+    planning = {
+        "heel": margin - half,
+        "toe": half - margin,
+        "shortest": -0.5 * size,
+        "longest": 0.65 * size,
+        "earliest": 0.4 * duration,
+        "latest": 1.29 * duration,
+        "soon": 0.12 * pace,
+        "acceleration": 60.0,
+        "hurry": 3.5,
+        "foothold_weight": 1.0,
+        "time_weight": 0.3 * size,
+        "capture_weight": 30.0,
+    }
+    weights = {
+        "pressure": 1e6,
+        "height": 1.0,
+        "swing": 1.0,
+        "pitch": 1.0,
+        "angle": 0.05,
+        "posture": 1e-3,
+        "torque": 1e-7,
+    }
+    rest = {
+        "speed": gait.step_length / duration,
+        "kp": 150.0 / size,
+        "kd": 25.0 / pace,
+        "foot_kp": 400.0 / size,
+        "foot_kd": 40.0 / pace,
+        "joint_kp": 150.0 / size,
+        "joint_kd": 25.0 / pace,
+        "knee_kp": 900.0 / size,
+        "friction": 0.6,
+        "least_force": 0.15 * weight,
+        "weight": weight,
+        "touchdown": 0.4,
+        "landing": 0.02 * duration,
+        "calm": 0.02 * size,
+        "alarmed": 0.08 * size,
+        "calming": 3.0 * pace,
+        "flat": 2e-3 * size,
+        "crouch": 0.03 * size,
+        "lift": 0.05 * size,
+        "most_raised": 0.08 * size,
+        "bent_knee": 0.15,
+        "straight_knee": -0.25,
+        "slow": 0.15 * pace,
+        "fast": pace,
+        "haste": 0.1 * pace,
+        "search": 0.1 * pace,
+        "smoothing": 0.01 * pace,
+        "hold": 0.6 * half,
+    }
+    return planning, weights, rest
+
+
+class WholeBody(Law):
+    """Follow a gait with the whole body: a quadratic programme chooses the torques.
+
+    At every call the accelerations of the joints are found that serve best, by weight, the centre
+    of pressure, the height of the hip, the trunk, the swing foot and the posture, all of which
+    follow the gait, under the limits of contact and motors: unilateral force, friction cone, centre
+    of pressure within the sole, torques. Errors of the capture point are answered by the centre of
+    pressure. Steps are as long and as quick as the gait's, or as long as `speed` asks for.
+
+    A robot that stops (speed zero) brings its feet together and stands, and takes a step if it
+    cannot stand otherwise. See ``docs/balance.md`` for the theory and what it cannot do.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot with two mirrored feet that can stand flat, and legs of thigh, shank and
+        foot; all joints but the trunk's actuated.
+    gait : Gait
+        The gait to follow, on flat feet, of this robot.
+    speed : float, optional
+        Speed that is wanted (m/s), by steps of another length in the time of the gait's; the
+        gait's own by default. ``simulation.parameters.speed`` changes it while a simulation runs.
+    friction : float
+        Coefficient of friction that it reckons with.
+    numbers : mapping of str to float, optional
+        Any other number of the law by its name: those of
+        :class:`~heelstrike.control.balance.numbers.Parameters`, of its planning and its weights.
+
+    Raises
+    ------
+    ControllerError
+        If the robot cannot be controlled this way, or the gait or a number does not fit it.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("bravo7")
+    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
+    >>> law = hs.WholeBody(robot, gait)
+    >>> hs.simulate(robot, law, state=gait.initial_state, duration=1.4).completed
+    True
+    """
+
+    adapts = False
+    """Whether foothold and time are adapted."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        *,
+        speed: float | None = None,
+        friction: float = 0.6,
+        numbers: Mapping[str, float] | None = None,
+    ) -> None:
+        feet = _feet(robot, gait)
+        groups = _numbers(robot, gait, feet)
+        given = {"friction": friction, **(numbers or {})}
+        if speed is not None:
+            given["speed"] = speed
+        for name, value in given.items():
+            group = next((group for group in groups if name in group), None)
+            if group is None:
+                known = ", ".join(sorted(set().union(*groups)))
+                raise ControllerError(f"there is no number {name!r}; there are {known}")
+            if not np.isfinite(value):
+                raise ControllerError(f"{name} must be a finite number, got {value}")
+            group[name] = float(value)
+        if friction <= 0.0:
+            raise ControllerError(f"friction must be positive, got {friction}")
+        planning, weights, rest = groups
+        if not self.adapts:
+            planning["capture_weight"] = 0.0  # the foot lands where the gait's does
+        parameters = Parameters(
+            reference=reference_of(robot, gait),
+            planning=Planning(**planning),
+            weights=Weights(**weights),
+            legs=_legs(robot, gait, feet),
+            adapts=int(self.adapts),
+            **rest,
+        )
+        rows = CONTACT_ROWS + 2 * robot.nu + len(feet)
+        begin = {
+            "stance": gait.stance_foot,
+            "landed": 1,
+            "rate": 1.0 / gait.step_duration,
+            "n": robot.nu,
+            "m": rows,
+        }
+        super().__init__(keep_balance, parameters, robot=robot, memory=begin)
+        self.gait = gait
+
+
+class FootstepFeedback(WholeBody):
+    """Walk, and step where and when balance needs it.
+
+    What :class:`WholeBody` does as long as nothing disturbs it. A capture point that the centre of
+    pressure alone does not bring back is answered by another foothold at another time, found anew
+    at every call; the gait is then left for a lower body and a higher swing foot, and taken up
+    again as the disturbance dies away. A foot that meets the ground early stands at once, one that
+    meets it late goes on looking for it, and the slope is estimated from the footholds.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot with two mirrored feet that can stand flat, and legs of thigh, shank and
+        foot; all joints but the trunk's actuated.
+    gait : Gait
+        The gait that is followed as long as nothing disturbs, on flat feet, of this robot.
+    speed : float, optional
+        Speed that is wanted (m/s); the gait's own by default, zero to stop and stand.
+    friction : float
+        Coefficient of friction that it reckons with.
+    numbers : mapping of str to float, optional
+        Any other number of the law by its name, as for :class:`WholeBody`.
+
+    Raises
+    ------
+    ControllerError
+        If the robot cannot be controlled this way, or the gait or a number does not fit it.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("bravo7")
+    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
+    >>> law = hs.FootstepFeedback(robot, gait)
+    >>> push = hs.Push("trunk", force=(400.0, 0.0), start=0.3, duration=0.1)  # 40 N s
+    >>> run = hs.simulate(robot, law, state=gait.initial_state, duration=2.1, pushes=push)
+    >>> run.completed
+    True
+    """
+
+    adapts = True
+
+
+def _feet(robot: Robot, gait: Gait) -> list[Sole]:
+    """Return the soles, or refuse what the law cannot control."""
+    refuse_loops(robot, "whole-body control", ControllerError)
+    try:
+        gait.check_joints(robot)
+    except GaitError as error:
+        raise ControllerError(str(error)) from None
+    free = robot.nv - robot.nu
+    if not robot.floating or len(robot.feet) != 2 or free != 3:
+        raise ControllerError(
+            f"whole-body control needs a floating robot with two feet and a motor at every joint; "
+            f"robot {robot.name!r} has {len(robot.feet)} feet and {free} coordinates without a "
+            "motor, of which three are the trunk's"
+        )
+    feet = [sole(robot, foot) for foot in range(2)]
+    if gait.point_feet or not all(foot.flat for foot in feet):
+        raise ControllerError(
+            f"whole-body control stands on flat feet; those of robot {robot.name!r}, or of its "
+            "gait, are points"
+        )
+    for foot in feet:
+        links = leg(robot, foot)
+        if len(links) != LINKS or any(robot.model.axis[link, 0] == 0.0 for link in links):
+            raise ControllerError(
+                f"whole-body control needs legs of hip, knee and ankle; foot "
+                f"{robot.feet[foot.foot].name!r} of robot {robot.name!r} hangs on "
+                f"{', '.join(robot.joint_names[link] for link in reversed(links))}"
+            )
+    return feet
+
+
+def _legs(robot: Robot, gait: Gait, feet: list[Sole]) -> Legs:
+    """Find hips, knees and the sense in which these bend."""
+    model = robot.model
+    actuators = model.actuator_joint.tolist()
+    course = gait.in_step(np.linspace(0.0, gait.step_duration, 20))
+    either = 0.5 * (course + gait.mirrored(course)).mean(axis=0)
+    hips, knees, straight, bend = [], [], [], []
+    for foot in feet:
+        ankle, knee, hip = leg(robot, foot)
+        thigh, shank = model.offset[knee], model.offset[ankle]
+        # Angle from the thigh to the shank about +y as the robot is described.
+        turned = np.arctan2(-shank[0], -shank[1]) - np.arctan2(-thigh[0], -thigh[1])
+        at = model.reference[knee] - turned / model.axis[knee, 0]
+        actuator = actuators.index(knee)
+        hips.append(hip)
+        knees.append(actuator)
+        straight.append(at)
+        bend.append(1.0 if either[actuator] >= at else -1.0)
+    length = float(np.hypot(*thigh) + np.hypot(*shank))
+    return Legs(
+        point=np.array([foot.point for foot in feet]),
+        angle=np.array([foot.angle for foot in feet]),
+        hip=np.array(hips),
+        knee=np.array(knees),
+        straight=np.array(straight),
+        bend=np.array(bend),
+        length=length,
+    )

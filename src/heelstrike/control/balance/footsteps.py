@@ -1,0 +1,184 @@
+"""Where and when the next foot lands, and where the foot that stands presses meanwhile.
+
+The capture point of a body that keeps its height over a foot pressed at p runs away from there,
+ξ(t) = p + (ξ₀ − p) e^{ωt} (T. Koolen et al., *Capturability-based analysis and control of legged
+locomotion*, 2012). A gait needs it at a certain place before the foot that lands. The plan is the
+landing that costs least, as in M. Khadiv et al., *Walking control based on step timing adaptation*
+(2020): for every time that it may take, the centre of pressure that brings the capture point
+nearest to where it belongs, then the foothold, each within its limits.
+"""
+
+from __future__ import annotations
+
+from math import exp
+
+from heelstrike.compiler.bundle import Bundle, cell, number
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.balance.reference import Reference, value_at
+
+COMMITTED = 0.06
+"""A landing sooner than this, in durations of a step, is not planned anew."""
+
+TIMES = 25
+"""Remaining times that a plan is chosen from, besides the gait's own."""
+
+
+class Planning(Bundle):
+    """What plans are made by.
+
+    Attributes
+    ----------
+    heel, toe : float
+        Where the centre of pressure may be along the sole, from its middle (m).
+    shortest, longest : float
+        Where a foot may land before the other (m).
+    earliest, latest : float
+        When (s after the last).
+    soon : float
+        The centre of pressure is not planned for less than this (s).
+    acceleration : float
+        That of the swing foot at most (m/s²).
+    hurry : float
+        How many times faster than in the gait the swing foot may move.
+    foothold_weight, time_weight, capture_weight : float
+        Costs of deviations (1/m², 1/s², 1/m²).
+    """
+
+    heel: float = number(float)
+    toe: float = number(float)
+    shortest: float = number(float)
+    longest: float = number(float)
+    earliest: float = number(float)
+    latest: float = number(float)
+    soon: float = number(float)
+    acceleration: float = number(float)
+    hurry: float = number(float)
+    foothold_weight: float = number(float)
+    time_weight: float = number(float)
+    capture_weight: float = number(float)
+
+
+class Plan(Bundle):
+    """A landing, and what it is reckoned from.
+
+    Attributes
+    ----------
+    length, offset : float
+        Step that is wanted (m), and capture point before the foot as it lands (m).
+    phase, elapsed : float
+        Where the reference is, and how long the foot has stood (s).
+    gone : float
+        Time since the plan before (s).
+    capture : float
+        Capture point before the stance sole's middle (m).
+    swing, speed : float
+        Where the swing sole is, and how fast (m, m/s).
+    foothold, remaining : float
+        Where it lands, and when (m, s from now).
+    pressure : float
+        Centre of pressure until then (m).
+    error : float
+        How far from the wanted place the capture point would be as the gait's foot lands, if
+        nothing were done (m).
+    cost : float
+        What the plan costs.
+    """
+
+    length: float = cell(float)
+    offset: float = cell(float)
+    phase: float = cell(float)
+    elapsed: float = cell(float)
+    gone: float = cell(float)
+    capture: float = cell(float)
+    swing: float = cell(float)
+    speed: float = cell(float)
+    foothold: float = cell(float)
+    remaining: float = cell(float)
+    pressure: float = cell(float)
+    error: float = cell(float)
+    cost: float = cell(float)
+
+
+@kernel
+def own_pressure(planning: Planning, reference: Reference, phase: float) -> float:
+    """Centre of pressure that takes the capture point where the gait does in the rest of a step."""
+    rest = (1.0 - phase) * reference.duration
+    if rest < planning.soon:
+        found = value_at(reference.pressure, phase)
+    else:
+        grown = exp(reference.rate * rest)
+        found = (reference.end - value_at(reference.capture, phase) * grown) / (1.0 - grown)
+    return min(max(found, planning.heel), planning.toe)
+
+
+@kernel
+def consider(
+    planning: Planning, reference: Reference, own: float, correction: float, remaining: float,
+    plan: Plan,
+) -> None:  # fmt: skip
+    """Take a remaining time for the plan if it costs less than the plan so far."""
+    grown = exp(reference.rate * remaining)
+    slow = exp(reference.rate * max(remaining, planning.soon))
+    free = own + correction + (plan.capture - own) * grown
+    wanted = plan.length + plan.offset
+    shift = (free - wanted) / (slow - 1.0)
+    shift = min(max(shift, planning.heel - own), planning.toe - own)
+    end = free - shift * (grown - 1.0)
+    light, heavy = planning.foothold_weight, planning.capture_weight
+    foothold = (light * plan.length + heavy * (end - plan.offset)) / (light + heavy)
+    reach = planning.acceleration * remaining * remaining / 6.0
+    ahead = plan.swing + 2.0 / 3.0 * plan.speed * remaining
+    foothold = min(max(foothold, ahead - reach), ahead + reach)
+    foothold = min(max(foothold, planning.shortest), planning.longest)
+    off = foothold - plan.length
+    late = plan.elapsed + remaining - reference.duration
+    missed = end - foothold - plan.offset
+    cost = light * off * off + planning.time_weight * late * late + heavy * missed * missed
+    if cost < plan.cost:
+        plan.cost = cost
+        plan.foothold = foothold
+        plan.remaining = remaining
+        plan.pressure = shift
+
+
+@kernel
+def choose_time(
+    planning: Planning, reference: Reference, own: float, correction: float, soonest: float,
+    plan: Plan,
+) -> None:  # fmt: skip
+    """Look for a remaining time that costs less: on a grid, then between its points."""
+    least = max(planning.earliest - plan.elapsed, soonest)
+    most = max(planning.latest - plan.elapsed, least)
+    width = (most - least) / (TIMES - 1)
+    for k in range(TIMES):
+        consider(planning, reference, own, correction, least + width * k, plan)
+    for _ in range(4):
+        width *= 0.5
+        middle = plan.remaining
+        consider(planning, reference, own, correction, max(middle - width, least), plan)
+        consider(planning, reference, own, correction, min(middle + width, most), plan)
+
+
+@kernel
+def make_plan(planning: Planning, reference: Reference, retimed: bool, plan: Plan) -> None:
+    """Write the landing that costs least; if not `retimed`, when the gait lands."""
+    own = own_pressure(planning, reference, plan.phase)
+    rest = (1.0 - plan.phase) * reference.duration
+    grown = exp(reference.rate * rest)
+    capture = value_at(reference.capture, plan.phase)
+    correction = reference.end - own - (capture - own) * grown
+    plan.error = own + correction + (plan.capture - own) * grown - plan.length - plan.offset
+    plan.cost = 1e30
+    least = COMMITTED * reference.duration
+    left = plan.remaining - plan.gone
+    if left < least and plan.elapsed > 0.0:
+        # The foot is as good as down: what is left is too short to be worth another plan.
+        consider(planning, reference, own, correction, max(left, 1e-4), plan)
+    else:
+        rest = reference.duration - plan.elapsed
+        consider(planning, reference, own, correction, max(rest, least), plan)
+        if retimed:
+            least = max(least, (1.0 - plan.phase) * reference.duration / planning.hurry)
+            choose_time(planning, reference, own, correction, least, plan)
+    plan.pressure += value_at(reference.pressure, plan.phase)
+    plan.pressure = min(max(plan.pressure, planning.heel), planning.toe)

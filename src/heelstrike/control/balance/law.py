@@ -1,0 +1,424 @@
+"""Walking by whole-body control and footstep feedback: the law, from touchdown to torques."""
+
+from __future__ import annotations
+
+from math import atan, cos, exp, inf, sin, sqrt
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.balance.constrained import constrain, point_task
+from heelstrike.control.balance.footsteps import make_plan
+from heelstrike.control.balance.numbers import Log, Memory, Parameters
+from heelstrike.control.balance.reference import (
+    Reference,
+    curvature_at,
+    slope_at,
+    value_at,
+)
+from heelstrike.control.balance.tasks import (
+    KNEE_LEVEL,
+    add_contact,
+    add_motors,
+    add_pressure,
+    add_task,
+    clear,
+    solve_torques,
+)
+from heelstrike.control.computed_torque import has_landed
+from heelstrike.dynamics.kernels import center_of_mass, point_position
+from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.robot.model import Floats
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.law import controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+JUST_BEGUN = 0.05
+"""A step has just begun up to this phase."""
+
+TURNING = 0.15
+"""How far within the sole a foot presses that touches at one end, as a part of its length."""
+
+STEEP = 0.6
+"""Ground whose normal rises less cannot be stood upon."""
+
+STEEPEST = 0.35
+"""No slope is believed to be steeper."""
+
+
+@kernel
+def begin_step(t: float, reference: Reference, memory: Memory) -> None:
+    """Set the reference to the beginning of a step."""
+    memory.start = t
+    memory.phase = 0.0
+    memory.late = 0.0
+    memory.raised = 0.0
+    memory.rate = 1.0 / reference.duration
+    memory.plan.remaining = reference.duration
+
+
+@kernel
+def touched(contacts: Contacts, robot: ControlledRobot, foot: int, upright: bool) -> bool:
+    """Whether a foot touches ground that it could stand on, or else what it cannot."""
+    for i in range(robot.nc):
+        steep = contacts.normal[i, 1] <= STEEP
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and steep != upright:
+            return True
+    return False
+
+
+@kernel
+def exchange_at_touchdown(
+    t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Exchange stance and swing when the swing foot has met the ground."""
+    early = memory.phase < parameters.touchdown
+    if early or t - memory.start < 0.3 * parameters.planning.earliest:
+        return
+    swing = 1 - memory.stance
+    if touched(contacts, robot, swing, True):
+        length = memory.swing[0] - memory.sole[0]
+        rise = memory.swing[1] - memory.sole[1]
+        if abs(length) > 0.1 * parameters.reference.length:
+            slope = min(max(rise / length, -STEEPEST), STEEPEST)
+            memory.slope = 0.4 * memory.slope + 0.6 * slope
+        memory.stance = swing
+        memory.landed = 0
+        memory.steps += 1
+        begin_step(t, parameters.reference, memory)
+
+
+@kernel
+def lift_over(
+    t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Lift a swing foot that has hit a wall, such as the riser of a step, over it."""
+    if memory.stands == 1 or not touched(contacts, robot, 1 - memory.stance, False):
+        return
+    memory.alarm = 1.0
+    memory.phase = min(memory.phase, 0.5)
+    memory.late = 0.0
+    memory.plan.remaining = max(memory.plan.remaining, 0.3 * parameters.reference.duration)
+    more = parameters.fast * max(t - memory.time, 0.0)
+    memory.raised = min(memory.raised + more, parameters.most_raised)
+
+
+@kernel
+def locate(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Find soles, centre of mass and capture point."""
+    work, legs, plan = state.kinematics, parameters.legs, memory.plan
+    stance, swing = memory.stance, 1 - memory.stance
+    point_position(work, robot.foot_link[stance], legs.point[stance], memory.sole)
+    point_position(work, robot.foot_link[swing], legs.point[swing], memory.swing)
+    place = place_of(work, memory.swing)
+    memory.speed[0], memory.speed[1] = velocity_at(work.velocity, robot.foot_link[swing], place)
+    center_of_mass(robot.model, work, memory.mass)
+    robot.center_of_mass_velocity(state, robot.other)
+    plan.capture = memory.mass[0] - memory.sole[0] + robot.other[0] / parameters.reference.rate
+    plan.swing = memory.swing[0] - memory.sole[0]
+    plan.speed = memory.speed[0]
+
+
+@kernel
+def stand_or_walk(t: float, parameters: Parameters, memory: Memory) -> None:
+    """Begin to stand once the feet are together, and to walk if that is wanted or needed."""
+    plan, hold = memory.plan, parameters.hold
+    away = abs(plan.capture)
+    if memory.stands == 1:
+        if parameters.speed != 0.0 or away > hold:
+            memory.stands = 0
+            begin_step(t, parameters.reference, memory)
+    elif parameters.speed == 0.0 and memory.phase < JUST_BEGUN and memory.landed == 1:
+        level = abs(memory.swing[1] - memory.sole[1]) < 0.1 * hold
+        if level and abs(plan.swing) < hold and away < 0.5 * hold:
+            memory.stands = 1
+
+
+@kernel
+def stay(t: float, parameters: Parameters, memory: Memory) -> None:
+    """Stand: press beyond the capture point, so that it comes back to the middle of the sole."""
+    plan, planning = memory.plan, parameters.planning
+    memory.alarm *= exp(-max(t - memory.time, 0.0) / parameters.calming)
+    memory.time = t
+    memory.rate = 0.0
+    plan.foothold = plan.swing
+    plan.remaining = parameters.reference.duration
+    plan.pressure = min(max(2.0 * plan.capture, planning.heel), planning.toe)
+
+
+@kernel
+def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> None:
+    """Plan the landing, move the reference's clock on, and see how alarming all this is."""
+    reference, plan = parameters.reference, memory.plan
+    elapsed = max(t - memory.time, 0.0)
+    memory.phase = min(memory.phase + memory.rate * elapsed, 1.0)
+    if memory.phase >= 1.0:
+        memory.late += elapsed
+    memory.time = t
+    plan.gone = elapsed
+    plan.length = parameters.speed * reference.duration
+    more = (plan.length - reference.length) / (exp(reference.rate * reference.duration) - 1.0)
+    plan.offset = reference.end - reference.length + more
+    plan.phase = memory.phase
+    plan.elapsed = t - memory.start
+    make_plan(parameters.planning, reference, parameters.adapts == 1, plan)
+    rate = (1.0 - memory.phase) / plan.remaining
+    memory.rate += min(elapsed / parameters.smoothing, 1.0) * (rate - memory.rate)
+    if landed and parameters.adapts == 1:
+        span = parameters.alarmed - parameters.calm
+        alarm = min(max((sqrt(plan.cost) - parameters.calm) / span, 0.0), 1.0)
+        # A foot that is late has found the ground lower than it should be.
+        alarm = max(alarm, min(2.0 * memory.late / parameters.search - 0.2, 1.0))
+        memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
+
+
+@kernel
+def press_where_it_touches(
+    contacts: Contacts, robot: ControlledRobot, parameters: Parameters, tilt: float, memory: Memory
+) -> None:
+    """Want the centre of pressure near what touches of a foot that does not lie flat.
+
+    A foot on its heel alone is turned down gently by a pressure a little before the heel; torques
+    that are right for a sole that lies flat would throw it about.
+    """
+    planning, plan = parameters.planning, memory.plan
+    least, most = inf, -inf
+    for i in range(robot.nc):
+        if robot.contact_foot[i] == memory.stance and contacts.gap[i] < parameters.flat:
+            x = contacts.position[i, 0] - memory.sole[0]
+            z = contacts.position[i, 1] - memory.sole[1]
+            along = x * cos(tilt) - z * sin(tilt)
+            least, most = min(least, along), max(most, along)
+    if most != least or memory.stands == 1:
+        return
+    span = TURNING * (planning.toe - planning.heel)
+    plan.pressure = min(max(plan.pressure, most - span), least + span)
+    plan.pressure = min(max(plan.pressure, planning.heel), planning.toe)
+
+
+@kernel
+def want_height(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add the task of the hip's height, which no leg may be too short for."""
+    reference, legs, plan, alarm = parameters.reference, parameters.legs, memory.plan, memory.alarm
+    work, on, rate = state.kinematics, memory.on, memory.rate
+    hip = work.origin[legs.hip[memory.stance]]
+    ankle = work.origin[robot.foot_link[memory.stance]]
+    own = value_at(reference.hip, memory.phase)
+    # The plane in which the body goes: parallel to the ground.
+    rise = memory.slope * (hip[0] - memory.sole[0])
+    reach = (1.0 - 0.015 * alarm) * legs.length
+    across = hip[0] - ankle[0]
+    under = ankle[1] - memory.sole[1]
+    room = under + sqrt(max(reach * reach - across * across, 0.0)) - rise
+    omega = reference.rate
+    # How far the hip will be before the foot that lands, the body falling over where it presses.
+    x = memory.mass[0] - memory.sole[0]
+    grown, shrunk = exp(omega * plan.remaining), exp(-omega * plan.remaining)
+    fallen = 0.5 * (plan.capture - plan.pressure) * (grown - 1.0)
+    fallen += 0.5 * (2.0 * x - plan.capture - plan.pressure) * (shrunk - 1.0)
+    across = plan.foothold - (hip[0] - memory.sole[0]) - fallen
+    limit = under + sqrt(max(reach * reach - across * across, 0.25 * reach * reach))
+    if memory.late > 0.0:
+        limit += min(memory.swing[1] - memory.sole[1] - memory.slope * plan.swing, 0.0)
+    low = min(min(own - parameters.crouch, room), limit)
+    height = own + alarm * (low - own)
+    point_task(robot, state, legs.hip[memory.stance], hip, on)
+    place = place_of(work, hip)
+    velocity = velocity_at(work.velocity, legs.hip[memory.stance], place)
+    calm = 1.0 - alarm
+    missing = calm * curvature_at(reference.hip, memory.phase) * rate * rate - on.shift[1]
+    missing += parameters.kp * (height + rise - (hip[1] - memory.sole[1]))
+    wanted = calm * slope_at(reference.hip, memory.phase) * rate + memory.slope * velocity[0]
+    missing += damping * parameters.kd * (wanted - velocity[1])
+    add_task(on.rows, 1, missing, parameters.weights.height, memory.program)
+
+
+@kernel
+def want_trunk(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add the task of the trunk's rotation."""
+    pitch, phase, rate, work = (
+        parameters.reference.pitch,
+        memory.phase,
+        memory.rate,
+        state.kinematics,
+    )
+    on, calm = memory.on, 1.0 - memory.alarm
+    point_task(robot, state, 2, work.origin[2], on)
+    missing = calm * curvature_at(pitch, phase) * rate * rate - on.shift[2]
+    missing += parameters.kp * (calm * value_at(pitch, phase) - work.angle[2])
+    wanted = calm * slope_at(pitch, phase) * rate
+    missing += damping * parameters.kd * (wanted - work.velocity[2, 0])
+    add_task(on.rows, 2, missing, parameters.weights.pitch, memory.program)
+
+
+@kernel
+def want_foothold(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add the tasks of the swing foot: to its foothold, over the ground, parallel to it."""
+    reference, weights, plan = parameters.reference, parameters.weights, memory.plan
+    phase, rate, on, program = memory.phase, memory.rate, memory.on, memory.program
+    swing, alarm = 1 - memory.stance, memory.alarm
+    link = robot.foot_link[swing]
+    point_task(robot, state, link, memory.swing, on)
+    squared = rate * rate
+
+    # Along the ground: what is wrong vanishes, in the time that is left, with the least effort.
+    left = max(plan.remaining, parameters.haste)
+    off = plan.swing - value_at(reference.swing_x, phase)
+    drift = plan.speed - slope_at(reference.swing_x, phase) * rate
+    goal = plan.foothold - reference.length
+    pull = 6.0 * (goal - off) / (left * left) - damping * 4.0 * drift / left
+    limit = parameters.planning.acceleration
+    pull = min(max(pull, -limit), limit)
+    ahead = min(max(curvature_at(reference.swing_x, phase) * squared + pull, -limit), limit)
+    add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
+
+    # Over the ground: the gait's way, higher when alarmed; a late foot looks for the ground.
+    up = memory.slope * plan.swing + value_at(reference.swing_z, phase) + memory.raised
+    speed = memory.slope * plan.speed + slope_at(reference.swing_z, phase) * rate
+    bend = curvature_at(reference.swing_z, phase) * squared
+    s, r = phase, 1.0 - phase
+    up += alarm * parameters.lift * 16.0 * s * s * r * r
+    speed += alarm * parameters.lift * 32.0 * s * r * (r - s) * rate
+    bend += alarm * parameters.lift * 32.0 * (1.0 - 6.0 * s * r) * squared
+    height = memory.swing[1] - memory.sole[1]
+    if memory.late > 0.0:
+        part = min(memory.late / parameters.search, 1.0)
+        speed = -parameters.slow - part * (parameters.fast - parameters.slow)
+        rise = parameters.foot_kd * damping * (speed - memory.speed[1])
+    else:
+        rise = bend + parameters.foot_kp * (up - height)
+        rise += damping * parameters.foot_kd * (speed - memory.speed[1])
+    rise = min(max(rise, -limit), limit)
+    add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
+
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[swing]
+    own = value_at(reference.swing_angle, phase) - atan(memory.slope)
+    turn = curvature_at(reference.swing_angle, phase) * squared
+    turn += parameters.foot_kp * (own - tilt)
+    wanted = slope_at(reference.swing_angle, phase) * rate
+    turn += damping * parameters.foot_kd * (wanted - state.kinematics.velocity[link, 0])
+    add_task(on.rows, 2, turn - on.shift[2], weights.angle, program)
+
+
+@kernel
+def want_rest(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
+) -> None:
+    """Add the task of the other foot as the robot stands: to stay where it is."""
+    weights, on, program = parameters.weights, memory.on, memory.program
+    link, kd = robot.foot_link[1 - memory.stance], parameters.foot_kd
+    point_task(robot, state, link, memory.swing, on)
+    add_task(on.rows, 0, -kd * memory.speed[0] - on.shift[0], weights.swing, program)
+    add_task(on.rows, 1, -kd * memory.speed[1] - on.shift[1], weights.swing, program)
+    turn = -kd * state.kinematics.velocity[link, 0]
+    add_task(on.rows, 2, turn - on.shift[2], weights.angle, program)
+
+
+@kernel
+def want_posture(
+    state: ControlState, robot: ControlledRobot, parameters: Parameters, damping: float,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Add what settles what the other tasks leave open: the gait's joints, bent knees, effort."""
+    reference, weights = parameters.reference, parameters.weights
+    program, on, phase, rate = memory.program, memory.on, memory.phase, memory.rate
+    weight = weights.posture * (1.0 - 0.98 * memory.alarm)
+    for i in range(robot.nu):
+        table = reference.joints[memory.stance, :, i]
+        wanted = curvature_at(table, phase) * rate * rate
+        if memory.stands == 0:
+            wanted += parameters.joint_kp * (value_at(table, phase) - state.joint_position[i])
+        speed = slope_at(table, phase) * rate
+        wanted += damping * parameters.joint_kd * (speed - state.joint_velocity[i])
+        program.hessian[i, i] += weight
+        program.gradient[i] -= weight * wanted
+        add_task(on.torque, i, -on.hold[i], weights.torque, program)
+
+
+@kernel
+def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory) -> None:
+    """Add rows that let no knee pass the angle beyond which its leg could not lift the body.
+
+    A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v.
+    """
+    legs, program, stiffness = parameters.legs, memory.program, parameters.knee_kp
+    range_of = parameters.bent_knee - parameters.straight_knee
+    for foot in range(2):
+        knee, sign = legs.knee[foot], legs.bend[foot]
+        bent = sign * (state.joint_position[knee] - legs.straight[foot])
+        part = memory.alarm
+        if foot != memory.stance:
+            # A swing leg that is bent the wrong way could not be lifted.
+            table = parameters.reference.joints[memory.stance, :, knee]
+            gait = sign * (value_at(table, memory.phase) - legs.straight[foot])
+            part = max(min(4.0 * part, 1.0), min(2.5 * gait - 0.5, 1.0))
+        least = parameters.straight_knee + max(part, 0.0) * range_of
+        row = program.count
+        for i in range(program.x.shape[0]):
+            program.rows[row, i] = 0.0
+        program.rows[row, knee] = sign
+        speed = sign * state.joint_velocity[knee]
+        program.bound[row] = stiffness * (least - bent) - 2.0 * sqrt(stiffness) * speed
+        program.level[row] = KNEE_LEVEL
+        program.count = row + 1
+
+
+@kernel
+def tell(memory: Memory, log: Log) -> None:
+    """Fill in the log."""
+    plan = memory.plan
+    log.phase = memory.phase
+    log.alarm = memory.alarm
+    log.capture_point = plan.capture
+    log.foothold = plan.foothold
+    log.pressure = plan.pressure
+    log.remaining = plan.remaining
+    log.slope = memory.slope
+    log.relaxed = memory.program.relaxed
+
+
+@controller
+def keep_balance(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, log: Log, torque: Floats,
+) -> None:  # fmt: skip
+    """Joint torques that walk, by the gait or by where the next foot has to land."""
+    exchange_at_touchdown(t, contacts, robot, parameters, memory)
+    lift_over(t, contacts, robot, parameters, memory)
+    locate(state, robot, parameters, memory)
+    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    stand_or_walk(t, parameters, memory)
+    if memory.stands == 1:
+        stay(t, parameters, memory)
+    else:
+        decide(t, landed, parameters, memory)
+    stance, on, program = memory.stance, memory.on, memory.program
+    link = robot.foot_link[stance]
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[stance]
+    press_where_it_touches(contacts, robot, parameters, tilt, memory)
+    constrain(robot, state, link, memory.sole, on)
+    clear(program)
+    weights = parameters.weights
+    add_pressure(weights.pressure, tilt, memory.plan.pressure, parameters.weight, on, program)
+    damping = 1.0 if landed else 0.0
+    want_height(state, robot, parameters, damping, memory)
+    want_trunk(state, robot, parameters, damping, memory)
+    if memory.stands == 1:
+        want_rest(state, robot, parameters, memory)
+    else:
+        want_foothold(state, robot, parameters, damping, memory)
+    want_posture(state, robot, parameters, damping, memory)
+    add_contact(parameters, tilt, on, program)
+    add_motors(robot, state, on, program)
+    keep_knees_bent(state, parameters, memory)
+    solve_torques(robot, state, memory, torque)
+    tell(memory, log)

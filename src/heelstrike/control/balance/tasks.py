@@ -1,0 +1,138 @@
+"""The quadratic programme of a whole body: tasks as costs, contact and motors as rows."""
+
+from __future__ import annotations
+
+from math import cos, inf, sin
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.balance.constrained import Constrained
+from heelstrike.control.balance.numbers import Memory, Parameters
+from heelstrike.control.quadratic.dual_active_set import solve_or_relax
+from heelstrike.control.quadratic.program import SOLVED, Program
+from heelstrike.robot.model import Floats
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+CONTACT_ROWS = 5
+
+# In which order rows are given up if not all can be kept: the margins of the centre of pressure
+# first, then the least normal force, then the friction cone. Motors cannot be overruled.
+KNEE_LEVEL = 4
+PRESSURE_LEVEL = 2
+FORCE_LEVEL = 3
+CONE_LEVEL = 1
+MOTOR_LEVEL = 0
+
+
+@kernel
+def clear(program: Program) -> None:
+    """Begin a new programme: no cost, no rows."""
+    n = program.x.shape[0]
+    for i in range(n):
+        program.gradient[i] = 0.0
+        for j in range(n):
+            program.hessian[i, j] = 0.0
+    program.count = 0
+    program.equalities = 0
+
+
+@kernel
+def add_task(rows: Floats, row: int, missing: float, weight: float, program: Program) -> None:
+    """Add ½ weight (row a − missing)² to the cost."""
+    n = program.x.shape[0]
+    for i in range(n):
+        share = weight * rows[row, i]
+        program.gradient[i] -= share * missing
+        for j in range(n):
+            program.hessian[i, j] += share * rows[row, j]
+
+
+@kernel
+def add_wrench_row(
+    on: Constrained, x: float, z: float, moment: float, level: int, program: Program
+) -> int:
+    """Add a row: force and moment of the ground along this direction are not negative."""
+    row = program.count
+    for i in range(program.x.shape[0]):
+        program.rows[row, i] = x * on.wrench[0, i] + z * on.wrench[1, i] + moment * on.wrench[2, i]
+    program.bound[row] = -(x * on.load[0] + z * on.load[1] + moment * on.load[2])
+    program.level[row] = level
+    program.count = row + 1
+    return row
+
+
+@kernel
+def add_contact(parameters: Parameters, tilt: float, on: Constrained, program: Program) -> None:
+    """Add what the ground can do: push, within the cone, and from within the sole."""
+    planning, friction = parameters.planning, parameters.friction
+    nx, nz = sin(tilt), cos(tilt)  # along the sole goes (nz, −nx)
+    pushes = add_wrench_row(on, nx, nz, 0.0, FORCE_LEVEL, program)
+    program.bound[pushes] += parameters.least_force
+    add_wrench_row(on, friction * nx + nz, friction * nz - nx, 0.0, CONE_LEVEL, program)
+    add_wrench_row(on, friction * nx - nz, friction * nz + nx, 0.0, CONE_LEVEL, program)
+    add_wrench_row(on, -planning.heel * nx, -planning.heel * nz, -1.0, PRESSURE_LEVEL, program)
+    add_wrench_row(on, planning.toe * nx, planning.toe * nz, 1.0, PRESSURE_LEVEL, program)
+
+
+@kernel
+def torque_range(robot: ControlledRobot, state: ControlState, actuator: int) -> tuple[float, float]:
+    """Least and greatest torque of a motor at its present speed."""
+    model = robot.model
+    joint = model.actuator_joint[actuator]
+    least, most = model.torque_lower[actuator], model.torque_upper[actuator]
+    stall = model.stall_torque[joint]
+    if stall < inf:
+        part = state.joint_velocity[actuator] / model.no_load_speed[joint]
+        least, most = max(least, -stall * (1.0 + part)), min(most, stall * (1.0 - part))
+    return least, most
+
+
+@kernel
+def add_motors(
+    robot: ControlledRobot, state: ControlState, on: Constrained, program: Program
+) -> None:
+    """Add what the motors can do."""
+    for actuator in range(robot.nu):
+        least, most = torque_range(robot, state, actuator)
+        for side in range(2):
+            sign = 1.0 - 2.0 * side
+            limit = -most if side else least
+            if limit == -inf:
+                continue
+            row = program.count
+            for i in range(robot.nu):
+                program.rows[row, i] = sign * on.torque[actuator, i]
+            program.bound[row] = limit - sign * on.hold[actuator]
+            program.level[row] = MOTOR_LEVEL
+            program.count = row + 1
+
+
+@kernel
+def add_pressure(
+    weight: float, tilt: float, pressure: float, total: float, on: Constrained, program: Program
+) -> None:
+    """Add the wish for a centre of pressure: no moment about there."""
+    row = add_wrench_row(
+        on, pressure * sin(tilt) / total, pressure * cos(tilt) / total, 1.0 / total, 0, program
+    )
+    program.count = row
+    add_task(program.rows, row, program.bound[row], weight, program)
+
+
+@kernel
+def solve_torques(
+    robot: ControlledRobot, state: ControlState, memory: Memory, torque: Floats
+) -> None:
+    """Solve the programme; write the torques of its answer, or the last ones if it has none."""
+    on, program = memory.on, memory.program
+    solve_or_relax(program)
+    if program.relaxed > 0:
+        memory.relaxed += 1
+    if program.status != SOLVED:
+        memory.unsolved += 1
+        return
+    for j in range(robot.nu):
+        total = on.hold[j]
+        for i in range(robot.nu):
+            total += on.torque[j, i] * program.x[i]
+        least, most = torque_range(robot, state, j)
+        torque[j] = min(max(total, least), most)

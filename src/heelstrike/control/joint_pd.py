@@ -1,0 +1,214 @@
+"""Springs and dampers on the joints about a gait, with as much feedforward as one likes.
+
+    Γ = Γ_ff + kp (q_ref − q) + kd (q̇_ref − q̇)
+
+Γ_ff is nothing, what bears the weight on the stance foot (q̈ = q̇ = 0), or what the gait needs
+(q̈ = q̈_ref, at the state as it is). Unlike computed torque the feedback does not go through the
+mass matrix: gains are in N m/rad, as motor drives have them.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from heelstrike.compiler.bundle import array, number
+from heelstrike.control.computed_torque import (
+    Stance,
+    StepTiming,
+    has_landed,
+    pitch_of,
+    restart_at_touchdown,
+)
+from heelstrike.errors import ControllerError, GaitError
+from heelstrike.gait.gait import Gait
+from heelstrike.robot.loops import refuse_loops
+from heelstrike.robot.model import Floats
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.law import Law, controller, per_actuator
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+
+class Feedforward(StrEnum):
+    """What a law of springs and dampers knows of the robot's dynamics.
+
+    Attributes
+    ----------
+    NONE
+        Nothing.
+    GRAVITY
+        The torques that bear the weight on the flat stance foot, at rest.
+    FULL
+        Those that the gait needs: inertia, velocities and weight.
+    """
+
+    NONE = "none"
+    GRAVITY = "gravity"
+    FULL = "full"
+
+
+class Parameters(StepTiming):
+    """Numbers of the law.
+
+    Attributes
+    ----------
+    kp, kd : (nu,) float
+        Stiffness (N m/rad) and damping (N m s/rad).
+    breakpoints : (pieces + 1,) float
+    coefficients : (2, pieces, terms, nu) float
+        The gait, as in :mod:`heelstrike.control.computed_torque`.
+    latest : float
+        The reference goes on along its polynomials until this time in a step (s).
+    weight, motion : int
+        Whether the weight, and whether velocities and accelerations are fed forward.
+    """
+
+    kp: Floats = array("nu")
+    kd: Floats = array("nu")
+    breakpoints: Floats = array("pieces + 1")
+    coefficients: Floats = array(2, "pieces", "terms", "nu")
+    latest: float = number(float)
+    weight: int = number(int)
+    motion: int = number(int)
+
+
+class Memory(Stance):
+    """What the law remembers.
+
+    Attributes
+    ----------
+    position, velocity, acceleration : (nu,) float
+        Of the gait.
+    """
+
+    position: Floats = array("nu")
+    velocity: Floats = array("nu")
+    acceleration: Floats = array("nu")
+
+
+@controller
+def joint_pd(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, torque: Floats,
+) -> None:  # fmt: skip
+    """Joint torques of the law above."""
+    restart_at_touchdown(t, contacts, robot, parameters, memory)
+    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    phase = min(t - memory.start, parameters.latest)
+    late = t - memory.start > parameters.latest
+    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
+    piece = 0
+    while piece < coefficients.shape[1] - 1 and phase >= breakpoints[piece + 1]:
+        piece += 1
+    phase -= breakpoints[piece]
+    for i in range(robot.nu):
+        position, velocity, acceleration = 0.0, 0.0, 0.0
+        for k in range(coefficients.shape[2] - 1, -1, -1):
+            acceleration = acceleration * phase + 2.0 * velocity
+            velocity = velocity * phase + position
+            position = position * phase + coefficients[memory.stance, piece, k, i]
+        moves = 0.0 if late else 1.0
+        memory.position[i] = position
+        memory.velocity[i] = moves * velocity
+        memory.acceleration[i] = moves * parameters.motion * acceleration
+        torque[i] = 0.0
+    if parameters.weight == 1:
+        seen = state
+        if parameters.motion == 0:
+            seen = robot.estimate
+            for j in range(robot.nq):
+                seen.q[j] = state.q[j]
+            for j in range(robot.nv):
+                seen.v[j] = 0.0
+            robot.update(seen)
+        robot.flat_foot_torque(seen, memory.stance, memory.acceleration, torque)
+    for i in range(robot.nu):
+        torque[i] += parameters.kp[i] * (memory.position[i] - state.joint_position[i])
+        if landed:
+            torque[i] += parameters.kd[i] * (memory.velocity[i] - state.joint_velocity[i])
+
+
+class JointPD(Law):
+    """Follow a gait on flat feet with springs and dampers on the joints, step after step.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated.
+    gait : Gait
+        The gait to follow, on flat feet.
+    kp, kd : float or (nu,) array
+        Stiffness (N m/rad) and damping (N m s/rad).
+    feedforward : Feedforward or its name
+        What is known of the dynamics: ``"none"``, ``"gravity"`` or ``"full"``.
+
+    Raises
+    ------
+    ControllerError
+        If the robot cannot be controlled this way, or gait or gains do not fit it.
+
+    Notes
+    -----
+    Torques are held over a step of time stepping: the damping of a joint that moves little inertia,
+    an ankle in swing, must stay below inertia over step, or the linearly implicit scheme be used.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("bravo7")
+    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
+    >>> law = hs.JointPD(robot, gait, kp=1000.0, kd=20.0, feedforward="full")
+    >>> hs.simulate(robot, law, state=gait.initial_state, duration=1.4).completed
+    True
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        *,
+        kp: ArrayLike,
+        kd: ArrayLike,
+        feedforward: Feedforward | str = Feedforward.FULL,
+    ) -> None:
+        refuse_loops(robot, "springs and dampers about a gait", ControllerError)
+        pitch_of(robot)
+        try:
+            gait.check_joints(robot)
+            known = Feedforward(feedforward)
+        except GaitError as error:
+            raise ControllerError(str(error)) from None
+        except ValueError:
+            names = ", ".join(f"{each.value!r}" for each in Feedforward)
+            raise ControllerError(
+                f"feedforward must be one of {names}, got {feedforward!r}"
+            ) from None
+        if gait.point_feet:
+            raise ControllerError(
+                "springs and dampers about a gait need flat feet; for a gait on point feet use "
+                "ComputedTorque"
+            )
+        kp, kd = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
+        if np.any(kp < 0.0) or np.any(kd < 0.0):
+            raise ControllerError(f"kp and kd must not be negative, got {kp} and {kd}")
+        sides = [gait.pieces, gait.mirrored_pieces()]
+        if gait.stance_foot:
+            sides.reverse()
+        duration = gait.step_duration
+        parameters = Parameters(
+            kp=kp,
+            kd=kd,
+            breakpoints=gait.breakpoints,
+            coefficients=np.array(sides),
+            earliest=0.5 * duration,
+            latest=1.1 * duration,
+            landing=0.02 * duration,
+            weight=int(known is not Feedforward.NONE),
+            motion=int(known is Feedforward.FULL),
+        )
+        begin = {"stance": gait.stance_foot, "landed": 1}
+        super().__init__(joint_pd, parameters, memory=begin, robot=robot, stiffness=kp, damping=kd)
+        self.gait = gait

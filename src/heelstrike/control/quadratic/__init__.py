@@ -1,0 +1,1 @@
+"""Small convex quadratic programmes, solved in compiled code and certified."""

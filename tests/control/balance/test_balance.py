@@ -1,0 +1,186 @@
+"""Whole-body control and footstep feedback: they walk, recover, and keep what they promise."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import walking
+
+import heelstrike as hs
+from heelstrike.analysis.recovery import recovery
+from heelstrike.control.balance.controllers import WholeBody
+from heelstrike.control.balance.reference import reference_of, slope_at, value_at
+from heelstrike.dynamics import link_poses
+from heelstrike.errors import ControllerError
+
+
+@cache
+def law(**options: Any) -> hs.FootstepFeedback:
+    return hs.FootstepFeedback(walking.bravo7(), walking.gait(), **options)
+
+
+def walked(controller: WholeBody, duration: float, **options: Any) -> hs.Run:
+    begin = options.pop("state", walking.gait().initial_state)
+    return hs.simulate(walking.bravo7(), controller, state=begin, duration=duration, **options)
+
+
+def pushed(impulse: float, start: float) -> hs.Push:
+    return hs.Push("trunk", force=(10.0 * impulse, 0.0), start=start, duration=0.1)
+
+
+def effort(run: hs.Run) -> float:
+    return float(np.mean(np.sum(run.torque**2, axis=1)))
+
+
+def test_the_reference_is_the_gait() -> None:
+    """Where the swing sole is, and that rates are derivatives."""
+    robot, gait = walking.bravo7(), walking.gait()
+    reference = reference_of(robot, gait)
+    assert value_at(reference.swing_x, 0.0) == pytest.approx(-gait.step_length, abs=1e-9)
+    assert value_at(reference.swing_x, 1.0) == pytest.approx(gait.step_length, abs=1e-9)
+    assert value_at(reference.swing_z, 1.0) == pytest.approx(0.0, abs=1e-9)
+    for table in (reference.hip, reference.capture, reference.joints[1, :, 2]):
+        rate = (value_at(table, 0.61) - value_at(table, 0.59)) / 0.02
+        assert slope_at(table, 0.6) == pytest.approx(rate, abs=2e-3 * max(1.0, abs(rate)))
+    mirrored = gait.mirrored(gait.in_step(0.3 * gait.step_duration))
+    for i in range(robot.nu):
+        assert value_at(reference.joints[1, :, i], 0.3) == pytest.approx(mirrored[i], abs=1e-5)
+
+
+@pytest.mark.parametrize("kind", [hs.WholeBody, hs.FootstepFeedback])
+def test_undisturbed_it_is_the_gait_at_its_price(kind: type[WholeBody]) -> None:
+    """Length and duration of the step to 2 %; torques no more than computed torque's by half."""
+    robot, gait = walking.bravo7(), walking.gait()
+    run = walked(kind(robot, gait), 5.0 * gait.step_duration)
+    assert run.completed
+    steps = 4
+    now = np.searchsorted(run.time, (5.0 - steps) * gait.step_duration)
+    length = (run.position[-1, 0] - run.position[now, 0]) / steps
+    assert length == pytest.approx(gait.step_length, rel=0.02)
+    usual = walked(hs.ComputedTorque(robot, gait), 2.0 * gait.step_duration)  # type: ignore[arg-type]
+    assert effort(run) < 1.5 * effort(usual)
+
+
+@pytest.mark.parametrize("impulse", [40.0, -40.0])
+def test_it_recovers_from_a_push(impulse: float) -> None:
+    begin = 2.3 * walking.gait().step_duration
+    run = walked(law(), begin + 5.1, pushes=pushed(impulse, begin), record_every=5)
+    found = recovery(run, after=5.0)
+    assert found, found.reason
+
+
+def test_the_law_that_does_not_step_elsewhere_falls_of_such_a_push() -> None:
+    """So that the test above tests the footsteps."""
+    fixed = hs.WholeBody(walking.bravo7(), walking.gait())
+    run = walked(fixed, 7.0, pushes=pushed(40.0, 1.61))
+    assert run.status == hs.RunStatus.FELL
+
+
+def test_torques_cone_and_sole_are_never_left() -> None:
+    """Of the programme's answers, while they are told to keep them all."""
+    robot = walking.bravo7()
+    simulation = hs.Simulation(
+        robot, law(), state=walking.gait().initial_state, pushes=pushed(60.0, 0.9)
+    )
+    memory = simulation._numbers.memory
+    numbers = simulation.parameters
+    seen = 0
+    while simulation.time < 2.1:
+        simulation.advance(simulation.time + 0.004)
+        asked = simulation.state.q
+        simulation.step()  # the torques of this one are for the state before it
+        program, on = memory.program, memory.on
+        torque = on.torque @ program.x + on.hold
+        assert np.all(np.abs(torque) <= 300.0 * (1.0 + 1e-9))
+        if program.relaxed:
+            continue
+        seen += 1
+        link = robot.feet[memory.stance].link
+        tilt = link_poses(robot, asked).angle[link]
+        x, z, moment = on.wrench @ program.x + on.load
+        along, normal = x * np.cos(tilt) - z * np.sin(tilt), x * np.sin(tilt) + z * np.cos(tilt)
+        assert normal >= numbers.least_force * (1.0 - 1e-9)
+        assert abs(along) <= numbers.friction * normal * (1.0 + 1e-9)
+        assert numbers.planning.heel - 1e-9 <= -moment / normal <= numbers.planning.toe + 1e-9
+    assert seen > 200
+
+
+def test_it_stands_starts_and_stops_on_command() -> None:
+    robot = walking.bravo7()
+    simulation = hs.Simulation(robot, law(speed=0.0), state=robot.reference_state())
+    memory = simulation._numbers.memory
+    simulation.advance(0.5)
+    assert (memory.stands, memory.steps) == (1, 0)
+    simulation.parameters.speed = 0.3
+    simulation.advance(4.0)
+    assert memory.stands == 0
+    assert simulation.state.v[0] > 0.1
+    assert simulation.state.q[0] > 0.6
+    simulation.parameters.speed = 0.0
+    simulation.advance(7.0)
+    assert memory.stands == 1
+    assert np.abs(simulation.state.v).max() < 0.05
+    assert simulation.state.q[1] > 0.9
+
+
+def test_it_finds_the_ground_where_it_is_not_expected() -> None:
+    """A step down, a step up and a slope that nobody told it of."""
+    for rise, ends in ((-0.06, 1.05), (0.04, 1.05)):
+        profile = [[-1.0, 0.0], [ends, 0.0], [ends, rise], [4.0, rise]]
+        run = walked(law(), 5.6, ground=hs.Ground(profile=profile), record_every=10)
+        assert run.completed, run.message
+        assert run.position[-1, 0] > 1.8
+        assert run.position[:, 1].min() > 0.65 * run.position[0, 1]
+    slope = hs.Ground(profile=[[-1.0, 0.0], [0.6, 0.0], [3.6, 0.3]])
+    run = walked(law(), 5.6, ground=slope, record_every=10)
+    assert run.completed
+    assert run.log["slope"].values[-1] == pytest.approx(0.1, abs=0.02)
+
+
+def test_feet_that_do_not_lie_flat_are_not_thrown_about() -> None:
+    """Ground with corners at random heights of ±30 mm: feet stand on one end before they turn."""
+    rng = np.random.default_rng(5)
+    x = 0.6 + 0.15 * np.arange(40)
+    z = rng.uniform(-0.03, 0.03, len(x))
+    profile = np.column_stack(([-9.0, 0.6, *x, 9.0], [0.0, 0.0, *z, 0.0]))
+    run = walked(law(), 12.0 * 0.7, ground=hs.Ground(profile=profile), record_every=10)
+    assert run.completed, run.message
+    assert np.abs(run.position[:, 2]).max() < 0.6
+    assert run.position[-1, 0] > 2.5
+
+
+def test_it_logs_what_it_plans() -> None:
+    run = walked(law(), 0.35)
+    assert run.log["phase"].values[-1] == pytest.approx(0.5, abs=0.01)
+    assert run.log["foothold"].values[-1] == pytest.approx(walking.gait().step_length, abs=0.005)
+    assert run.log["remaining"].values[-1] == pytest.approx(0.35, abs=0.01)
+
+
+def test_numbers_are_those_of_the_robot_by_its_size() -> None:
+    parameters = law().parameters
+    assert parameters.weight == pytest.approx(75.0 * 9.81)
+    assert parameters.planning.toe == pytest.approx(0.09)
+    assert parameters.legs.bend.tolist() == [1.0, 1.0]
+    assert parameters.legs.length == pytest.approx(0.8838)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"numbers": {"crouching": 0.1}}, "no number 'crouching'; there are .*crouch, "),
+        ({"numbers": {"crouch": np.nan}}, "crouch must be a finite number"),
+        ({"friction": 0.0}, "friction must be positive"),
+    ],
+)
+def test_wrong_numbers_are_named(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(ControllerError, match=said):
+        law.__wrapped__(**options)
+
+
+def test_robots_it_cannot_control_are_refused() -> None:
+    rabbit = hs.load_robot("rabbit")
+    with pytest.raises(ControllerError, match="moves the joints"):
+        hs.FootstepFeedback(rabbit, walking.gait())
