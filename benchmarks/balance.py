@@ -160,7 +160,7 @@ def hard(walker: Walker, seeds: range) -> None:
     degree = np.pi / 180.0
 
     def encoders(seed: int, law: Any) -> Any:
-        return hs.Sensed(walker.robot, law, encoders=hs.Encoders(bits=14), period=1e-3, seed=seed)
+        return hs.Sensed(law, encoders=hs.Encoders(bits=14), period=1e-3, seed=seed)
 
     def everything(seed: int) -> tuple[hs.Ground, dict[str, Any]]:
         surface = made(seed, slope=4.0 * degree, rough=0.015 * size, friction=0.5)
