@@ -366,5 +366,7 @@ def test_nobody_writes_past_it() -> None:
                     found.add((source.relative_to(package).as_posix(), node.attr))
     assert found == {
         ("view/animation.py", "write_bytes"),  # into the file beside
+        ("view/live/viewer.py", "write_text"),  # into a folder of its own, for the browser
+        ("view/report/writing.py", "savefig"),  # into memory
         ("view/style.py", "savefig"),  # into memory
     }

@@ -58,7 +58,7 @@ def test_delassus_matrix_and_what_impulses_do(
             row = 2 * (robot.nc + place) + place
             write_unit_row(int(draw.integers(robot.nv)), row, -1.0, assembly)
         count = robot.nc + 2
-        assemble_delassus(robot.model, equations, count, assembly)
+        assemble_delassus(robot.model, count, equations, assembly)
         jacobian = assembly.jacobian[: 2 * count]
         inverse = np.linalg.inv(dynamics.mass_matrix(robot, memory.q))
         expected = jacobian @ inverse @ jacobian.T
