@@ -43,7 +43,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 class Opened:
     """A page that was opened offline, and all that went wrong or was asked for."""
 
-    def __init__(self, chromium: Any, path: Path, **options: Any) -> None:
+    def __init__(self, chromium: Any, path: Path, at: str = "", **options: Any) -> None:
         size = {"viewport": {"width": 1200, "height": 900}}
         self.page = chromium.new_context(offline=True, **(size | options)).new_page()
         self.wrong: list[str] = []
@@ -51,7 +51,7 @@ class Opened:
         self.page.on("console", lambda message: self.wrong.append(message.text))
         self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
         self.page.on("request", lambda request: self.asked.append(request.url))
-        self.page.goto(path.as_uri())
+        self.page.goto(path.as_uri() + at)
 
     def ready(self) -> Opened:
         self.page.locator("html[data-ready=yes]").wait_for(state="attached")
@@ -110,6 +110,17 @@ def test_keys(chromium: Any, files: dict[str, Path]) -> None:
     opened.page.wait_for_timeout(150)
     assert opened.time == held
     opened.check()
+
+
+def test_a_page_in_a_frame_may_play_at_once(chromium: Any, files: dict[str, Path]) -> None:
+    """Not for people who asked their system for stillness."""
+    opened = Opened(chromium, files["walk"], "#play").ready()
+    browsers.wait_until(lambda: opened.time > 0.1, "the robot to move")
+    opened.check()
+    still = Opened(chromium, files["walk"], "#play", reduced_motion="reduce").ready()
+    still.page.wait_for_timeout(150)
+    assert still.time == 0.0
+    still.check()
 
 
 def test_mouse(chromium: Any, files: dict[str, Path]) -> None:
