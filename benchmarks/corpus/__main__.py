@@ -26,7 +26,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from corpus.clones import Published, extracted, published
+from corpus.clones import Published, extracted, published, row
 from corpus.peers import ROOT, MuJoCo, Peer, Refused, peer_of
 from heelstrike import dynamics
 from heelstrike.errors import HeelstrikeError
@@ -172,15 +172,10 @@ def page(outcomes: list[Outcome]) -> str:
             "|---|---|---|---|",
         ]
         for each in these:
-            link = (
-                f"[{each.robot.path.split('/')[-1]}](https://github.com/{each.robot.repository}/"
-                f"blob/{each.robot.commit}/{each.robot.path.replace(' ', '%20')})"
-            )
             words = each.summary if each.loaded else f"**refused**: {each.summary}"
             number = "" if np.isnan(each.difference) else f"{each.difference:.1g}"
             said = f"{each.engine}{'; ' + each.said if each.said else ''}"
-            cells = (f"{each.robot.repository} {link}", words, said, number)
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+            lines.append(row(each.robot.link, words, said, number))
         lines.append("")
     return "\n".join(lines)
 

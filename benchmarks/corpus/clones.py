@@ -43,6 +43,12 @@ class Published:
     kind: str
     options: str = ""
 
+    @property
+    def link(self) -> str:
+        """The repository, and a link to the file in it, as Markdown."""
+        address = f"https://github.com/{self.repository}/blob/{self.commit}/{self.path}"
+        return f"{self.repository} [{self.path.split('/')[-1]}]({address.replace(' ', '%20')})"
+
     def how(self) -> dict[str, Any]:
         """Options of `load_robot` for this file."""
         options: dict[str, Any] = {"projected": True} if self.kind == "spatial" else {}
@@ -55,6 +61,11 @@ def published() -> list[Published]:
     """Return the table."""
     with TABLE.open(newline="", encoding="utf-8") as file:
         return [Published(**row) for row in csv.DictReader(file)]
+
+
+def row(*cells: str) -> str:
+    """Return a row of a Markdown table."""
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
 def extracted(robot: Published, clones: Path, scratch: Path) -> Path:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from corpus.clones import Published, extracted, published
+from corpus.clones import Published, extracted, published, row
 from heelstrike.errors import GaitError, HeelstrikeError
 from heelstrike.experiments.walk import design, steps_taken, typical_step, walk, why_unstable
 from heelstrike.gait import Gait
@@ -159,15 +159,8 @@ def page(walks: list[Walk]) -> str:
         "|---|---|---|---|---|",
     ]
     for each in walks:
-        link = (
-            f"[{each.robot.path.split('/')[-1]}](https://github.com/{each.robot.repository}/"
-            f"blob/{each.robot.commit}/{each.robot.path.replace(' ', '%20')})"
-        )
-        cells = (
-            f"{each.robot.repository} {link}", each.machine, each.gait,
-            str(each.steps) if each.gait else "", each.reason,
-        )  # fmt: skip
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        steps = str(each.steps) if each.gait else ""
+        lines.append(row(each.robot.link, each.machine, each.gait, steps, each.reason))
     return "\n".join([*lines, ""])
 
 
