@@ -304,13 +304,6 @@ class Memory(Bundle):
     tally: Tally = part(Tally)
 
 
-def capacity(robot: Robot) -> int:
-    """How many contact points, joint stops and dry joints a robot has in one contact problem."""
-    model = robot.model
-    stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
-    return robot.nc + int(stops) + int(np.sum(model.dry_friction > 0.0))
-
-
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nc, model = robot.nc, robot.model
