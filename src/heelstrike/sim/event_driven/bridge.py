@@ -30,8 +30,8 @@ from heelstrike.sim.contacts.geometry import (
 )
 from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.event_driven.candidates import solve_candidates
-from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
+from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
+from heelstrike.sim.event_driven.dynamics import evaluate
 from heelstrike.sim.event_driven.faces import (
     NO_FACE,
     closes_corner,

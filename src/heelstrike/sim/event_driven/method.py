@@ -34,7 +34,6 @@ from heelstrike.sim.contacts.loops import close_loops, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
-from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
     NO_FACE,
@@ -49,6 +48,7 @@ from heelstrike.sim.event_driven.location import TOGETHER, integrate, shortest_s
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
+from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
 from heelstrike.sim.method import Method, solver_order
@@ -387,7 +387,6 @@ def decide_modes(
     """
     model = scene.model
     forced, jammed = phase.forced == 1, phase.jammed == 1
-    friction, guess = memory.surface.friction, memory.reaction.mode
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
         extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
@@ -404,9 +403,7 @@ def decide_modes(
                 continue
         count = phase.closed_count
         if not jammed and count > 0:
-            status = solve_candidates(
-                count, memory.loops, True, friction, guess, phase, memory.assembly
-            )
+            status = solve_accelerations(count, model, phase.trial, memory, phase)
             jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0

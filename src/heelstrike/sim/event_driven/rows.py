@@ -8,10 +8,10 @@ from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
@@ -54,8 +54,7 @@ def write_row(
         residual[k] = 0.0
     count, loops = phase.closed_count, memory.loops.unknown.shape[0]
     if count + loops > 0:
-        friction, guess = memory.surface.friction, memory.reaction.mode
-        solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
+        solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
         note_loops(model, count + loops, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
