@@ -393,6 +393,7 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
                 break
             look_back(scene, control, memory, phase)
             part = first_event(scene, length, control, memory, phase)
+            phase.has_fired = 0 if part == NO_EVENT else 1
         if phase.has_fired == 0:
             fits = settle(scene, memory, phase)
         if good and fits:

@@ -44,7 +44,7 @@ from heelstrike.sim.event_driven.faces import (
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
 from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, heading, strike
-from heelstrike.sim.event_driven.location import TOGETHER, integrate, shortest_step
+from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
@@ -73,6 +73,8 @@ JUMP = 1e-7
 INSTANT = 1e-10
 # Mark of a point that touches the ground without force or speed, until it is known what happens.
 UNPRESSED = 2
+# Mark of one that is so near that nobody could tell, as at the top of a bounce too low to see.
+LYING = 3
 # So many in a row are switched by what fired.
 INSISTENT = 8
 # Events that may follow each other at once, and at once behind a bridge; how many more as time goes
@@ -448,9 +450,9 @@ def find_what_happened(
 ) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
-    Points that touch the ground without speed are closed, sliding ones that stop are at rest; an
-    impact goes through those that touch without force. At the start of a run every point near the
-    ground touches it.
+    Points that touch the ground without speed are closed, whatever ended the step, and sliding ones
+    that stop are at rest; an impact goes through those that touch without force. At the start of a
+    run every point near the ground touches it.
     """
     impact = False
     forced = False
@@ -499,8 +501,13 @@ def find_what_happened(
                 phase.accumulation[contact] = phase.time
         elif gap <= TOGETHER and normal <= rest:
             phase.hit[contact] = UNPRESSED
+            if gap <= GAP_NOISE:
+                phase.hit[contact] = LYING
+                phase.slide[contact] = heading(tangent)
     for contact in range(phase.closed.shape[0]):
-        if phase.hit[contact] == UNPRESSED:
+        if phase.hit[contact] == LYING and not impact:
+            phase.closed[contact] = 1
+        if phase.hit[contact] >= UNPRESSED:
             phase.hit[contact] = 1 if impact else 0
     return impact, forced and not impact
 

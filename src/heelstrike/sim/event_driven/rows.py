@@ -91,7 +91,7 @@ def write_rows_within(
 ) -> bool:
     """Append the rows due within the finished step; return whether there was room for all.
 
-    An event at its end has rows of its own, one before it if velocities may jump.
+    An event at its end has rows of its own, one before it if velocities or normals may jump.
     """
     period = phase.output_period * phase.row_every
     last = phase.time + phase.length
@@ -100,6 +100,8 @@ def write_rows_within(
         last -= 1e-12
         for contact in range(phase.closed.shape[0]):
             touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+        for corner in range(2 * phase.closed.shape[0], phase.fired.shape[0]):
+            touch = touch or phase.fired[corner] == 1
     state = phase.slopes[SLOPES - 1]
     while True:
         time = phase.next_row * period
