@@ -7,9 +7,9 @@ import os
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.errors import GaitError, HeelstrikeError, RobotError, SimulationError
@@ -136,13 +136,12 @@ def zoo(
     campaign.begin()
     for name, robot in robots.items():
         campaign.visit(name, robot, controllers, disturbances)
-    return campaign.results.chosen(keys)
+    return campaign.results.chosen(keys, disturbances)
 
 
 def in_words(method: Method) -> str:
     """Return the name of a method, with its step and all that is not as usual."""
-    own = fields(method) if is_dataclass(method) else ()
-    usual: dict[str, Any] = {each.name: each.default for each in own}
+    usual = {each.name: each.default for each in fields(cast("Any", method))}  # all have some
     told = [
         f"{name}={value}" for name, value in vars(method).items()
         if name in usual and (name == "step" or value != usual[name])
@@ -227,7 +226,7 @@ def _begun(folder: Path | None, settings: Settings, *, afresh: bool) -> Results:
     if differing:
         raise SimulationError(
             f"{path} was made with {'; '.join(differing)}. Ask for the same to go on with it, for "
-            "another folder, or to begin afresh."
+            "another folder, or to begin anew (--afresh)."
         )
     return results
 
@@ -280,6 +279,7 @@ class _Campaign:
         }  # fmt: skip
         wanted = sum(map(len, missing.values()))
         self.progress.finished += len(controllers) * len(disturbances) - wanted
+        self.show(self.progress)
         gait: Gait | HeelstrikeError | None = None
         work: list[tuple[Entry, Trial, Disturbance]] = []
         for entry in controllers:
@@ -375,8 +375,8 @@ class _Campaign:
                     self._doing({w.what: w.share for w in watches if w.begun and not w.ended})
             except BaseException:
                 self.stop.set()
-                for future in waiting:
-                    future.cancel()
+                begun = [future for future in waiting if not future.cancel()]
+                self.keep(*(each.result() for each in begun if each.exception() is None))
                 raise
             finally:
                 self.progress.doing = {}

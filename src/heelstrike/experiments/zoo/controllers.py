@@ -90,7 +90,22 @@ def point_feet(robot: Robot) -> str:
 def walking(
     name: str, law: Callable[[Robot, Gait], Law], needs: Callable[[Robot], str] = flat_feet
 ) -> Entry:
-    """Enter a controller that is made of a robot and its gait, and walks from the gait's start."""
+    """Enter a controller that walks a gait from its beginning.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    law : callable
+        Takes a robot and its gait, returns the controller; the class of one, say.
+    needs : callable
+        Takes a robot, returns what it lacks, in a word; by default it must have two flat feet.
+
+    Returns
+    -------
+    Entry
+        An entry of the zoo.
+    """
 
     def trial(robot: Robot, gait: Gait | None) -> Trial:
         assert gait is not None
@@ -105,7 +120,22 @@ def walking(
 def standing(
     name: str, law: Callable[[Robot], Law], needs: Callable[[Robot], str] = flat_feet
 ) -> Entry:
-    """Enter a controller that makes a robot stand as its file has it."""
+    """Enter a controller that makes a robot stand as its file has it.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    law : callable
+        Takes a robot, returns the controller.
+    needs : callable
+        Takes a robot, returns what it lacks, in a word; by default it must have two flat feet.
+
+    Returns
+    -------
+    Entry
+        An entry of the zoo.
+    """
 
     def trial(robot: Robot, _: Gait | None) -> Trial:
         return Trial(

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 import statistics
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from heelstrike import __version__
 from heelstrike.errors import SimulationError
+from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Disturbance
 from heelstrike.json_checksum import Entries, json_text, reading_json
 from heelstrike.whole_file import write_whole
 
@@ -85,7 +86,18 @@ class Cell:
         return self.robot, self.controller, self.disturbance
 
     def worst(self, *, less: bool) -> float:
-        """Size withstood in every trial; NaN if there is none."""
+        """Return the size withstood in every trial.
+
+        Parameters
+        ----------
+        less : bool
+            Whether less of the disturbance is better.
+
+        Returns
+        -------
+        float
+            The size; NaN if there is none.
+        """
         if not self.withstood:
             return math.nan
         return max(self.withstood) if less else min(self.withstood)
@@ -134,30 +146,58 @@ class Results:
         Those of all cells.
     animals : dict of str to Animal
         Robots by name.
-    cells : dict of Key to Cell
-        In the order in which they were finished.
+    cells : dict of (str, str, str) to Cell
+        By robot, controller and disturbance, in the order in which they were finished.
+    disturbances : sequence of Disturbance
+        Those that cells are of, in the order of the table.
     """
 
     settings: Settings
     animals: dict[str, Animal] = field(default_factory=dict)
     cells: dict[Key, Cell] = field(default_factory=dict)
+    disturbances: Sequence[Disturbance] = DISTURBANCES
 
     def put(self, *cells: Cell) -> None:
-        """Add cells."""
+        """Add cells.
+
+        Parameters
+        ----------
+        *cells : Cell
+            What was found.
+        """
         self.cells |= {cell.key: cell for cell in cells}
 
     def meet(self, animal: Animal) -> None:
-        """Add a robot, and forget what was found with another of its name."""
+        """Add a robot, and forget what was found with another of its name.
+
+        Parameters
+        ----------
+        animal : Animal
+            The robot.
+        """
         known = self.animals.get(animal.robot)
         if known is not None and known.fingerprint != animal.fingerprint:
             self.cells = {key: cell for key, cell in self.cells.items() if key[0] != animal.robot}
         self.animals[animal.robot] = animal
 
-    def chosen(self, keys: Iterable[Key]) -> Results:
-        """Return those of some keys that are there, in the order of the keys."""
+    def chosen(self, keys: Iterable[Key], disturbances: Sequence[Disturbance]) -> Results:
+        """Return those cells of some keys that are there, in the order of the keys.
+
+        Parameters
+        ----------
+        keys : iterable of (str, str, str)
+            Robot, controller and disturbance.
+        disturbances : sequence of Disturbance
+            Those of the keys.
+
+        Returns
+        -------
+        Results
+            What is there of them.
+        """
         cells = {key: self.cells[key] for key in keys if key in self.cells}
         animals = {name: self.animals[name] for name in dict.fromkeys(key[0] for key in cells)}
-        return replace(self, animals=animals, cells=cells)
+        return replace(self, animals=animals, cells=cells, disturbances=disturbances)
 
     def robots(self) -> Iterator[tuple[Animal, dict[str, dict[str, Cell]]]]:
         """Go through the robots: each with its cells by controller and disturbance."""
@@ -182,6 +222,16 @@ class Results:
 
     def save(self, path: Path) -> Path:
         """Write a file.
+
+        Parameters
+        ----------
+        path : Path
+            File to write, JSON.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
 from rich.table import Table
 
-from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Disturbance
+from heelstrike.experiments.zoo.disturbances import Disturbance
 from heelstrike.experiments.zoo.results import STANDS, Animal, Cell, Results
 
 NOTHING = "–"
@@ -39,13 +39,13 @@ def digits(value: float) -> str:
     """Write a number with as many digits as one reads."""
     if abs(value) < 1e-6:
         return "0"
-    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.2g}"
+    return f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.2g}"
 
 
 def columns(results: Results) -> list[Disturbance]:
-    """Return the disturbances that there are cells of, in the order of the zoo."""
+    """Return the disturbances that there are cells of, in the order of the table."""
     there = {key[2] for key in results.cells}
-    return [each for each in DISTURBANCES if each.name in there]
+    return [each for each in results.disturbances if each.name in there]
 
 
 def empty(row: Mapping[str, Cell]) -> str:
