@@ -194,8 +194,8 @@ class Chart:
 class Landing:
     """The end of a step: the state on the section, the time it took (s), its length (m).
 
-    And what the controller remembers of it, as far as that is carried on, and the contact point that
-    landed last.
+    And what the controller remembers of it, as far as that is carried on, and the contact point
+    that landed last.
     """
 
     state: State

@@ -9,9 +9,9 @@ derivative of the map from touchdown to touchdown, without a difference of two s
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import permutations, product
+from itertools import pairwise, permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,9 @@ NOT_SMOOTH = (
     EventKind.JOINT_SLIP, EventKind.JOINT_STICK,
 )  # fmt: skip
 """Events behind which errors have no derivative that is known here."""
+
+APPROACHES = 1e-8
+"""What comes down on the ground or to a stop faster than this (m/s, rad/s) was not there."""
 
 SWITCHES = (EventKind.STICK, EventKind.SLIP_REVERSAL)
 
@@ -137,7 +140,6 @@ class Monodromy:
         )
 
 
-# More arguments than eight: what walks, and how its steps are told apart, are a user's to say.
 def monodromy(
     robot: Robot,
     state: State,
@@ -210,16 +212,15 @@ def monodromy(
     _refuse(robot, run, period)
     instants = _instants(run, period)
     bounds = [0.0, *(events[0].time for events in instants)]
-    spans = list(zip(bounds[:-1], bounds[1:], strict=True))
     simulation = Simulation(robot, controller, state=state, method=method, ground=ground)
     variation = Variation(simulation, controller)
     flows, saltations = [], []
-    for (start, end), events in zip(spans, instants, strict=True):
-        active = _active(run, start, end)
-        flows.append(variation.flow(start, end, active))
-        last = events is instants[-1]
-        after = None if last else _active(run, end, bounds[bounds.index(end) + 1])
-        saltations.append(_Instant(run, tuple(events), active, after).saltation())
+    phases = [_active(run, start, end) for start, end in pairwise(bounds)]
+    for place, (start, end) in enumerate(pairwise(bounds)):
+        flows.append(variation.flow(start, end, phases[place]))
+        after = phases[place + 1] if place + 1 < len(phases) else None
+        instant = _Instant(run, tuple(instants[place]), phases[place], after)
+        saltations.append(instant.saltation())
     return Monodromy(
         period=period,
         flows=tuple(flows),
@@ -326,11 +327,9 @@ class _Instant:
         robot, ground, (first, last) = self.run.robot, self.run.ground, self.rows
         q, v = self._state(first)
         at = contact_kinematics(robot, q, v, ground)
-        resting = ActiveContacts(resting=(contact,))
-        # The same speed's derivative by q is that of the row of a point at rest: −(J v̇ + …).
         by_position = _speed_gradient(robot, ground, q, v, contact)
         gradient = np.concatenate((by_position, at.jacobian[contact, 1]))
-        assert self.after is not None and resting
+        assert self.after is not None
         return saltation_matrix(
             np.eye(len(gradient)), gradient, self._rate(first, v, self.before),
             self._rate(last, self.run.velocity[last], self.after),
@@ -338,10 +337,12 @@ class _Instant:
 
     def _impacts(self, struck: list[Event]) -> list[Floats]:
         """Matrices of the orders in which points that come down together may do so."""
-        fresh = [event for event in struck if event.kind is EventKind.TOUCHDOWN]
-        others = [event for event in struck if event.kind is not EventKind.TOUCHDOWN]
-        if not fresh:
-            fresh, others = others[:1], others[1:]
+        first, _ = self.rows
+        q, v = self._state(first)
+        rate = self._rate(first, v, self.before)
+        # The others were on the ground or at their stops, and feel the impact.
+        fresh = [event for event in struck if self._gap_gradient(event, q) @ rate < -APPROACHES]
+        others = [event for event in struck if event not in fresh]
         if len(fresh) > MOST_TOGETHER:
             raise SimulationError(
                 f"{len(fresh)} contact points come down together at t = {self.time:.6g} s: more "
@@ -354,8 +355,8 @@ class _Instant:
                 found.append(matrix)
         if not found:
             raise SimulationError(
-                f"the impact at t = {self.time:.6g} s cannot be linearised: none of the points "
-                "that come down would reach the ground after the other"
+                f"the impact at t = {self.time:.6g} s cannot be linearised: nothing comes down in "
+                "it, or of several points none after the other"
             )
         return found
 
@@ -467,8 +468,3 @@ def _relabelling(
 
 def _vector(state: State) -> Floats:
     return np.concatenate((state.q, state.v))
-
-
-def coarser(method: EventDriven, period: float) -> EventDriven:
-    """Return the method with rows at events alone."""
-    return replace(method, output_period=period)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial, legendre
 from numpy.typing import NDArray
 
-from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
 from heelstrike.contact.queries.linearization import ActiveContacts, linearize_contact
 from heelstrike.errors import SimulationError
 from heelstrike.robot.state import State
@@ -19,14 +20,14 @@ from heelstrike.sim.simulation import Simulation
 
 Floats = NDArray[np.float64]
 
-PANEL = 0.02
-"""Longest stretch of time (s) that is taken at once."""
+PANEL = 0.005
+"""Longest stretch of time (s) that is taken at once: gaits are smooth by pieces only."""
 
-STAGES = 6
-"""Gauss's nodes in it: collocation of order 12."""
+STAGES = 4
+"""Gauss's nodes in it: collocation of order 8."""
 
-DISTURBANCE = 1e-3
-"""Disturbance (m, rad, m/s, rad/s) of the law's derivative, by differences of fourth order."""
+DISTURBANCE = 3e-6
+"""Disturbance (m, rad, m/s, rad/s) of the law's derivative: small, as laws have kinks."""
 
 PRESSED = 1e-3
 """Change of a number that a law remembers, by which is seen whether torques hang on it."""
@@ -67,7 +68,7 @@ class Variation:
         self._simulation = simulation
         self._robot, self._ground = simulation.robot, simulation.ground
         self._asked: AskedLaw | None = None
-        self._remembered: dict[str, float] = {}
+        self._constant: dict[str, float] = {}
         if controller is None:
             return
         law = law_of(controller)
@@ -91,6 +92,7 @@ class Variation:
         span = (end - begin) / panels
         for panel in range(panels):
             start = begin + panel * span
+            self._check_memory(start + span * NODES[0])
             slopes = [self._slope(start + span * node, active) for node in NODES]
             system = np.eye(STAGES * size)
             for i, j in np.ndindex(STAGES, STAGES):
@@ -103,64 +105,78 @@ class Variation:
 
     def _slope(self, time: float, active: ActiveContacts) -> Floats:
         """Derivative of the closed loop's rate by the state."""
-        simulation, robot = self._simulation, self._robot
-        simulation.advance(time)
-        state = simulation.state
-        if self._asked is None:
-            nothing = np.zeros(robot.nu)
-            return linearize_contact(
-                robot, state.q, state.v, nothing, active, ground=self._ground
-            ).A
+        self._simulation.advance(time)
+        state, nothing = self._simulation.state, np.zeros(self._robot.nu)
+        instant = None if self._asked is None else self._instant()
+        torque = nothing if instant is None else instant.torque()
+        found = linearize_contact(
+            self._robot, state.q, state.v, torque, active, ground=self._ground
+        )
+        return found.A if instant is None else found.A + found.B @ instant.gains()
+
+    def _instant(self) -> _Instant:
+        simulation, state = self._simulation, self._simulation.state
+        assert self._asked is not None
         kept = simulation.snapshot().part("control")
         numbers = np.concatenate((kept["parameters"], kept["kept"]))
-        force = simulation.contacts.force
-        self._check_memory(numbers, time, state, force)
-        torque = self._torque(numbers, time, state, force)
-        found = linearize_contact(robot, state.q, state.v, torque, active, ground=self._ground)
-        return found.A + found.B @ self._gains(numbers, time, state, force)
-
-    def _torque(self, numbers: Any, time: float, state: State, force: Floats) -> Floats:
-        """What the law asks for, by what it remembers now; it forgets the call."""
-        assert self._asked is not None
         at = contact_kinematics(self._robot, state.q, state.v, self._ground)
-        seen = Contacts(position=at.position, normal=at.normal, gap=at.gap, force=force)
-        self._asked.restore(numbers)
-        return self._asked.torque(time, state, seen)
+        force = simulation.contacts.force
+        return _Instant(self._asked, numbers, simulation.time, state, at, force)
 
-    def _gains(self, numbers: Any, time: float, state: State, force: Floats) -> Floats:
-        """Derivative of the torques by the state, (nu, nq + nv)."""
-        nq, size = self._robot.nq, self._robot.nq + self._robot.nv
-
-        def torque(change: Floats) -> Floats:
-            moved = State(state.q + change[:nq], state.v + change[nq:])
-            return self._torque(numbers, time, moved, force)
-
-        columns = [
-            8.0 * (torque(e) - torque(-e)) - (torque(2.0 * e) - torque(-2.0 * e))
-            for e in DISTURBANCE * np.eye(size)
-        ]
-        return np.array(columns).T / (12.0 * DISTURBANCE)
-
-    def _check_memory(self, numbers: Any, time: float, state: State, force: Floats) -> None:
+    def _check_memory(self, time: float) -> None:
         """Refuse a law that acts on something that changes within the step: a state of its own."""
-        assert self._asked is not None
-        usual = self._torque(numbers, time, state, force)
-        self._asked.restore(numbers)
-        memory = self._asked.numbers.memory
-        for name, member, values in memory.views():
+        if self._asked is None:
+            return
+        self._simulation.advance(time)
+        instant, asked = self._instant(), self._asked
+        usual = instant.torque()
+        asked.restore(instant.numbers)
+        for name, member, values in asked.numbers.memory.views():
             if member.kind is not float:
                 continue
             for place in np.ndindex(values.shape):
-                held = float(values[place])
-                values[place] = held + PRESSED
-                at = contact_kinematics(self._robot, state.q, state.v, self._ground)
-                seen = Contacts(position=at.position, normal=at.normal, gap=at.gap, force=force)
-                matters = not np.array_equal(self._asked.torque(time, state, seen), usual)
-                self._asked.restore(numbers)
                 label = f"{name}{list(place) if place else ''}"
-                if matters and self._remembered.setdefault(label, held) != held:
+                held = float(values[place])
+                if self._constant.setdefault(label, held) == held:
+                    continue
+                values[place] = held + PRESSED
+                pressed = replace(instant, numbers=asked.snapshot())
+                if not np.array_equal(pressed.torque(), usual):
                     raise SimulationError(
                         f"the controller's memory.{label} changes within a step and its torques "
                         "hang on it: it is a state of its own, which is not linearised here. "
                         "hs.floquet_multipliers takes differences of whole steps instead"
                     )
+                asked.restore(instant.numbers)
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """A law at an instant: what it remembers, and what it sees."""
+
+    asked: AskedLaw
+    numbers: Any
+    time: float
+    state: State
+    at: ContactKinematics
+    force: Floats
+
+    def torque(self, change: Floats | None = None) -> Floats:
+        """What it asks for in a state changed by so little; it forgets the call."""
+        nq = len(self.state.q)
+        change = np.zeros(nq + len(self.state.v)) if change is None else change
+        moved = self.at.jacobian @ change[:nq]
+        tangent = np.column_stack((self.at.normal[:, 1], -self.at.normal[:, 0]))
+        seen = Contacts(
+            position=self.at.position + moved[:, :1] * self.at.normal + moved[:, 1:] * tangent,
+            normal=self.at.normal, gap=self.at.gap + moved[:, 0], force=self.force,
+        )  # fmt: skip
+        self.asked.restore(self.numbers)
+        there = State(self.state.q + change[:nq], self.state.v + change[nq:])
+        return self.asked.torque(self.time, there, seen)
+
+    def gains(self) -> Floats:
+        """Derivative of the torques by the state, (nu, nq + nv)."""
+        changes = DISTURBANCE * np.eye(len(self.state.q) + len(self.state.v))
+        columns = [self.torque(each) - self.torque(-each) for each in changes]
+        return np.array(columns).T / (2.0 * DISTURBANCE)
