@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from heelstrike.analysis.stability.largest import largest_push as largest_push
     from heelstrike.analysis.stability.largest import largest_roughness as largest_roughness
     from heelstrike.analysis.stability.largest import largest_slope as largest_slope
+    from heelstrike.analysis.stability.monodromy import Monodromy as Monodromy
+    from heelstrike.analysis.stability.monodromy import monodromy as monodromy
     from heelstrike.analysis.stability.trial import Trial as Trial
     from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
     from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
@@ -45,11 +47,15 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import array as array
     from heelstrike.compiler.bundle import cell as cell
     from heelstrike.compiler.bundle import number as number
+    from heelstrike.contact import ActiveContacts as ActiveContacts
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
+    from heelstrike.contact import linearize_contact as linearize_contact
+    from heelstrike.contact import linearize_impact as linearize_impact
+    from heelstrike.contact import saltation_matrix as saltation_matrix
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import Actuated as Actuated
@@ -116,6 +122,7 @@ __version__ = "0.1.0"
 # Public name -> the package that defines it. The imports above repeat this for type checkers,
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
+    "ActiveContacts": "heelstrike.contact",
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
     "Bundle": "heelstrike.compiler.bundle",
@@ -143,6 +150,7 @@ _HOME = {
     "Largest": "heelstrike.analysis.stability.largest",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
+    "Monodromy": "heelstrike.analysis.stability.monodromy",
     "PhasedGait": "heelstrike.gait",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
@@ -180,14 +188,18 @@ _HOME = {
     "largest_push": "heelstrike.analysis.stability.largest",
     "largest_roughness": "heelstrike.analysis.stability.largest",
     "largest_slope": "heelstrike.analysis.stability.largest",
+    "linearize_contact": "heelstrike.contact",
+    "linearize_impact": "heelstrike.contact",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
     "make_invariant": "heelstrike.gait",
+    "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
     "report": "heelstrike.view.report",
+    "saltation_matrix": "heelstrike.contact",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",
