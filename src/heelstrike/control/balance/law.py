@@ -6,7 +6,7 @@ from math import atan, cos, exp, inf, sin, sqrt
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import constrain, point_task
-from heelstrike.control.balance.footsteps import make_plan
+from heelstrike.control.balance.footsteps import COMMITTED, make_plan
 from heelstrike.control.balance.numbers import Log, Memory, Parameters
 from heelstrike.control.balance.reference import (
     Reference,
@@ -51,18 +51,29 @@ def begin_step(t: float, reference: Reference, memory: Memory) -> None:
     memory.phase = 0.0
     memory.late = 0.0
     memory.raised = 0.0
+    memory.lifting = 0
     memory.rate = 1.0 / reference.duration
     memory.plan.remaining = reference.duration
 
 
 @kernel
-def touched(contacts: Contacts, robot: ControlledRobot, foot: int, upright: bool) -> bool:
-    """Whether a foot touches ground that it could stand on, or else what it cannot."""
+def touched(contacts: Contacts, robot: ControlledRobot, foot: int) -> bool:
+    """Whether a foot touches ground that it could stand on."""
     for i in range(robot.nc):
         steep = contacts.normal[i, 1] <= STEEP
-        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and steep != upright:
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and not steep:
             return True
     return False
+
+
+@kernel
+def wall_at(contacts: Contacts, robot: ControlledRobot, foot: int) -> float:
+    """Direction away from a wall that a foot touches, along the ground: ±1, and 0 of none."""
+    for i in range(robot.nc):
+        steep = contacts.normal[i, 1] <= STEEP
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and steep:
+            return 1.0 if contacts.normal[i, 0] > 0.0 else -1.0
+    return 0.0
 
 
 @kernel
@@ -74,12 +85,12 @@ def exchange_at_touchdown(
     if early or t - memory.start < 0.3 * parameters.planning.earliest:
         return
     swing = 1 - memory.stance
-    if touched(contacts, robot, swing, True):
+    if memory.lifting == 0 and touched(contacts, robot, swing):
         length = memory.swing[0] - memory.sole[0]
         rise = memory.swing[1] - memory.sole[1]
         if abs(length) > 0.1 * parameters.reference.length:
             slope = min(max(rise / length, -STEEPEST), STEEPEST)
-            memory.slope = 0.4 * memory.slope + 0.6 * slope
+            memory.slope += parameters.believed * (slope - memory.slope)
         memory.stance = swing
         memory.landed = 0
         memory.steps += 1
@@ -90,15 +101,28 @@ def exchange_at_touchdown(
 def lift_over(
     t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
-    """Lift a swing foot that has hit a wall, such as the riser of a step, over it."""
-    if memory.stands == 1 or not touched(contacts, robot, 1 - memory.stance, False):
+    """Lift a swing foot that has hit a wall, such as the riser of a step, over it.
+
+    It is first taken back and up: a foot that is pressed on against the wall jams, and turns.
+    """
+    if memory.stands == 1:
         return
+    if memory.lifting == 1 and (memory.swing[1] > memory.top or t > memory.until):
+        memory.lifting = 0
+    away = wall_at(contacts, robot, 1 - memory.stance)
+    if memory.lifting == 0:
+        if away == 0.0 or memory.plan.remaining < COMMITTED * parameters.reference.duration:
+            return
+        memory.lifting = 1
+        memory.back = memory.swing[0] + away * parameters.away
+        memory.top = memory.swing[1] + parameters.lift
+        memory.until = t + parameters.search
+        height = memory.swing[1] - memory.sole[1]
+        memory.raised = min(max(memory.raised, height) + parameters.away, parameters.most_raised)
     memory.alarm = 1.0
     memory.phase = min(memory.phase, 0.5)
     memory.late = 0.0
     memory.plan.remaining = max(memory.plan.remaining, 0.3 * parameters.reference.duration)
-    more = parameters.fast * max(t - memory.time, 0.0)
-    memory.raised = min(memory.raised + more, parameters.most_raised)
 
 
 @kernel
@@ -138,7 +162,7 @@ def stand_or_walk(t: float, parameters: Parameters, memory: Memory) -> None:
 def stay(t: float, parameters: Parameters, memory: Memory) -> None:
     """Stand: press beyond the capture point, so that it comes back to the middle of the sole."""
     plan, planning = memory.plan, parameters.planning
-    memory.alarm *= exp(-max(t - memory.time, 0.0) / parameters.calming)
+    memory.alarm = max(memory.alarm - max(t - memory.time, 0.0) / parameters.calming, 0.0)
     memory.time = t
     memory.rate = 0.0
     plan.foothold = plan.swing
@@ -164,12 +188,15 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     make_plan(parameters.planning, reference, parameters.adapts == 1, plan)
     rate = (1.0 - memory.phase) / plan.remaining
     memory.rate += min(elapsed / parameters.smoothing, 1.0) * (rate - memory.rate)
+    memory.alarm = max(memory.alarm - elapsed / parameters.calming, 0.0)
     if landed and parameters.adapts == 1:
-        span = parameters.alarmed - parameters.calm
-        alarm = min(max((sqrt(plan.cost) - parameters.calm) / span, 0.0), 1.0)
         # A foot that is late has found the ground lower than it should be.
-        alarm = max(alarm, min(2.0 * memory.late / parameters.search - 0.2, 1.0))
-        memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
+        alarm = min(2.0 * memory.late / parameters.search - 0.2, 1.0)
+        # What a foot that is as good as down misses, it could not do better; see the next plan.
+        if plan.remaining >= COMMITTED * reference.duration:
+            span = parameters.alarmed - parameters.calm
+            alarm = max(alarm, min((sqrt(plan.cost) - parameters.calm) / span, 1.0))
+        memory.alarm = max(memory.alarm, alarm)
 
 
 @kernel
@@ -278,7 +305,11 @@ def want_foothold(
     pull = 6.0 * (goal - off) / (left * left) - damping * 4.0 * drift / left
     limit = parameters.planning.acceleration
     pull = min(max(pull, -limit), limit)
-    ahead = min(max(curvature_at(reference.swing_x, phase) * squared + pull, -limit), limit)
+    ahead = curvature_at(reference.swing_x, phase) * squared + pull
+    if memory.lifting == 1:
+        haste = parameters.haste
+        ahead = (6.0 * (memory.back - memory.swing[0]) / haste - 4.0 * plan.speed) / haste
+    ahead = min(max(ahead, -limit), limit)
     add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
 
     # Over the ground: the gait's way, higher when alarmed; a late foot looks for the ground.
@@ -297,6 +328,8 @@ def want_foothold(
     else:
         rise = bend + parameters.foot_kp * (up - height)
         rise += damping * parameters.foot_kd * (speed - memory.speed[1])
+    if memory.lifting == 1:
+        rise = parameters.foot_kd * (parameters.fast - memory.speed[1])
     rise = min(max(rise, -limit), limit)
     add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
 
@@ -393,8 +426,8 @@ def keep_balance(
 ) -> None:  # fmt: skip
     """Joint torques that walk, by the gait or by where the next foot has to land."""
     exchange_at_touchdown(t, contacts, robot, parameters, memory)
-    lift_over(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
+    lift_over(t, contacts, robot, parameters, memory)
     landed = has_landed(t, state, contacts, robot, parameters, memory)
     stand_or_walk(t, parameters, memory)
     if memory.stands == 1:
