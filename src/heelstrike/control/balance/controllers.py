@@ -90,7 +90,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "haste": 0.1 * pace,
         "search": 0.1 * pace,
         "smoothing": 0.01 * pace,
-        "hold": 0.6 * half,
+        "hold": 0.75 * half,
     }
     return planning, weights, rest
 

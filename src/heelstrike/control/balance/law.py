@@ -156,6 +156,7 @@ def stand_or_walk(t: float, parameters: Parameters, memory: Memory) -> None:
         level = abs(memory.swing[1] - memory.sole[1]) < 0.1 * hold
         if level and abs(plan.swing) < hold and away < 0.5 * hold:
             memory.stands = 1
+            memory.back = memory.swing[0]
 
 
 @kernel
@@ -192,10 +193,13 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     if landed and parameters.adapts == 1:
         # A foot that is late has found the ground lower than it should be.
         alarm = min(2.0 * memory.late / parameters.search - 0.2, 1.0)
-        # What a foot that is as good as down misses, it could not do better; see the next plan.
-        if plan.remaining >= COMMITTED * reference.duration:
-            span = parameters.alarmed - parameters.calm
-            alarm = max(alarm, min((sqrt(plan.cost) - parameters.calm) / span, 1.0))
+        amiss = sqrt(plan.cost)
+        if plan.remaining < COMMITTED * reference.duration:
+            # A foot that is as good as down cannot be placed anew: the next one will be off by
+            # what this one misses, not by what missing it costs.
+            amiss /= sqrt(max(parameters.planning.capture_weight, 1.0))
+        span = parameters.alarmed - parameters.calm
+        alarm = max(alarm, min((amiss - parameters.calm) / span, 1.0))
         memory.alarm = max(memory.alarm, alarm)
 
 
@@ -346,13 +350,18 @@ def want_foothold(
 def want_rest(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
-    """Add the task of the other foot as the robot stands: to stay where it is."""
+    """Add the task of the other foot as the robot stands: to lie where it came to rest."""
     weights, on, program = parameters.weights, memory.on, memory.program
-    link, kd = robot.foot_link[1 - memory.stance], parameters.foot_kd
+    link, kp, kd = robot.foot_link[1 - memory.stance], parameters.foot_kp, parameters.foot_kd
     point_task(robot, state, link, memory.swing, on)
-    add_task(on.rows, 0, -kd * memory.speed[0] - on.shift[0], weights.swing, program)
-    add_task(on.rows, 1, -kd * memory.speed[1] - on.shift[1], weights.swing, program)
-    turn = -kd * state.kinematics.velocity[link, 0]
+    ahead = kp * (memory.back - memory.swing[0]) - kd * memory.speed[0]
+    add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
+    # A little below the ground, so that it goes on touching it.
+    low = memory.sole[1] + memory.slope * memory.plan.swing - parameters.flat
+    rise = kp * (low - memory.swing[1]) - kd * memory.speed[1]
+    add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[1 - memory.stance]
+    turn = -kp * (tilt + atan(memory.slope)) - kd * state.kinematics.velocity[link, 0]
     add_task(on.rows, 2, turn - on.shift[2], weights.angle, program)
 
 

@@ -174,7 +174,8 @@ class Memory(Stance):
     lifting : int
         Whether the swing foot is lifted clear of a wall that it has hit.
     back, top, until : float
-        Where it is held meanwhile (m), up to which height (m), and until when at the latest (s).
+        Where it is held meanwhile, or as the robot stands (m), up to which height (m), and until
+        when at the latest (s).
     late : float
         For how long the swing foot has looked for the ground (s).
     alarm : float
