@@ -76,10 +76,12 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "landing": 0.02 * duration,
         "calm": 0.02 * size,
         "alarmed": 0.08 * size,
-        "calming": 3.0 * pace,
+        "calming": 6.0 * pace,
+        "believed": 0.6,
         "flat": 2e-3 * size,
         "crouch": 0.03 * size,
         "lift": 0.05 * size,
+        "away": 0.02 * size,
         "most_raised": 0.08 * size,
         "bent_knee": 0.15,
         "straight_knee": -0.25,
@@ -88,7 +90,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "haste": 0.1 * pace,
         "search": 0.1 * pace,
         "smoothing": 0.01 * pace,
-        "hold": 0.6 * half,
+        "hold": 0.75 * half,
     }
     return planning, weights, rest
 
