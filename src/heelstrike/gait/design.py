@@ -119,14 +119,14 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
     periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)
     return Margins(
         normal_force=float(wrench[1].min()),
-        friction_use=_use(wrench, request.friction),
+        friction_use=_use(wrench, request.cone),
         zero_moment_point=_inside(wrench, half),
         clearance=float((heights - program.clearance(fine)).min()),
         joint_range=float(ranges.min()),
         torque=float(limits.min()),
         peak_torque=float(np.abs(torque).max()),
         impulse=float(impulse[1]) if request.impact else 0.0,
-        impulse_friction_use=_use(impulse, request.friction) if request.impact else 0.0,
+        impulse_friction_use=_use(impulse, request.cone) if request.impact else 0.0,
         impulse_center=_inside(impulse, half) if request.impact else half,
         landing_velocity=float(landing.max()),
         lift_velocity=float(lift.min()),

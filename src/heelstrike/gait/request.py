@@ -176,6 +176,12 @@ class Request:
             )
 
     @property
+    def cone(self) -> float:
+        """Coefficient of friction under the feet: that of the ground, as their points scale it."""
+        under = [i for foot in self.robot.feet for i in foot.contacts]
+        return self.friction * float(self.robot.model.friction_scale[under].min())
+
+    @property
     def pendulum_time(self) -> float:
         """Time scale sqrt(height / gravity), in s."""
         return float(np.sqrt(self.height / np.hypot(*self.robot.model.gravity)))

@@ -183,7 +183,7 @@ class Transcription:
         The sign is that of a moment about +y, which a force f_z at x > 0 makes negative.
         """
         x, z, *moments = wrench
-        friction, half = self.request.friction, self.request.stance.half_length
+        friction, half = self.request.cone, self.request.stance.half_length
         inside = half - self.request.zmp_margin
         for side, name in ((1.0, "forward"), (-1.0, "backward")):
             constraints.add(groups[0], friction * z - side * x, subject=name, unit=unit)

@@ -14,12 +14,14 @@ from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
 from heelstrike.robot.model import (
     AXES,
+    NUMBERS,
     POWERS,
     PROPERTIES,
     JointProperties,
     Limits,
     Model,
     Pair,
+    bounds,
 )
 from heelstrike.robot.robot import Robot
 
@@ -185,7 +187,16 @@ class RobotBuilder:
         axis = (0.0, x / length, z / length)
         return self._add(name, link or name, parent, axis, _pair("at", at), properties)
 
-    def contact(self, link: str, at: Pair, *, radius: float = 0.0, friction: float = 1.0) -> None:
+    def contact(
+        self,
+        link: str,
+        at: Pair,
+        *,
+        radius: float = 0.0,
+        friction: float = 1.0,
+        friction_scale: float = 1.0,
+        restitution_scale: float = 1.0,
+    ) -> None:
         """Add a contact point: a disc fixed to a link, a point if its radius is zero.
 
         Parameters
@@ -197,14 +208,33 @@ class RobotBuilder:
         radius : float
             Radius (m).
         friction : float
-            Friction of its surface. A simulation takes friction from the ground; left and right are
-            compared by it.
+            Friction of its surface, as files give it. A simulation takes friction from the ground;
+            left and right are compared by it.
+        friction_scale, restitution_scale : float
+            What friction and restitution of the ground are multiplied by under it: 0.5 for a point
+            that is half as rough as those that the ground was measured with. Restitution cannot be
+            more than the ground's.
         """
         x, z = _pair("at", at)
         size, roughness = _number("radius", radius, 0.0), _number("friction", friction, 0.0)
-        self._points.append(ContactPoint(self._index(link), x, z, size, roughness))
+        scales = {"friction_scale": friction_scale, "restitution_scale": restitution_scale}
+        for name, scale in scales.items():
+            number = NUMBERS[name]
+            if not _number(name, scale, number.least) <= number.most:
+                raise self._error(f"{name} of a contact point must be {bounds(name)}, got {scale}.")
+        its = {name: float(scale) for name, scale in scales.items()}
+        self._points.append(ContactPoint(self._index(link), x, z, size, roughness, **its))
 
-    def sole(self, link: str, *, heel: Pair, toe: Pair, friction: float = 1.0) -> None:
+    def sole(
+        self,
+        link: str,
+        *,
+        heel: Pair,
+        toe: Pair,
+        friction: float = 1.0,
+        friction_scale: float = 1.0,
+        restitution_scale: float = 1.0,
+    ) -> None:
         """Add the two ends of a flat sole; see :meth:`contact`.
 
         Parameters
@@ -213,11 +243,17 @@ class RobotBuilder:
             Link that carries it.
         heel, toe : (2,) float
             Its ends in the frame of that link (m).
-        friction : float
-            Friction of its surface.
+        friction, friction_scale, restitution_scale : float
+            As for :meth:`contact`, alike for both.
         """
-        self.contact(link, heel, friction=friction)
-        self.contact(link, toe, friction=friction)
+        for end in (heel, toe):
+            self.contact(
+                link,
+                end,
+                friction=friction,
+                friction_scale=friction_scale,
+                restitution_scale=restitution_scale,
+            )
 
     def loop(self, link: str, other: str | None, *, at: Pair, other_at: Pair | None = None) -> None:
         """Close a loop: join two links, which hang on others already, by one more hinge.

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
+from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, Model, label
 from heelstrike.robot.robot import Foot
 from heelstrike.robot.sides.mirror import Mirror
 
@@ -266,6 +266,7 @@ def _differing_contacts(model: Model, mirror: Mirror, names: Sequence[str]) -> I
         compared = [
             ("contact points", *model.contact_position[[i, j]], SAME_PLACE),
             ("radius of the contact points", *model.contact_radius[[i, j]], SAME_PLACE),
+            *((label(name), *getattr(model, name)[[i, j]]) for name in SCALES),
         ]
         yield from _unequal(compared, f"of {names[link]} and {names[other]}")
 

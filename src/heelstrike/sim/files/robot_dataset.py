@@ -175,6 +175,8 @@ def _check(robot: Robot) -> None:
     }
     for name, number in NUMBERS.items():
         values = np.asarray(getattr(model, name))
+        if number.shape == ("nc",) and np.any((values < number.least) | (values > number.most)):
+            raise DamageError(f"{name} must lie between {number.least:g} and {number.most:g}")
         if number.points:
             high = model.extents[number.points]
             astray[name] = astray.get(name) or np.any((values < number.least) | (values >= high))
