@@ -73,6 +73,7 @@ class RobotBuilder:
         self._loops: list[tuple[tuple[int, int], tuple[Pair, Pair]]] = []
         self._couplings: list[tuple[tuple[int, int], tuple[float, ...]]] = []
         self._latches: list[tuple[int, int, int]] = []
+        self._brakes: list[int] = []
 
     def floating_base(
         self, link: str, at: Pair = (0.0, 0.0), **properties: Unpack[JointProperties]
@@ -358,6 +359,27 @@ class RobotBuilder:
         by = -1 if release is None else self._index(release, f"the latch of {joint!r} lets go by")
         self._latches.append((place, 1 if end == "upper" else -1, by))
 
+    def brake(self, joint: str) -> None:
+        """Give a joint a brake, which holds it wherever it is while it is on.
+
+        It is off until :attr:`Simulation.braked` says otherwise. What it takes to hold the joint is
+        recorded as ``Run.brake_torque``; it does not slip.
+
+        Parameters
+        ----------
+        joint : str
+            The joint.
+
+        Raises
+        ------
+        RobotError
+            If there is no such joint, or it has a brake already.
+        """
+        place = self._joint(joint, "brake")
+        if place in self._brakes:
+            raise self._error(f"joint {joint!r} has a brake already.")
+        self._brakes.append(place)
+
     def build(self) -> Robot:
         """Return the robot. The builder may go on and build others.
 
@@ -392,6 +414,7 @@ class RobotBuilder:
             latch_joint=[joint for joint, _, _ in self._latches],
             latch_side=[side for _, side, _ in self._latches],
             latch_release=[link for _, _, link in self._latches],
+            brake_joint=self._brakes,
             pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(

@@ -297,6 +297,7 @@ def _description(robot: Robot) -> str:
     lines += [f"closed loop: {name}" for name in robot.loop_names]
     lines += [f"coupled: {coupling_words(robot, k)}" for k in range(robot.model.couplings)]
     lines += [f"latch: {latch_words(robot, k)}" for k in range(robot.model.latches)]
+    lines += [f"brake: {name}" for name in robot.brake_names]
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
@@ -457,5 +458,6 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "loops": list(robot.loop_names),
         "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
         "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
+        "brakes": list(robot.brake_names),
         **of_joints,
     }

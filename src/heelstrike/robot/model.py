@@ -29,7 +29,7 @@ AXES = 2
 POWERS = 5
 """Coefficients of the polynomial by which a joint follows another."""
 
-SELDOM = ("loops", "couplings", "latches")
+SELDOM = ("loops", "couplings", "latches", "brakes")
 """Extents of what most robots have nothing of."""
 
 
@@ -100,8 +100,8 @@ class Model(Bundle):
         are equal; each counts what it says.
     nc, nu : int
         Number of contact points and of actuators.
-    loops, couplings, latches : int
-        Number of closed loops, of coupled joints and of latches.
+    loops, couplings, latches, brakes : int
+        Number of closed loops, of coupled joints, of latches and of brakes.
     axes : int
         Dimension of space.
     parent : (nl,) int
@@ -167,6 +167,8 @@ class Model(Bundle):
         That end: 1 for the upper, -1 for the lower.
     latch_release : (latches,) int
         Link whose touchdown makes it let go; -1 if none does.
+    brake_joint : (brakes,) int
+        Joint that each brake holds wherever it is, while it is on.
     pivot : int
         Link whose origin serves as the reference point of spatial vectors, so that a robot far
         from the world origin loses no digits.
@@ -181,6 +183,7 @@ class Model(Bundle):
     loops: int = extent()
     couplings: int = extent()
     latches: int = extent()
+    brakes: int = extent()
     axes: int = extent()
 
     parent: Integers = of("nl", kind=int, points="nl", least=-1)
@@ -223,6 +226,7 @@ class Model(Bundle):
     latch_joint: Integers = of("latches", kind=int, points="nv", least=0, **_LATER)
     latch_side: Integers = of("latches", kind=int, least=-1, **_LATER)
     latch_release: Integers = of("latches", kind=int, points="nl", least=-1, **_LATER)
+    brake_joint: Integers = of("brakes", kind=int, points="nv", least=0, **_LATER)
     pivot: int = of(kind=int, points="nl", least=0)
 
     @classmethod
@@ -232,7 +236,7 @@ class Model(Bundle):
         Parameters
         ----------
         **members : array
-            Every member by its name; loops, couplings and latches only where there are any.
+            Every member by its name; loops, couplings, latches and brakes only where there are any.
 
         Returns
         -------

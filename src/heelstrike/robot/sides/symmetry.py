@@ -100,6 +100,7 @@ def differences(
         *_differing_loops(model, mirror, link_names),
         *_differing_couplings(model, mirror, joint_names),
         *_differing_latches(model, mirror, joint_names),
+        *_differing_brakes(model, mirror, joint_names),
     ]
     return list(dict.fromkeys(findings))  # two points of a foot may say the same
 
@@ -318,6 +319,13 @@ def _differing_latches(model: Model, mirror: Mirror, names: Sequence[str]) -> It
         its = int(image[joint]), int(side * mirror.sign[joint]), int(image[release])
         if its not in known:
             yield f"the latch of {names[joint]} has no mirror image"
+
+
+def _differing_brakes(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    braked = set(model.brake_joint.tolist())
+    for joint in sorted(braked):
+        if int(mirror.joint[joint]) not in braked:
+            yield f"{names[joint]} has a brake, {names[int(mirror.joint[joint])]} has none"
 
 
 def _unequal(compared: Iterable[tuple[Any, ...]], pair: str) -> Iterator[str]:

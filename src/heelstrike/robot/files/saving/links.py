@@ -83,6 +83,8 @@ def warn_of_loss(
             said.append(f"{label(name)} of {', '.join(robot.contact_names[i] for i in scaled)}")
     if model.latches:
         said.append(f"latches of {', '.join(robot.latch_names)}")
+    if model.brakes:
+        said.append(f"brakes of {', '.join(robot.brake_names)}")
     if model.loops:
         said.append(f"closed loops ({', '.join(robot.loop_names)})")
     if said:

@@ -8,7 +8,7 @@ import numpy as np
 
 from heelstrike.robot.assembly import link_origins
 from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
-from heelstrike.robot.files.links import LATCH
+from heelstrike.robot.files.links import BRAKE, LATCH
 from heelstrike.robot.files.saving.text import (
     POINT_RADIUS,
     SMALLEST_INERTIA,
@@ -44,6 +44,8 @@ def mjcf(robot: Robot) -> Element:
         name = f"{LATCH}:{robot.joint_names[joint]}"
         name += f":{body_name[release]}" if release >= 0 else ""
         SubElement(holder, "numeric", name=name, data=str(side))
+    for name in robot.brake_names:
+        SubElement(holder, "numeric", name=f"{BRAKE}:{name}", data="1")
     for name in SCALES:
         for point_name, value in zip(_geom_names(robot), getattr(model, name), strict=True):
             if value != NUMBERS[name].default:
