@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanisms import braked
 
 import heelstrike as hs
 from heelstrike.analysis import energy_balance
@@ -27,10 +28,7 @@ METHODS = {
 
 
 def pendulum() -> Robot:
-    build = RobotBuilder("pendulum")
-    build.hinge("swing", None, mass=MASS, inertia=INERTIA, center_of_mass=(0.0, -LENGTH))
-    build.brake("swing")
-    return build.build()
+    return braked(MASS, LENGTH, INERTIA)
 
 
 def swinging(method: Any) -> hs.Simulation:
