@@ -37,7 +37,7 @@ def evaluated(robot: hs.Robot, *motion: np.ndarray) -> Evaluated:
     names = ("position", "velocity", "acceleration", "velocity_after")
     inputs = [casadi.SX.sym(name, robot.nv - 3) for name in names]
     q, v, a, after = (symbols(part) for part in inputs)
-    support = Support(robot, sole(robot, 0), q, v, a)
+    support = Support(robot, sole(robot, 0), drive_of(robot), q, v, a)
     impact = Impact(support, sole(robot, 1), after)
     function = casadi.Function(
         "evaluate",
