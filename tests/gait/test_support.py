@@ -11,6 +11,7 @@ from gait_motion import contact_rates, foot_jacobian, place, selection, standing
 
 import heelstrike as hs
 from heelstrike import dynamics
+from heelstrike.dynamics.queries.following import drive_of
 from heelstrike.dynamics.queries.symbolic import expression, symbols
 from heelstrike.gait.sole import sole
 from heelstrike.gait.support import Impact, Support
