@@ -28,7 +28,7 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.contacts.loops import append_loops, free_loops, rows_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
@@ -135,7 +135,7 @@ def gather_corners(
     assembly, contacts, surface = memory.assembly, memory.contacts, memory.surface
     tree, scratch = memory.equations.tree, phase.scratch[0]
     first = count
-    room = assembly.candidate.shape[0] - memory.loops.unknown.shape[0]
+    room = assembly.candidate.shape[0] - rows_of(memory.loops)
     for place in range(first):
         contact = assembly.candidate[place]
         if contact >= model.nc:

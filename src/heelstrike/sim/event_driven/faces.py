@@ -113,8 +113,8 @@ def locate_on_face(
     contacts.gap[contact] = distance - radius
     point[0] -= radius * normal[0]
     point[1] -= radius * normal[1]
-    surface.friction[contact] = ground.friction[segment]
-    surface.restitution[contact] = ground.restitution[segment]
+    surface.friction[contact] = model.friction_scale[contact] * ground.friction[segment]
+    surface.restitution[contact] = model.restitution_scale[contact] * ground.restitution[segment]
 
 
 @kernel

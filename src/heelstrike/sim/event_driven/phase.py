@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
-from heelstrike.dynamics.loops import count_rows
+from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 from heelstrike.sim.memory import contact_capacity
@@ -218,7 +218,7 @@ def allocate_phase(robot: Robot) -> Phase:
     contacts = contact_capacity(robot)
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        forces=2 * contacts + count_rows(model), functions=2 * contacts + robot.nc,
+        forces=2 * contacts + most_rows(model), functions=2 * contacts + robot.nc,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
