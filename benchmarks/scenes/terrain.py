@@ -52,13 +52,16 @@ class Terrain:
         foot = self.corner[:-1] + held[..., None] * self.tangent
         return np.linalg.norm(point[..., None, :] - foot, axis=-1), foot, held != along
 
-    def to_corner(self, point: Array) -> Array:
+    def to_corner(self, point: Array, *, instants: bool = False) -> Array:
         """How near points (T, n, 2) come, by the next row, to a second face of a concave corner.
 
-        Infinite where there is none. The last row is as near as it is.
+        Infinite where there is none. The last row is as near as it is, and so are all where
+        `instants` asks for how near they are.
         """
         distance, _, _ = self._feet(point)
         beside = self._beside(point, distance)
+        if instants:
+            return beside.min(axis=-1)
         second = np.argmin(beside, axis=-1)[..., None]
         now = np.take_along_axis(beside, second, -1)[..., 0]
         then = np.take_along_axis(np.concatenate((distance[1:], distance[-1:])), second, -1)[..., 0]

@@ -9,23 +9,25 @@ Flat ground has one face, and none of this.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.ground import GroundModel, line_contact
+from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.faces import (
     NO_FACE,
     along_segment,
+    center_of,
     is_beside,
     is_concave,
+    locate_on_face,
     nearest_face,
     second_face,
+    take_surface,
 )
 from heelstrike.sim.contacts.geometry import locate_contacts
 from heelstrike.sim.controller.interface import Contacts
@@ -40,42 +42,6 @@ ONE_NORMAL = 1e-12
 def has_corners(ground: GroundModel) -> bool:
     """Whether the ground has more than one face."""
     return bool(ground.friction.shape[0] > 1)
-
-
-@kernel
-def center_of(model: Model, contacts: Contacts, point: int) -> tuple[float, float]:
-    """Where the centre of the disc of a contact point is."""
-    position, normal = contacts.position[point], contacts.normal[point]
-    radius = model.contact_radius[point]
-    return position[0] + radius * normal[0], position[1] + radius * normal[1]
-
-
-@kernel
-def locate_on_face(
-    model: Model, ground: GroundModel, tree: Workspace, point: int, face: int, contacts: Contacts
-) -> None:
-    """Contact point, gap and normal of a disc on a face, wherever it is along it."""
-    place, normal = contacts.position[point], contacts.normal[point]
-    radius = model.contact_radius[point]
-    point_position(tree, model.contact_link[point], model.contact_position[point], place)
-    if face % 2 == 0:
-        distance = line_contact(ground, face // 2, place[0], place[1], normal)
-    else:
-        corner = ground.vertices[face // 2]
-        distance = math.sqrt((place[0] - corner[0]) ** 2 + (place[1] - corner[1]) ** 2)
-        normal[0] = (place[0] - corner[0]) / distance
-        normal[1] = (place[1] - corner[1]) / distance
-    contacts.gap[point] = distance - radius
-    place[0] -= radius * normal[0]
-    place[1] -= radius * normal[1]
-
-
-@kernel
-def take_surface(ground: GroundModel, contact: int, face: int, surface: Surface) -> None:
-    """Write the coefficients of the ground of a face; those of a corner are the left segment's."""
-    segment = face // 2 - face % 2
-    surface.friction[contact] = ground.friction[segment]
-    surface.restitution[contact] = ground.restitution[segment]
 
 
 @kernel

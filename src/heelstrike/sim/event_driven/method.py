@@ -26,7 +26,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.faces import NO_FACE
+from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
 from heelstrike.sim.contacts.loops import close_loops, steady_loops
@@ -39,9 +39,7 @@ from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
     locate,
-    locate_on_face,
     stand_on_face,
-    take_surface,
     turn_corner,
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
@@ -193,10 +191,8 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        latches = robot.model.latches
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * (
-            contact_capacity(robot) + robot.nc
-        ) + 2 * latches + 8
+        latches, contacts = robot.model.latches, contact_capacity(robot) + robot.nc
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + 2 * latches + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
