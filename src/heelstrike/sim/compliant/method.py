@@ -430,7 +430,7 @@ def note_forces(
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
-    for contact in range(force.shape[0]):
+    for contact in range(record.contact_force.shape[1]):
         record.contact_force[row, contact, 0] = force[contact, 0]
         record.contact_force[row, contact, 1] = force[contact, 1]
         record.slip_velocity[row, contact] = memory.reaction.slip[contact]
