@@ -450,6 +450,23 @@ def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
 
 
 @kernel
+def turns_over(
+    model: Model, ground: GroundModel, tree: Workspace, contact: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> bool:  # fmt: skip
+    """Let a point that has come to the end of its face go over to the next; tell whether it has."""
+    if contact >= model.nc or phase.fired[2 * phase.watched + contact] == 0:
+        return False
+    phase.fired[2 * phase.watched + contact] = 0
+    if turn_corner(model, ground, contact, contacts, phase):
+        face = phase.face[contact]
+        locate_on_face(model, ground, tree, contact, face, contacts)
+        take_surface(ground, contact, face, surface)
+        phase.closed[contact] = 0
+    return True
+
+
+@kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
     contacts: Contacts, surface: Surface, phase: Phase,
@@ -467,14 +484,7 @@ def find_what_happened(
         phase.hit[contact] = 0
         first = phase.fired[2 * contact] == 1
         second = phase.fired[2 * contact + 1] == 1
-        turns = contact < model.nc and phase.fired[2 * phase.watched + contact] == 1
-        if turns:
-            phase.fired[2 * phase.watched + contact] = 0
-            if turn_corner(model, ground, contact, contacts, phase):
-                face = phase.face[contact]
-                locate_on_face(model, ground, tree, contact, face, contacts)
-                take_surface(ground, contact, face, surface)
-                phase.closed[contact] = 0
+        turns = turns_over(model, ground, tree, contact, contacts, surface, phase)
         if contact >= phase.first_second:
             point = contact - phase.first_second
             if phase.closed[point] == 0 and phase.hit[point] == 0:
