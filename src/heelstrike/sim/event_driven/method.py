@@ -38,6 +38,8 @@ from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forc
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
+    is_at_second,
+    leave_second_face,
     locate,
     stand_on_face,
     turn_corner,
@@ -458,6 +460,9 @@ def turns_over(
     if contact >= model.nc or phase.fired[2 * phase.watched + contact] == 0:
         return False
     phase.fired[2 * phase.watched + contact] = 0
+    two_faces = phase.watched > phase.first_second and phase.closed[phase.first_second + contact]
+    if two_faces and leave_second_face(model, ground, tree, contact, contacts, surface, phase):
+        return False
     if turn_corner(model, ground, contact, contacts, phase):
         face = phase.face[contact]
         locate_on_face(model, ground, tree, contact, face, contacts)
@@ -490,6 +495,10 @@ def find_what_happened(
             if phase.closed[point] == 0 and phase.hit[point] == 0:
                 continue  # it is met from the other face only
             stand_on_face(model, ground, tree, point, contacts, surface, phase)
+            if phase.seconds.gap[point] == np.inf:
+                continue
+            if starting and not is_at_second(model, ground, point, rest, contacts, phase):
+                continue
         if phase.closed[contact] == 1:
             if second and phase.slide[contact] != 0:
                 for other in range(phase.watched):
