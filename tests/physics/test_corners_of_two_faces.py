@@ -264,6 +264,36 @@ def test_a_point_that_lands_in_the_corner_itself_is_stopped_by_both_faces() -> N
     np.testing.assert_allclose(run.position[-1], 0.0, atol=1e-10)
 
 
+def test_a_disc_lies_on_two_edges() -> None:
+    """A gap of half its diameter: both edges press by m g / (2 cos 30°) at 30°."""
+    radius = 0.1
+    disc = body([(0.0, 0.0)], 0.5 * MASS * radius**2, radius)
+    ditch = [[-1, 0], [-0.05, 0], [-0.05, -0.5], [0.05, -0.5], [0.05, 0], [1, 0]]
+    height = np.sqrt(radius**2 - 0.05**2)
+    run = simulated(disc, [0.0, height + 0.05, 0.0], [0.0] * 3, 0.3, ditch, friction=0.5)
+    np.testing.assert_allclose(run.position[-1], [0.0, height, 0.0], atol=1e-10)
+    np.testing.assert_allclose(run.world_force[-1, 0], [0.0, MASS * G], atol=1e-8)
+    np.testing.assert_allclose(run.contact_point[-1, 0], [0.0, height - radius], atol=1e-8)
+
+
+def test_a_disc_that_fills_a_shaft_comes_down_to_its_ground() -> None:
+    """It is on both walls when it meets a third face."""
+    radius = 0.1
+    disc = body([(0.0, 0.0)], 0.5 * MASS * radius**2, radius)
+    shaft = [[-1.0, 0.3], [-radius, 0.3], [-radius, 0.0], [radius, 0.0], [radius, 0.3], [1.0, 0.3]]
+    run = simulated(disc, [0.0, 0.2, 0.0], [0.0] * 3, 0.3, shaft, friction=0.3)
+    np.testing.assert_allclose(run.position[-1], [0.0, radius, 0.0], atol=1e-10)
+    np.testing.assert_allclose(run.world_force[-1, 0], [0.0, MASS * G], atol=1e-8)
+
+
+def test_faces_that_hardly_turn_are_told_apart_by_where_the_point_is() -> None:
+    """The line of a slope of 1e-7 is nearer than 1e-6 m ten centimetres before it begins."""
+    run = simulated(puck(), [-0.1, 0.0], [1.0, 0.0], 0.3, [[-1.0, 0.0], [0.0, 0.0], [1.0, 1e-7]])
+    before = run.position[:, 0] < -1e-9
+    assert np.abs(run.position[before, 1]).max() < 1e-14
+    assert run.position[-1, 1] == pytest.approx(2e-8, rel=1e-6)
+
+
 def test_a_simulation_is_taken_up_again_within_a_corner(tmp_path: Any) -> None:
     """The contact with the second face is part of the state that is kept, and of what is saved."""
     setting: dict[str, Any] = {

@@ -126,7 +126,7 @@ def misses_corner(
             x, z = center_of(model, contacts, point)
             radius = model.contact_radius[point]
             face = nearest_face(ground, x, z, radius)
-            gap, _ = second_face(ground, face, x, z, radius)
+            gap, _ = second_face(ground, face, NO_FACE, x, z, radius)
             if gap < -depth:
                 return True
     return False
@@ -145,7 +145,7 @@ def choose_sides(
             if contacts.gap[point] >= ENTERS:
                 continue
             face = nearest_face(ground, x, z, radius)
-            gap, other = second_face(ground, face, x, z, radius)
+            gap, other = second_face(ground, face, NO_FACE, x, z, radius)
             if gap < ENTERS:
                 corners.first[point], corners.second[point] = face, other
                 bend[second] = 0.0

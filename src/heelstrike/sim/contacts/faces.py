@@ -89,11 +89,12 @@ def is_concave(ground: GroundModel, corner: int) -> bool:
 
 @kernel
 def second_face(
-    ground: GroundModel, face: int, x: float, z: float, radius: float
+    ground: GroundModel, face: int, besides: int, x: float, z: float, radius: float
 ) -> tuple[float, int]:
     """Gap between a disc and the second face it could touch while it is on one, and which it is.
 
-    The gap is infinite where there is none.
+    With another face `besides` it is a third one, beside neither. The gap is infinite where there
+    is none.
     """
     segments, segment = ground.friction.shape[0], face // 2
     pivots = face % 2 == 1
@@ -115,6 +116,8 @@ def second_face(
                 its += 1
             elif before < 0.0 and other < segments - 1:
                 its += 3
+        if its == besides or (besides != NO_FACE and is_beside(besides, its)):
+            continue
         if its % 2 == 0:
             distance = height_over(ground, other, x, z)
         else:

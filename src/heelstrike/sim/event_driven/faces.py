@@ -22,6 +22,7 @@ from heelstrike.sim.contacts.faces import (
     NO_FACE,
     along_segment,
     center_of,
+    distance_to,
     is_beside,
     is_concave,
     locate_on_face,
@@ -36,6 +37,8 @@ from heelstrike.sim.memory import Reaction, Surface
 
 # Two normals are one when one minus the cosine of the angle between them is below this.
 ONE_NORMAL = 1e-12
+# Faces whose gaps differ by less (m) are equally near.
+ONE_GAP = 1e-9
 
 
 @kernel
@@ -60,7 +63,7 @@ def locate_second(
     if phase.closed[second] == 0:
         x, z = center_of(model, contacts, point)
         _, phase.face[second] = second_face(
-            ground, phase.face[point], x, z, model.contact_radius[point]
+            ground, phase.face[point], NO_FACE, x, z, model.contact_radius[point]
         )
     if phase.face[second] != NO_FACE:
         locate_on_face(model, ground, tree, point, phase.face[second], seconds)
@@ -108,7 +111,7 @@ def stand_on_face(
             locate_second(model, ground, tree, point, contacts, surface, phase)
             own, other = contacts.normal[point], phase.seconds.normal[point]
             twice = own[0] * other[0] + own[1] * other[1] > 1.0 - ONE_NORMAL
-            if phase.seconds.gap[point] < np.inf and twice:
+            if twice and abs(phase.seconds.gap[point] - contacts.gap[point]) < ONE_GAP:
                 phase.face[point] = phase.face[phase.first_second + point]
                 locate_second(model, ground, tree, point, contacts, surface, phase)
 
@@ -214,7 +217,61 @@ def watch_corners(
         if face != NO_FACE:
             x, z = center_of(model, contacts, contact)
             left, _ = following_face(ground, face, x, z, radius)
+            if phase.watched > phase.first_second:
+                left = min(left, *way_out(ground, contact, x, z, radius, phase))
             value[first + contact] = min(left, 1.0)
+
+
+@kernel
+def way_out(
+    ground: GroundModel, point: int, x: float, z: float, radius: float, phase: Phase
+) -> tuple[float, float]:
+    """How far a disc that is on two faces is from the end of the second, and from a third.
+
+    Between parallel walls a disc can move on both.
+    """
+    second = phase.first_second + point
+    if phase.closed[second] == 0:
+        return np.inf, np.inf
+    left, _ = following_face(ground, phase.face[second], x, z, radius)
+    third, _ = second_face(ground, phase.face[point], phase.face[second], x, z, radius)
+    return left, third
+
+
+@kernel
+def leave_second_face(
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> bool:  # fmt: skip
+    """Let a point that is on two faces go over from the second to a third that it meets.
+
+    Or off the end of the second. Returns false if it has come to the end of the first.
+    """
+    x, z = center_of(model, contacts, point)
+    second, radius = phase.first_second + point, model.contact_radius[point]
+    own, _ = following_face(ground, phase.face[point], x, z, radius)
+    left, third = way_out(ground, point, x, z, radius, phase)
+    if own < min(left, third):
+        return False
+    phase.closed[second], phase.slide[second], phase.stuck[second] = 0, 0, 0
+    if third <= left:
+        _, its = second_face(ground, phase.face[point], phase.face[second], x, z, radius)
+        phase.face[second] = its
+        locate_on_face(model, ground, tree, point, its, phase.seconds)
+        take_surface(ground, second, its, surface)
+        phase.fired[2 * second] = 1
+    return True
+
+
+@kernel
+def is_at_second(
+    model: Model, ground: GroundModel, point: int, reach: float, contacts: Contacts, phase: Phase
+) -> bool:
+    """Whether a point is within reach of its second face itself, and not only of the line of it."""
+    face = phase.face[phase.first_second + point]
+    x, z = center_of(model, contacts, point)
+    far = distance_to(ground, face // 2, x, z) - model.contact_radius[point] > reach
+    return face % 2 == 1 or not far
 
 
 @kernel

@@ -39,6 +39,8 @@ from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forc
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
+    is_at_second,
+    leave_second_face,
     locate,
     stand_on_face,
     turn_corner,
@@ -452,6 +454,26 @@ def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
 
 
 @kernel
+def turns_over(
+    model: Model, ground: GroundModel, tree: Workspace, contact: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> bool:  # fmt: skip
+    """Let a point that has come to the end of its face go over to the next; tell whether it has."""
+    if contact >= model.nc or phase.fired[2 * phase.watched + contact] == 0:
+        return False
+    phase.fired[2 * phase.watched + contact] = 0
+    two_faces = phase.watched > phase.first_second and phase.closed[phase.first_second + contact]
+    if two_faces and leave_second_face(model, ground, tree, contact, contacts, surface, phase):
+        return False
+    if turn_corner(model, ground, contact, contacts, phase):
+        face = phase.face[contact]
+        locate_on_face(model, ground, tree, contact, face, contacts)
+        take_surface(model, ground, contact, contact, face, surface)
+        phase.closed[contact] = 0
+    return True
+
+
+@kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
     contacts: Contacts, surface: Surface, phase: Phase,
@@ -469,19 +491,16 @@ def find_what_happened(
         phase.hit[contact] = 0
         first = phase.fired[2 * contact] == 1
         second = phase.fired[2 * contact + 1] == 1
-        turns = contact < model.nc and phase.fired[2 * phase.watched + contact] == 1
-        if turns:
-            phase.fired[2 * phase.watched + contact] = 0
-            if turn_corner(model, ground, contact, contacts, phase):
-                face = phase.face[contact]
-                locate_on_face(model, ground, tree, contact, face, contacts)
-                take_surface(model, ground, contact, contact, face, surface)
-                phase.closed[contact] = 0
+        turns = turns_over(model, ground, tree, contact, contacts, surface, phase)
         if contact >= phase.first_second:
             point = contact - phase.first_second
             if phase.closed[point] == 0 and phase.hit[point] == 0:
                 continue  # it is met from the other face only
             stand_on_face(model, ground, tree, point, contacts, surface, phase)
+            if phase.seconds.gap[point] == np.inf:
+                continue
+            if starting and not is_at_second(model, ground, point, rest, contacts, phase):
+                continue
         if phase.closed[contact] == 1:
             if second and phase.slide[contact] != 0:
                 for other in range(phase.watched):

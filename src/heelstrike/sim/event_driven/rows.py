@@ -111,6 +111,9 @@ def write_rows_within(
         last -= 1e-12
         for contact in range(phase.watched):
             touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+        for second in range(phase.first_second, phase.watched):
+            function = 2 * phase.watched + second - phase.first_second
+            touch = touch or (phase.closed[second] == 1 and phase.fired[function] == 1)
     state = phase.slopes[SLOPES - 1]
     while True:
         time = phase.next_row * period
