@@ -33,7 +33,7 @@ from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
 
 SAMPLE = 1e-3
-"""Time between two calls of every controller, in s."""
+"""Time between two calls of every controller, in s; a longer step of the method goes before."""
 
 BRAVO7_WEIGHT, BRAVO7_STEP = 75.0, 0.30
 """Mass (kg) and step length (m, which goes with the height) of the robot whose gains are scaled."""
@@ -199,8 +199,9 @@ def gait_for(robot: Robot) -> Gait:
 
 
 def sampled(trial: Trial, method: Method) -> Trial:
-    """Return a trial by another method, its controller called once a sample."""
-    period = None if isinstance(method, TimeStepping) else SAMPLE
+    """Return a trial by another method, its controller called once a sample, or once a step."""
+    slow = isinstance(method, TimeStepping) and method.step >= SAMPLE
+    period = None if slow else SAMPLE
     return replace(trial, method=method, control_period=period)
 
 

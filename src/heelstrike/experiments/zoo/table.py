@@ -142,7 +142,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "```",
         "",
         f"with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, controllers "
-        "called every millisecond.",
+        "called every millisecond, or every step if that is longer.",
         "",
         f"![What controllers withstand on robots: one panel a disturbance]({link})",
         "",
