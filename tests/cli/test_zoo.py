@@ -67,6 +67,18 @@ def test_a_table_and_its_files(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_a_robot_of_a_file_by_whatever_name(tmp_path: Path) -> None:
+    """Square brackets are markup to rich. A URDF file does not say how high its robot stands."""
+    robot = hs.load_robot("bravo7")
+    with pytest.warns(hs.RobotWarning, match="Left out: outlines"):
+        robot.save(tmp_path / "[red]mine.urdf")
+    done = invoke("--quick", "--robots", tmp_path / "[red]mine.urdf", *SPRINGS, "--floating",
+                  "--out", tmp_path / "out")  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    assert done.stdout.startswith("[red]mine.urdf, 75 kg")
+    assert re.search(r"JointFeedback +≥50 +0\b", done.stdout)
+
+
 def test_a_second_call_goes_on_and_other_settings_do_not(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
