@@ -72,7 +72,7 @@ def test_a_robot_of_a_file_by_whatever_name(tmp_path: Path) -> None:
     robot = hs.load_robot("bravo7")
     with pytest.warns(hs.RobotWarning, match="Left out: outlines"):
         robot.save(tmp_path / "[red]mine.urdf")
-    done = invoke("--quick", "--robots", tmp_path / "[red]mine.urdf", *SPRINGS, "--floating",
+    done = invoke("--quick", "--robots", tmp_path / "[red]mine.urdf", *SPRINGS,
                   "--out", tmp_path / "out")  # fmt: skip
     assert done.exit_code == 0, done.stderr
     assert done.stdout.startswith("[red]mine.urdf, 75 kg")
