@@ -172,9 +172,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
 
 def _explained(there: Sequence[Disturbance]) -> list[str]:
     rows = [_line("disturbance", "name", "unit", "what it is"), _line("---", "---", "---", "---")]
-    return rows + [
-        _line(each.heading, f"`{each.name}`", each.unit or "1", each.told) for each in there
-    ]
+    return rows + [_line(each.heading, f"`{each.name}`", each.unit, each.told) for each in there]
 
 
 def _measure(results: Results, share: float) -> list[str]:
@@ -192,7 +190,8 @@ def _measure(results: Results, share: float) -> list[str]:
         "many shapes, at least. Everything else has one trial.",
         "",
         "A controller that does not walk undisturbed is not disturbed: it falls, leans by more "
-        "than 0.6 rad, or strays from its speed. One that stands meets no other ground.",
+        "than 0.6 rad, or strays from its speed. One that stands meets no other ground, "
+        "and what it pays is nothing.",
     ]
 
 
