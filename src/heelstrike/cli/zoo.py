@@ -5,21 +5,15 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from heelstrike.cli.options import (
     AsJson,
-    Averaged,
     Debug,
-    Floating,
-    Forward,
-    Packages,
-    Pose,
-    Projected,
     method_called,
-    reading,
+    reads_robots,
 )
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, this_command, wrote
 from heelstrike.cli.walk import Method
@@ -29,6 +23,7 @@ ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
+@reads_robots
 def zoo(
     robots: Annotated[
         str, typer.Option(help="Built-in robots, and MJCF, URDF or SDF files, with commas between.")
@@ -54,12 +49,7 @@ def zoo(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Threads.", show_default="one a processor")
     ] = None,
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
+    how: Any = None,
     out: Annotated[
         Path,
         typer.Option(
@@ -96,7 +86,6 @@ def zoo(
 
         entries = campaign.chosen_controllers(controllers)
         kinds = campaign.chosen_disturbances(disturbances)
-        how = reading(floating, projected, forward, pose, mirror, package_path)
         machines = campaign.loaded(robots, how)
         targets = Targets(out, page or out / "zoo.md", figure or out / "zoo.svg")
     settings = campaign.QUICK if quick else campaign.USUAL

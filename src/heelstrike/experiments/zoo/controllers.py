@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.analysis.stability.zero_dynamics import zero_dynamics
+from heelstrike.contact.ground import Ground
 from heelstrike.control import (
     ComputedTorque,
     FootstepFeedback,
@@ -33,7 +34,7 @@ from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
 
 SAMPLE = 1e-3
-"""Time between two calls of every controller, in s."""
+"""Time between two calls of every controller, in s; a longer step of the method goes before."""
 
 BRAVO7_WEIGHT, BRAVO7_STEP = 75.0, 0.30
 """Mass (kg) and step length (m, which goes with the height) of the robot whose gains are scaled."""
@@ -118,16 +119,18 @@ def walking(
 
 
 def standing(
-    name: str, law: Callable[[Robot], Law], needs: Callable[[Robot], str] = flat_feet
+    name: str,
+    law: Callable[[Robot, NDArray[np.float64]], Law],
+    needs: Callable[[Robot], str] = flat_feet,
 ) -> Entry:
-    """Enter a controller that makes a robot stand as its file has it.
+    """Enter a controller that makes a robot stand, as it does on level ground.
 
     Parameters
     ----------
     name : str
         What it is called.
     law : callable
-        Takes a robot, returns the controller.
+        Takes a robot and the coordinates (nq,) in which it stands, returns the controller.
     needs : callable
         Takes a robot, returns what it lacks, in a word; by default it must have two flat feet.
 
@@ -138,8 +141,9 @@ def standing(
     """
 
     def trial(robot: Robot, _: Gait | None) -> Trial:
+        state = robot.standing(Ground())
         return Trial(
-            robot=robot, controller=law(robot), state=robot.reference_state(), step_length=0.0,
+            robot=robot, controller=law(robot, state.q), state=state, step_length=0.0,
             step_duration=typical_step(robot).duration,
         )  # fmt: skip
 
@@ -152,11 +156,12 @@ def _joint_pd(robot: Robot, gait: Gait) -> Law:
     return JointPD(robot, gait, kp=1000.0 * size[0] * size[1], kd=damping, feedforward="full")
 
 
-def _joint_springs(robot: Robot) -> Law:
+def _joint_springs(robot: Robot, q: NDArray[np.float64]) -> Law:
     size = _size(robot)
-    posture = robot.model.reference[robot.model.actuator_joint]
     damping = _at_most(robot, 100.0 * size[0] * size[1] ** 1.5)
-    return JointFeedback(robot, posture, kp=2000.0 * size[0] * size[1], kd=damping)
+    return JointFeedback(
+        robot, q[robot.model.actuator_joint], kp=2000.0 * size[0] * size[1], kd=damping
+    )
 
 
 def _virtual_constraints(robot: Robot, gait: Gait | None) -> Trial:
@@ -199,8 +204,9 @@ def gait_for(robot: Robot) -> Gait:
 
 
 def sampled(trial: Trial, method: Method) -> Trial:
-    """Return a trial by another method, its controller called once a sample."""
-    period = None if isinstance(method, TimeStepping) else SAMPLE
+    """Return a trial by another method, its controller called once a sample, or once a step."""
+    slow = isinstance(method, TimeStepping) and method.step >= SAMPLE
+    period = None if slow else SAMPLE
     return replace(trial, method=method, control_period=period)
 
 

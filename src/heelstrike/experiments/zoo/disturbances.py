@@ -148,7 +148,7 @@ def _friction(trial: Trial, _: Chance, effort: Effort) -> Largest:
         recovers, most=friction - LEAST_FRICTION, strides=effort.strides, halvings=effort.halvings
     )
     failed = friction - found.failed if np.isfinite(found.failed) else np.inf
-    return replace(found, recovered=friction - found.recovered, failed=failed, unit="")
+    return replace(found, recovered=friction - found.recovered, failed=failed, unit="μ")
 
 
 def _trunk_mass(trial: Trial, _: Chance, effort: Effort) -> Largest:
@@ -201,7 +201,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         by_chance=True,
     ),
     Disturbance(
-        "friction", "least μ", "", "the slipperiest patch, two steps long, on ground of μ = 0.75",
+        "friction", "least", "μ", "the slipperiest patch, two steps long, on ground of μ = 0.75",
         _friction, less=True,
     ),
     Disturbance(
@@ -210,7 +210,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
     ),
     Disturbance(
         "price", "price", "N²m²", "mean of the sum of torques squared, undisturbed", _price,
-        standing=True, less=True,
+        less=True,
     ),
 )  # fmt: skip
 """Disturbances, in the order of the table."""

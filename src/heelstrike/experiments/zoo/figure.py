@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullLocator
 
 from heelstrike.experiments.zoo.disturbances import Disturbance
 from heelstrike.experiments.zoo.results import STANDS, Cell, Results
@@ -16,14 +17,11 @@ from heelstrike.view.style import FOOT_COLORS, GREY, INK, PALE, new_figure, styl
 
 COLORS = (*FOOT_COLORS, INK)
 MARKERS = "os^DvPX*<>"
-WIDTH, ROW, AROUND = 9.0, 0.13, 0.75
+WIDTH, ROW, AROUND = 9.0, 0.11, 0.75
 """Inches: of the figure; of a row; round each panel."""
 
 GAP = 0.8
 """Rows between two robots."""
-
-LINEAR = 10.0
-"""Up to here an axis of torques squared is linear, beyond it is logarithmic."""
 
 CANNOT = ("needs ", "no ", "not on", "trunk is", "refused")
 """How words begin that say that a controller cannot drive a robot at all: it has no row."""
@@ -109,12 +107,14 @@ def _panel(
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(bands[-1][2], bands[0][1])
     axes.grid(visible=False, axis="y")
-    unit = f" ({disturbance.unit})" if disturbance.unit else ""
-    axes.set_title(f"{disturbance.name.replace('-', ' ')}{unit}", loc="left")
-    if disturbance.less and disturbance.unit:
-        axes.set_xscale("symlog", linthresh=LINEAR)
-    most = 1.0 if axes.get_xscale() == "linear" else 1.5
-    axes.set_xlim(0.0, most * max(axes.get_xlim()[1], LINEAR if most > 1.0 else 0.1))
+    axes.set_title(f"{disturbance.name.replace('-', ' ')} ({disturbance.unit})", loc="left")
+    if disturbance.name == "price":
+        axes.set_xscale("log")
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:.0f}")
+        axes.xaxis.set_minor_locator(NullLocator())
+    else:
+        axes.set_xlim(left=0.0)
     if disturbance.less:
         axes.invert_xaxis()
 
@@ -126,7 +126,7 @@ def _mark(
     if cell.word:
         if cell.word != STANDS:
             left = axes.get_yaxis_transform()
-            axes.plot(0.0, y, "x", transform=left, color=GREY, markersize=4.5, clip_on=False)
+            axes.plot(0.012, y, "x", transform=left, color=GREY, markersize=4.5, clip_on=False)
         return
     worst = cell.worst(less=disturbance.less)
     best = min(cell.withstood) if disturbance.less else max(cell.withstood)
@@ -154,4 +154,6 @@ def _legend(figure: Figure, looks: dict[str, tuple[str, str]], results: Results)
     title = "To the right is better."
     if trials > 1:
         title += f" Marker: withstood in all trials; line: up to the best of {trials}."
+    if any(cell.word == STANDS for cell in results.cells.values()):
+        title += " Blank: one that stands does not come to it."
     figure.legend(handles=handles, loc="outside upper left", ncols=4, title=title, alignment="left")

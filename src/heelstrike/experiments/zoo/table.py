@@ -12,12 +12,16 @@ from pathlib import Path
 from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
 from rich.table import Table
+from rich.text import Text
 
 from heelstrike.experiments.zoo.disturbances import Disturbance
 from heelstrike.experiments.zoo.results import STANDS, Animal, Cell, Results
 
 NOTHING = "–"
 """What stands where there is no number."""
+
+UNFORESEEN = ("refused", "no gait")
+"""Words that say little without their reason."""
 
 SURE = 0.95
 """Confidence with which a share of all phases and grounds is stated."""
@@ -71,8 +75,8 @@ def on_terminal(results: Results) -> RenderableType:
     shown_columns = columns(results)
     for animal, rows in results.robots():
         table = Table(
-            title=_title(animal), title_justify="left", title_style="bold", box=SIMPLE_HEAD,
-            show_edge=False, padding=0,
+            title=Text(_title(animal), "bold"), title_justify="left", title_style="",
+            box=SIMPLE_HEAD, show_edge=False, padding=0,
         )  # fmt: skip
         table.add_column("", no_wrap=True)
         for each in shown_columns:
@@ -83,13 +87,14 @@ def on_terminal(results: Results) -> RenderableType:
             cells = [
                 shown(row.get(each.name), each).replace("\u2009", "") for each in shown_columns
             ]
-            table.add_row(controller, *cells)
-        parts += [table] if filled else [f"[bold]{_title(animal)}[/bold]"]
+            table.add_row(Text(controller), *cells)
+        parts.append(table if filled else Text(_title(animal), "bold"))
         told: dict[str, list[str]] = {}
-        for word, controllers, _ in notes(rows):
-            told.setdefault(word, []).append(controllers)
-        parts += [f"{word}: {', '.join(names)}" for word, names in told.items()]
-        parts.append("")
+        for word, controllers, reason in notes(rows):
+            in_full = f": {reason}" if word in UNFORESEEN else ""
+            told.setdefault(word, []).append(controllers + in_full)
+        parts += [Text(f"{word}: {', '.join(names)}") for word, names in told.items()]
+        parts.append(Text())
     return Group(*parts[:-1])
 
 
@@ -142,7 +147,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "```",
         "",
         f"with heelstrike {settings.version}, {settings.method}, seed {settings.seed}, controllers "
-        "called every millisecond.",
+        "called every millisecond, or every step if that is longer.",
         "",
         f"![What controllers withstand on robots: one panel a disturbance]({link})",
         "",
@@ -167,9 +172,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
 
 def _explained(there: Sequence[Disturbance]) -> list[str]:
     rows = [_line("disturbance", "name", "unit", "what it is"), _line("---", "---", "---", "---")]
-    return rows + [
-        _line(each.heading, f"`{each.name}`", each.unit or "1", each.told) for each in there
-    ]
+    return rows + [_line(each.heading, f"`{each.name}`", each.unit, each.told) for each in there]
 
 
 def _measure(results: Results, share: float) -> list[str]:
@@ -187,7 +190,8 @@ def _measure(results: Results, share: float) -> list[str]:
         "many shapes, at least. Everything else has one trial.",
         "",
         "A controller that does not walk undisturbed is not disturbed: it falls, leans by more "
-        "than 0.6 rad, or strays from its speed. One that stands meets no other ground.",
+        "than 0.6 rad, or strays from its speed. One that stands meets no other ground, "
+        "and what it pays is nothing.",
     ]
 
 
