@@ -40,6 +40,9 @@ TURNING = 0.15
 STEEP = 0.6
 """Ground whose normal rises less cannot be stood upon."""
 
+BUMP = 0.1
+"""A slope that differs by as much from the one before may be but a bump."""
+
 STEEPEST = 0.35
 """No slope is believed to be steeper."""
 
@@ -90,7 +93,9 @@ def exchange_at_touchdown(
         rise = memory.swing[1] - memory.sole[1]
         if abs(length) > 0.1 * parameters.reference.length:
             slope = min(max(rise / length, -STEEPEST), STEEPEST)
-            memory.slope += parameters.believed * (slope - memory.slope)
+            off = slope - memory.slope
+            doubt = (1.0 - parameters.believed) * min(abs(off) / BUMP, 1.0)
+            memory.slope += (1.0 - doubt) * off
         memory.stance = swing
         memory.landed = 0
         memory.steps += 1
