@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from heelstrike.control import Sensed as Sensed
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
+    from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
     from heelstrike.errors import ContactProblemError as ContactProblemError
@@ -165,6 +166,7 @@ _HOME = {
     "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
     "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
+    "ZeroMomentPointRegulation": "heelstrike.control",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
