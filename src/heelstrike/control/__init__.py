@@ -9,7 +9,7 @@ from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
 from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadratic_program
-from heelstrike.control.regulation.law import ZeroMomentPointRegulation
+from heelstrike.control.regulation.controller import ZeroMomentPointRegulation
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller

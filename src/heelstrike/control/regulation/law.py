@@ -18,157 +18,28 @@ point within its bounds, w does.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.computed_torque import Landing, Stance, has_landed, pitch_of
-from heelstrike.control.regulation.disturbance import Disturbance, observe, remember
+from heelstrike.control.computed_torque import has_landed
+from heelstrike.control.regulation.disturbance import observe, remember
 from heelstrike.control.regulation.interval import narrowed
-from heelstrike.dynamics.inverse_kinematics import leg_joints
+from heelstrike.control.regulation.numbers import (
+    CONDITIONS,
+    MOMENTS,
+    PERIOD,
+    Choice,
+    Log,
+    Memory,
+    Parameters,
+)
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.places import point_columns
 from heelstrike.dynamics.spatial import spatial
-from heelstrike.errors import ControllerError, GaitError
-from heelstrike.gait.gait import Footing, Gait
-from heelstrike.robot.loops import refuse_loops
-from heelstrike.robot.model import Floats, Integers
-from heelstrike.robot.robot import Robot
-from heelstrike.robot.sole import sole
+from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.law import Law, controller, per_actuator
+from heelstrike.sim.controller.law import controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import (
-    complete,
-    joint_torques,
-    solve_three_transposed,
-)
-
-MOMENTS, CONDITIONS = 2, 5
-"""Conditions on the ground's wrench: toe and heel, then normal force and both ends of friction."""
-
-PERIOD = 1e-3
-"""Seconds between two calls."""
-
-
-class Parameters(Landing):
-    """Numbers of the law.
-
-    Attributes
-    ----------
-    kp, kd : (nu,) float
-        Gains (1/s², 1/s).
-    breakpoints : (pieces + 1,) float
-        Times in a step between which one polynomial holds (s).
-    coefficients : (2, pieces, terms, nu) float
-        For either stance foot the joints' polynomials, lowest power first.
-    ankle : (2,) int
-        Actuator of the ankle of each foot.
-    earliest, latest : float
-        A touchdown counts only after this time of the gait; the reference ends at this (s).
-    margin : float
-        How far the zero moment point stays inside the sole (m).
-    friction : float
-        Coefficient of friction that is reckoned with.
-    least_force : float
-        Least normal force (N).
-    returning : float
-        T_r, in which the clock comes back to the pace of time (s).
-    hurry : float
-        Greatest |s̈| (1/s).
-    slowest, fastest : float
-        Bounds of ṡ.
-    bandwidth : float
-        Frequency (Hz) up to which disturbances are felt; negative for not at all.
-    """
-
-    kp: Floats = array("nu")
-    kd: Floats = array("nu")
-    breakpoints: Floats = array("pieces + 1")
-    coefficients: Floats = array(2, "pieces", "terms", "nu")
-    ankle: Integers = array(2, of=int)
-    earliest: float = number(float)
-    latest: float = number(float)
-    margin: float = number(float)
-    friction: float = number(float)
-    least_force: float = number(float)
-    returning: float = number(float)
-    hurry: float = number(float)
-    slowest: float = number(float)
-    fastest: float = number(float)
-    bandwidth: float = number(float)
-
-
-class Choice(Bundle):
-    """What the ground exerts on the stance foot, and the motion, for numbers to be chosen.
-
-    Attributes
-    ----------
-    position, slope, curvature : (nu,) float
-        q_d, q_d′ and q_d″.
-    joints : (3, nu) float
-        Accelerations of the joints as nothing is chosen, and what s̈ and w add to them.
-    force : (3, nv) float
-        Generalised forces of motors and ground for these.
-    conditions : (5, 3) float
-        Numbers that must not be negative, likewise.
-    """
-
-    position: Floats = array("nu")
-    slope: Floats = array("nu")
-    curvature: Floats = array("nu")
-    joints: Floats = array(3, "nu")
-    force: Floats = array(3, "nv")
-    conditions: Floats = array(CONDITIONS, 3)
-
-
-class Memory(Stance):
-    """What the law remembers.
-
-    Attributes
-    ----------
-    time : float
-        Of the last call (s).
-    clock, rate, hurry : float
-        s, ṡ and s̈ (s, 1, 1/s).
-    choice : Choice
-    disturbance : Disturbance
-    """
-
-    time: float = cell(float)
-    clock: float = cell(float)
-    rate: float = cell(float)
-    hurry: float = cell(float)
-    choice: Choice = part(Choice)
-    disturbance: Disturbance = part(Disturbance)
-
-
-class Log(Bundle):
-    """What the law tells of itself.
-
-    Attributes
-    ----------
-    clock, rate, hurry : float
-        s, ṡ and s̈.
-    slowest_hurry, fastest_hurry : float
-        The interval of s̈; both the same if it is empty.
-    ankle : float
-        w, what the stance ankle accelerates besides (rad/s²).
-    pressure : float
-        Zero moment point that is expected, from the middle of the sole towards the toe (m).
-    given_up : int
-        0: all conditions are met. 1: normal force or friction are not. 2: s̈ alone would not keep
-        the zero moment point, the ankle does. 3: neither does.
-    """
-
-    clock: float = cell(float, unit="s", label="Clock of the gait")
-    rate: float = cell(float, label="Rate of the clock")
-    hurry: float = cell(float, unit="1/s", label="Change of the clock's rate")
-    slowest_hurry: float = cell(float, unit="1/s", label="Least change of the clock's rate")
-    fastest_hurry: float = cell(float, unit="1/s", label="Greatest change of the clock's rate")
-    ankle: float = cell(float, unit="rad/s²", label="Acceleration that the ankle gives up")
-    pressure: float = cell(float, unit="m", label="Expected zero moment point")
-    given_up: int = cell(int, label="Conditions given up")
+from heelstrike.sim.controller.stance import complete, joint_torques, solve_three_transposed
 
 
 @kernel
@@ -279,9 +150,7 @@ def find_conditions(
 
 
 @kernel
-def choose(
-    parameters: Parameters, elapsed: float, memory: Memory, log: Log
-) -> tuple[float, float]:
+def choose(parameters: Parameters, elapsed: float, memory: Memory, log: Log) -> tuple[float, float]:
     """Choose s̈, nearest to the gait's own time law, and w, nearest to nothing."""
     rows, rate = memory.choice.conditions, memory.rate
     soon = max(elapsed, PERIOD)
@@ -358,114 +227,3 @@ def tell(
         length = np.hypot(ends[1, 0] - ends[0, 0], ends[1, 1] - ends[0, 1])
         within = length - 2.0 * parameters.margin
         log.pressure = 0.5 * within * (heel - toe) / (heel + toe)
-
-
-class ZeroMomentPointRegulation(Law):
-    """Follow a gait by a clock that the zero moment point regulates.
-
-    Computed torque towards q_d(s); s̈ is as near to the gait's own time law as the zero moment
-    point, the normal force and friction allow, and the stance ankle gives way to what the clock
-    cannot do. See ``docs/zmp-regulation.md`` for the theory and what it cannot do.
-
-    Parameters
-    ----------
-    robot : Robot
-        A floating robot with two mirrored flat feet on ankles, all joints but the trunk's actuated.
-    gait : Gait
-        The gait to follow, which stands on one flat foot at a time.
-    margin : float
-        How far the zero moment point stays from either end of the sole (m).
-    kp, kd : float or (nu,) array
-        Gains of the joints, in 1/s² and 1/s.
-    friction : float, optional
-        Coefficient of friction that it reckons with; by default that of the gait.
-    least_force : float
-        Least normal force on the stance foot, in parts of the weight.
-    returning : float
-        Time (s) in which the clock comes back to the pace of time, where it may.
-    hurry : float
-        Greatest change |s̈| of the clock's rate (1/s).
-    slowest, fastest : float
-        Bounds of the clock's rate.
-    bandwidth : float or None
-        Frequency (Hz) up to which the law feels what pushes the robot, by velocities, torques and
-        contact forces; infinite for all that there is between two calls, None for nothing.
-    period : float
-        Seconds between two calls.
-
-    Raises
-    ------
-    ControllerError
-        If the robot cannot be controlled this way, or the gait or a number does not fit it.
-
-    Examples
-    --------
-    >>> import heelstrike as hs
-    >>> robot = hs.load_robot("bravo7")
-    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
-    >>> law = hs.ZeroMomentPointRegulation(robot, gait)
-    >>> push = hs.Push("trunk", force=(100.0, 0.0), start=0.3, duration=0.1)  # 10 N s
-    >>> run = hs.simulate(robot, law, state=gait.initial_state, duration=1.4, pushes=push)
-    >>> run.completed, bool(run.log["rate"].values.max() > 1.1)
-    (True, True)
-    """
-
-    def __init__(
-        self,
-        robot: Robot,
-        gait: Gait,
-        *,
-        margin: float = 0.02,
-        kp: ArrayLike = 400.0,
-        kd: ArrayLike = 40.0,
-        friction: float | None = None,
-        least_force: float = 0.1,
-        returning: float = 0.3,
-        hurry: float = 50.0,
-        slowest: float = 0.0,
-        fastest: float = 3.0,
-        bandwidth: float | None = np.inf,
-        period: float = PERIOD,
-    ) -> None:
-        _check(robot, gait)
-        sides = [gait.pieces, gait.mirrored_pieces()]
-        if gait.stance_foot:
-            sides.reverse()
-        duration = gait.step_duration
-        parameters = Parameters(
-            kp=per_actuator("kp", kp, robot),
-            kd=per_actuator("kd", kd, robot),
-            breakpoints=gait.breakpoints,
-            coefficients=np.array(sides),
-            ankle=np.array(_ankles(robot)),
-            earliest=0.5 * duration,
-            latest=1.1 * duration,
-            landing=0.02 * duration,
-            margin=float(margin),
-            friction=float(gait.friction if friction is None else friction),
-            least_force=float(least_force) * robot.weight,
-            returning=float(returning),
-            hurry=float(hurry),
-            slowest=float(slowest),
-            fastest=float(fastest),
-            bandwidth=-1.0 if bandwidth is None else float(bandwidth),
-        )
-        begin = {"stance": gait.stance_foot, "landed": 1, "rate": 1.0}
-        super().__init__(
-            regulate_zero_moment_point, parameters, memory=begin, robot=robot, period=period
-        )
-        self.gait = gait
-
-
-def _check(robot: Robot, gait: Gait) -> None:
-    refuse_loops(robot, "regulation of the zero moment point", ControllerError)
-    pitch_of(robot)
-    try:
-        gait.check_joints(robot)
-    except GaitError as error:
-        raise ControllerError(str(error)) from None
-
-
-def _ankles(robot: Robot) -> list[int]:
-    actuators = robot.model.actuator_joint.tolist()
-    return [actuators.index(leg[-1]) for leg in leg_joints(robot)]
