@@ -46,7 +46,7 @@ class ZeroMomentPointRegulation(Law):
         Bounds of the clock's rate.
     bandwidth : float or None
         Frequency (Hz) up to which the law feels what pushes the robot, by velocities, torques and
-        contact forces; infinite for all that there is between two calls, None for nothing.
+        contact forces; None for not at all.
     period : float
         Seconds between two calls.
 
@@ -81,7 +81,7 @@ class ZeroMomentPointRegulation(Law):
         hurry: float = 50.0,
         slowest: float = 0.0,
         fastest: float = 3.0,
-        bandwidth: float | None = np.inf,
+        bandwidth: float | None = 30.0,
         period: float = PERIOD,
     ) -> None:
         _check(robot, gait)
