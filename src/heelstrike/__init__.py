@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import StandingLQR as StandingLQR
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
     from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
@@ -158,6 +159,7 @@ _HOME = {
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
+    "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",

@@ -11,6 +11,7 @@ from heelstrike.control.quadratic.program import Program
 from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadratic_program
 from heelstrike.control.regulation.controller import ZeroMomentPointRegulation
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
+from heelstrike.control.standing_lqr import StandingLQR
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -34,6 +35,7 @@ __all__ = [
     "Program",
     "QuadraticSolution",
     "Sensed",
+    "StandingLQR",
     "VirtualConstraints",
     "WholeBody",
     "ZeroMomentPointRegulation",
