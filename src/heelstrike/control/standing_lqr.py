@@ -149,8 +149,8 @@ def _refuse_what_falls(robot: Robot, held: ContactInverseDynamics) -> None:
 class StandingLQR(Law):
     """Stand in a posture by the linear-quadratic regulator of the robot on its feet.
 
-    τ = τ₀ − K (y, ẏ) with the least cost ∫ δqᵀW_q δq + δq̇ᵀW_v δq̇ + δτᵀR δτ dt of all linear laws, for
-    small disturbances and as long as the feet stay where they are. What y is follows from all
+    τ = τ₀ − K (y, ẏ) has the least cost ∫ δqᵀW_q δq + δq̇ᵀW_v δq̇ + δτᵀR δτ dt of all linear laws,
+    for small disturbances and as long as the feet stay where they are. What y is follows from all
     coordinates but where the trunk is, so that it does not matter where the robot stands. See
     ``docs/lqr.md`` for the theory and what it cannot do.
 
@@ -165,8 +165,8 @@ class StandingLQR(Law):
     torque_weight : float or (nu,) array
         Diagonal of R, 1/(N m)².
     period : float or None
-        Seconds between two calls, for which the regulator is found: torques are held meanwhile. None
-        for a law that acts continuously.
+        Seconds between two calls, for which the regulator is found: torques are held meanwhile.
+        None for a law that acts continuously.
 
     Attributes
     ----------
@@ -200,8 +200,8 @@ class StandingLQR(Law):
         robot: Robot,
         posture: ArrayLike | None = None,
         *,
-        position_weight: ArrayLike = 1e6,
-        velocity_weight: ArrayLike = 1e4,
+        position_weight: ArrayLike = 1e4,
+        velocity_weight: ArrayLike = 1e3,
         torque_weight: ArrayLike = 1.0,
         period: float | None = 1e-3,
     ) -> None:
