@@ -143,10 +143,11 @@ def test_answers_of_ill_conditioned_programmes_are_refined() -> None:
     """Curvatures that differ by 1e8 and rows by 1e6 in size cost no accuracy of the answer.
 
     A point keeps all rows, eight of them without room, more than there are unknowns; one direction
-    leads inside all. What one pass of the active set leaves is 1e-6 of forces and 1e-7 of rows.
+    leads inside all. Of the first 8000 seeds these are the ones of which a pass of the active set
+    leaves most: from 1e-4 to 2e-7.
     """
     worst = np.zeros(3)
-    for seed in range(150):
+    for seed in (2281, 2272, 5271, 5662, 3974, 5905, 730, 2658, 5569, 7441, 801, 1576):
         rng = np.random.default_rng(seed)
         n, m = 6, 19
         factor = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-4.0, 4.0, n)[:, None]
