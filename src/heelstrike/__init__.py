@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from heelstrike.control import Feedforward as Feedforward
     from heelstrike.control import FootSensors as FootSensors
     from heelstrike.control import FootstepFeedback as FootstepFeedback
+    from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
@@ -134,6 +135,7 @@ _HOME = {
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
+    "GaitLQR": "heelstrike.control",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",

@@ -4,6 +4,7 @@ from heelstrike.control.actuation import Actuated
 from heelstrike.control.balance.controllers import FootstepFeedback, WholeBody
 from heelstrike.control.computed_torque import ComputedTorque, Encoder
 from heelstrike.control.estimation import Estimated
+from heelstrike.control.gait_lqr.law import GaitLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
 from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
@@ -28,6 +29,7 @@ __all__ = [
     "Feedforward",
     "FootSensors",
     "FootstepFeedback",
+    "GaitLQR",
     "InertialUnit",
     "JointPD",
     "Law",
