@@ -2,7 +2,7 @@
 
     τ = τ_d(θ) − K(θ) (x − x_d(θ)),   x = (q, v) but for where the trunk is
 
-Walk and gains are cubic splines of the phase. On the other foot the robot is looked at in the
+Walk and gains are Chebyshev series of the phase. On the other foot the robot is looked at in the
 mirror, and its torques are.
 """
 
@@ -10,12 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.gait_lqr.orbit import orbit_of
-from heelstrike.control.gait_lqr.transverse import STEPS, Transverse, sorted_by_size
+from heelstrike.control.gait_lqr.orbit import NODES, Course, nodes, orbit_of
+from heelstrike.control.gait_lqr.transverse import Transverse, sorted_by_size
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats, Integers
@@ -26,8 +25,8 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 LANDS_AFTER = 0.5
 """A swing foot that meets the ground before this part of the phase scuffs; after it, it lands."""
 
-BEYOND = 0.1
-"""Splines go on for this part of the phase beyond either end; then they stay as they are."""
+BEYOND = 0.01
+"""Series go on for this part of half the phase beyond either end; then they stay as they are."""
 
 
 class Parameters(Bundle):
@@ -45,13 +44,11 @@ class Parameters(Bundle):
         Factors of the coordinates in θ.
     first, width : float
         Where θ begins, and how far it goes (rad).
-    walk : (pieces, 2 nv, 4) float
-        Coordinates and velocities of the walk; cubics of the part of a piece gone by, lowest power
-        first.
-    torque : (pieces, nu, 4) float
-        Torques of the walk, likewise.
-    gains : (pieces, nu, 2 nv, 4) float
-        K, likewise.
+    walk : (2 nv, terms) float
+        Coordinates and velocities of the walk, as Chebyshev series over the range of θ.
+    torque : (nu, terms) float
+    gains : (nu, 2 nv, terms) float
+        Torques of the walk, and K, likewise.
     """
 
     stance: int = number(int)
@@ -63,9 +60,9 @@ class Parameters(Bundle):
     phase: Floats = array("nv")
     first: float = number(float)
     width: float = number(float)
-    walk: Floats = array("pieces", "2 nv", 4)
-    torque: Floats = array("pieces", "nu", 4)
-    gains: Floats = array("pieces", "nu", "2 nv", 4)
+    walk: Floats = array("2 nv", "terms")
+    torque: Floats = array("nu", "terms")
+    gains: Floats = array("nu", "2 nv", "terms")
 
 
 class Memory(Bundle):
@@ -78,12 +75,15 @@ class Memory(Bundle):
         State as in the walk, and how far from it.
     asked : (nu,) float
         Torques as in the walk.
+    polynomial : (terms,) float
+        Chebyshev polynomials at the phase.
     """
 
     stance: int = cell(int)
     x: Floats = array("2 nv")
     away: Floats = array("2 nv")
     asked: Floats = array("nu")
+    polynomial: Floats = array("terms")
 
 
 class Log(Bundle):
@@ -114,9 +114,22 @@ def seen_as_in_the_walk(state: ControlState, parameters: Parameters, memory: Mem
 
 
 @kernel
-def cubic(numbers: Floats, s: float) -> float:
-    """Value of a cubic."""
-    return numbers[0] + s * (numbers[1] + s * (numbers[2] + s * numbers[3]))
+def find_polynomials(x: float, polynomial: Floats) -> None:
+    """Write the Chebyshev polynomials at x."""
+    before, now = 1.0, x
+    polynomial[0] = before
+    for k in range(1, polynomial.shape[0]):
+        polynomial[k] = now
+        before, now = now, 2.0 * x * now - before
+
+
+@kernel
+def value(series: Floats, polynomial: Floats) -> float:
+    """Value of a series."""
+    total = 0.0
+    for k in range(polynomial.shape[0]):
+        total += series[k] * polynomial[k]
+    return total
 
 
 @controller
@@ -131,19 +144,16 @@ def gait_lqr(
         memory.stance = swing
         part = seen_as_in_the_walk(state, parameters, memory)
     log.phase = part
-    pieces = parameters.walk.shape[0]
-    place = min(max(part, -BEYOND), 1.0 + BEYOND) * pieces
-    piece = min(max(int(place), 0), pieces - 1)
-    s = place - piece
-    walk, given = parameters.walk[piece], parameters.torque[piece]
-    gains = parameters.gains[piece]
+    x = min(max(2.0 * part - 1.0, -1.0 - BEYOND), 1.0 + BEYOND)
+    polynomial = memory.polynomial
+    find_polynomials(x, polynomial)
     count = memory.x.shape[0]
     for j in range(count):
-        memory.away[j] = memory.x[j] - cubic(walk[j], s)
+        memory.away[j] = memory.x[j] - value(parameters.walk[j], polynomial)
     for i in range(robot.nu):
-        total = cubic(given[i], s)
+        total = value(parameters.torque[i], polynomial)
         for j in range(count):
-            total -= cubic(gains[i, j], s) * memory.away[j]
+            total -= value(parameters.gains[i, j], polynomial) * memory.away[j]
         memory.asked[i] = total
     for i in range(robot.nu):
         if memory.stance == parameters.stance:
@@ -169,8 +179,6 @@ class GaitLQR(Law):
         Those of where the trunk is count for nothing.
     torque_weight : float or (nu,) array
         What torques cost besides those of the walk, 1/(N m)².
-    pieces : int
-        Cubic pieces of the splines.
 
     Attributes
     ----------
@@ -203,13 +211,8 @@ class GaitLQR(Law):
         position_weight: ArrayLike = 1e4,
         velocity_weight: ArrayLike = 1e2,
         torque_weight: ArrayLike = 1.0,
-        pieces: int = 64,
     ) -> None:
         robot = gait.robot
-        if pieces < 8 or STEPS % pieces:
-            raise ControllerError(
-                f"pieces must be a divisor of {STEPS}, from 8 on, got {pieces!r}"
-            )
         cost = np.concatenate(
             [
                 _weights("position_weight", position_weight, robot.nv)[2:],
@@ -221,20 +224,20 @@ class GaitLQR(Law):
             raise ControllerError(f"torque_weight must be positive, got {torque_weight!r}")
         orbit = orbit_of(gait)
         transverse = Transverse.of(orbit)
-        found = transverse.regulator(np.diag(cost), np.diag(effort)) @ transverse.basis.T
-        theta = transverse.theta[:: 2 * STEPS // pieces]
-        gains = CubicSpline(theta, found[:: STEPS // pieces])
-        # What the splines make of the gains is what is predicted.
+        found = transverse.regulator(np.diag(cost), np.diag(effort))
+        first, last = orbit.q.first, orbit.q.last
+        gains = Course.through(first, last, found(nodes(first, last)))
+        # What the series make of the gains is what is predicted.
         step = transverse.over_a_step(gains(transverse.theta) @ transverse.basis)
         self.multipliers = sorted_by_size(np.linalg.eigvals(step))
         if not np.all(np.abs(self.multipliers) < 1.0):
             raise ControllerError("no regulator makes this walk repeat; try other weights")
         self.gait = gait
         size = robot.nv - 2
-        whole = np.zeros((len(theta), robot.nu, 2 * robot.nv))
-        spline = np.asarray(gains(theta))
-        whole[:, :, 2 : robot.nv] = spline[:, :, :size]
-        whole[:, :, robot.nv + 2 :] = spline[:, :, size:]
+        whole = np.zeros((NODES, robot.nu, 2 * robot.nv))
+        whole[:, :, 2 : robot.nv] = gains.coefficients[:, :, :size]
+        whole[:, :, robot.nv + 2 :] = gains.coefficients[:, :, size:]
+        walk = np.hstack([orbit.q.coefficients, orbit.v.coefficients])
         mirror = robot.mirror
         assert mirror is not None  # see PhasedGait
         driven = mirror.among(robot.model.actuator_joint)
@@ -246,20 +249,18 @@ class GaitLQR(Law):
             actuator=driven.joint,
             actuator_sign=driven.sign,
             phase=gait.phase,
-            first=float(theta[0]),
-            width=float(theta[-1] - theta[0]),
-            walk=_cubics(theta, np.hstack([orbit.q(theta), orbit.v(theta)])),
-            torque=_cubics(theta, orbit.torque(theta)),
-            gains=_cubics(theta, whole),
+            first=first,
+            width=last - first,
+            walk=_terms_last(walk),
+            torque=_terms_last(orbit.torque.coefficients),
+            gains=_terms_last(whole),
         )
-        super().__init__(gait_lqr, parameters, memory={"stance": gait.stance_foot}, robot=robot)
+        begin = {"stance": gait.stance_foot, "terms": NODES}
+        super().__init__(gait_lqr, parameters, memory=begin, robot=robot)
 
 
-def _cubics(theta: Floats, values: Floats) -> Floats:
-    """Coefficients of a spline, (pieces, ..., 4), in the part of each piece that has gone by."""
-    spline = CubicSpline(theta, values)
-    width = (theta[1] - theta[0]) ** np.arange(4)
-    return np.ascontiguousarray(np.moveaxis(spline.c[::-1], 0, -1) * width)
+def _terms_last(coefficients: Floats) -> Floats:
+    return np.ascontiguousarray(np.moveaxis(coefficients, 0, -1))
 
 
 def _weights(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:

@@ -56,7 +56,9 @@ class Course:
         """Values at phases, (..., entries)."""
         x = (2.0 * np.asarray(theta) - self.first - self.last) / (self.last - self.first)
         values = chebval(x, self.coefficients)
-        moved: Floats = np.moveaxis(values, range(self.coefficients.ndim - 1), range(x.ndim, values.ndim))
+        moved: Floats = np.moveaxis(
+            values, range(self.coefficients.ndim - 1), range(x.ndim, values.ndim)
+        )
         return moved
 
     def slope(self) -> Course:

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.linalg import null_space
 
 from heelstrike import dynamics
@@ -79,8 +80,8 @@ class Transverse:
         jump = basis.T @ across[0] @ _impact_slope(orbit) @ _to_the_ground(orbit) @ basis
         return cls(theta, basis, slopes, pushes, pace, jump)
 
-    def regulator(self, cost: Floats, effort: Floats) -> Floats:
-        """Gains (STEPS + 1, nu, 2 p − 1) of the least cost, at every other phase."""
+    def regulator(self, cost: Floats, effort: Floats) -> CubicSpline:
+        """Gains (nu, 2 p) of the least cost over the phase."""
         cheap = np.linalg.inv(effort)
         costs = self.pace[:, None, None] * (self.basis.T @ cost @ self.basis)
         pushes = self.B @ cheap @ np.moveaxis(self.B, 1, 2) / self.pace[:, None, None]
@@ -106,7 +107,8 @@ class Transverse:
                 break
             if abs(size - before) <= SETTLED * size:
                 gains = cheap @ np.moveaxis(self.B[::2], 1, 2) @ values
-                return np.asarray(gains / self.pace[::2, None, None])
+                gains = gains / self.pace[::2, None, None] @ self.basis.T
+                return CubicSpline(self.theta[::2], gains)
             before = size
         raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
 
