@@ -208,8 +208,8 @@ class GaitLQR(Law):
         self,
         gait: PhasedGait,
         *,
-        position_weight: ArrayLike = 1e4,
-        velocity_weight: ArrayLike = 1e2,
+        position_weight: ArrayLike = 1e6,
+        velocity_weight: ArrayLike = 1e3,
         torque_weight: ArrayLike = 1.0,
     ) -> None:
         robot = gait.robot

@@ -1,8 +1,8 @@
 """The walk over a phase that repeats: states, torques, and the equations of motion about it.
 
-All are found at the nodes of Chebyshev polynomials in the phase θ and interpolated, which for smooth
-motions is exact to rounding. Beside the joints the coordinates are the trunk's pitch: where the
-trunk is follows from the stance foot. A disturbance is (δp, δṗ), p all coordinates but those two.
+All are found at the nodes of Chebyshev polynomials in the phase θ and interpolated, which for
+smooth motions is exact to rounding. Where the trunk is follows from the stance foot: a disturbance
+is (δp, δṗ), p all coordinates but the trunk's x and z.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ INVARIANT = 1e-6
 """Impacts may lead this far from the beginning of the gait (rad, and in slopes)."""
 
 SMALL = 1e-6
-"""Disturbance (rad, rad/s) of central differences, whose errors are its square and 1e-16 over it."""
+"""Disturbance (rad, rad/s) of central differences: their errors are its square, and 1e-16 over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +148,7 @@ def orbit_of(gait: PhasedGait) -> Orbit:
 
 
 def _rates(surface: Surface, end: Touchdown, theta: Floats) -> Floats:
-    """θ̇ of the walk that repeats: ½σ² grows by what gravity gives, and the impact takes its part."""
+    """θ̇ of the walk that repeats: gravity adds to ½σ² what the impact takes of it."""
     domain = [end.after, end.before]
     power = Chebyshev.interpolate(
         np.vectorize(lambda each: surface.inertia(each) * surface.tipping(each)), NODES, domain

@@ -13,8 +13,8 @@ is that of the beginning:
 
     w⁺ = Eᵀ Π₀ DΔ (I − f ∇h/(∇h f)) E w⁻.
 
-The regulator minimises ∫ zᵀQz + δτᵀR δτ dt over all steps to come: a Riccati equation whose solution
-the jump takes from the beginning of a step to the end of the one before.
+The regulator minimises ∫ zᵀQz + δτᵀR δτ dt over all steps to come: a Riccati equation whose
+solution the jump takes from the beginning of a step to the end of the one before.
 """
 
 from __future__ import annotations
