@@ -66,11 +66,14 @@ if TYPE_CHECKING:
     from heelstrike.control import Feedforward as Feedforward
     from heelstrike.control import FootSensors as FootSensors
     from heelstrike.control import FootstepFeedback as FootstepFeedback
+    from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import StandingLQR as StandingLQR
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
+    from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
     from heelstrike.errors import ContactProblemError as ContactProblemError
@@ -139,6 +142,7 @@ _HOME = {
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
+    "GaitLQR": "heelstrike.control",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
@@ -165,6 +169,7 @@ _HOME = {
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
+    "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",
@@ -173,6 +178,7 @@ _HOME = {
     "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
     "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
+    "ZeroMomentPointRegulation": "heelstrike.control",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",

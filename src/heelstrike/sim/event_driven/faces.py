@@ -258,7 +258,7 @@ def leave_second_face(
         _, its = second_face(ground, phase.face[point], phase.face[second], x, z, radius)
         phase.face[second] = its
         locate_on_face(model, ground, tree, point, its, phase.seconds)
-        take_surface(ground, second, its, surface)
+        take_surface(model, ground, point, second, its, surface)
         phase.fired[2 * second] = 1
     return True
 
