@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import SteppingConstraints as SteppingConstraints
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
     from heelstrike.control import controller as controller
@@ -81,6 +82,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
@@ -158,6 +160,8 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
     "State": "heelstrike.robot",
+    "StepFamily": "heelstrike.gait",
+    "SteppingConstraints": "heelstrike.control",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",

@@ -10,6 +10,7 @@ from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
 from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadratic_program
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
+from heelstrike.control.stepping_constraints import SteppingConstraints
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -33,6 +34,7 @@ __all__ = [
     "Program",
     "QuadraticSolution",
     "Sensed",
+    "SteppingConstraints",
     "VirtualConstraints",
     "WholeBody",
     "controller",

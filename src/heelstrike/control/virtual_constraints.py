@@ -183,15 +183,13 @@ def want(
             memory.wanted[k] += joints[k, i] * law
 
 
-@controller
-def virtual_constraints(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory, torque: Floats,
+@kernel
+def obey(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, phase: Floats, foot: int,
+    accelerations: Floats, slope: Floats, torque: Floats,
 ) -> None:  # fmt: skip
-    """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
-    exchange_at_touchdown(state, contacts, robot, parameters, memory)
-    want(state, robot, parameters, memory)
-    foot, columns, wanted = memory.stance, robot.columns, robot.acceleration
+    """Torques (nu,) that give the joints the accelerations + θ̈ slope on a point foot."""
+    columns, wanted = robot.columns, robot.acceleration
     contact = robot.foot_contact[foot]
     link, place = robot.model.contact_link[contact], contacts.position[contact]
     point_columns(robot.model, state.kinematics, link, place, columns)
@@ -201,15 +199,15 @@ def virtual_constraints(
     )
     # In the place of the rotation, which nothing holds: the phase.
     for j in range(robot.nv):
-        columns[j, 2] = parameters.phase[foot, j]
+        columns[j, 2] = phase[foot, j]
     drift, along = robot.other, robot.passive  # both are written anew below
     point_bias_acceleration(state.kinematics, link, place, drift)
-    complete(robot, (-drift[0], -drift[1], 0.0), memory.wanted, wanted)
+    complete(robot, (-drift[0], -drift[1], 0.0), accelerations, wanted)
 
     # The moment about the foot at θ̈ = 0, and at θ̈ = 1; it is linear in θ̈.
     force, other = robot.force, robot.other
     force_wanted(robot, state, force)
-    complete(robot, (0.0, 0.0, 1.0), memory.slope, along)
+    complete(robot, (0.0, 0.0, 1.0), slope, along)
     for j in range(robot.nv):
         wanted[j] += along[j]
     force_wanted(robot, state, other)
@@ -219,6 +217,18 @@ def virtual_constraints(
     for j in range(robot.nv):
         force[j] += share * (other[j] - force[j])
     joint_torques(robot, torque)
+
+
+@controller
+def virtual_constraints(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory, torque: Floats,
+) -> None:  # fmt: skip
+    """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
+    exchange_at_touchdown(state, contacts, robot, parameters, memory)
+    want(state, robot, parameters, memory)
+    foot = memory.stance
+    obey(state, contacts, robot, parameters.phase, foot, memory.wanted, memory.slope, torque)
 
 
 class VirtualConstraints(Law):
@@ -274,8 +284,8 @@ class VirtualConstraints(Law):
         mirrored = matrix @ gait.joint_mirror()
         both = [matrix, mirrored] if gait.stance_foot == 0 else [mirrored, matrix]
         parameters = Parameters(
-            kp=_gains("kp", kp, robot),
-            kd=_gains("kd", kd, robot),
+            kp=gains_of("kp", kp, robot),
+            kd=gains_of("kd", kd, robot),
             epsilon=0.0 if finite_time is None else float(finite_time),
             exponent=float(exponent),
             phase=phase,
@@ -291,7 +301,8 @@ class VirtualConstraints(Law):
         self.gait = gait
 
 
-def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+def gains_of(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+    """Return gains of each actuator, (nu,), that are not negative."""
     gains = per_actuator(name, value, robot)
     if np.any(gains < 0.0):
         raise ControllerError(f"{name} must not be negative, got {value!r}")
