@@ -22,13 +22,22 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.virtual_constraints import LANDS_AFTER, gains_of, obey, series
+from heelstrike.control.virtual_constraints import (
+    LANDS_AFTER,
+    demand,
+    gains_of,
+    hold_foot,
+    series,
+)
+from heelstrike.dynamics.frames import into_frame
+from heelstrike.dynamics.spatial import Spatial, spatial
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.family import StepFamily
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.stance import joint_torques, solve_three_transposed
 
 # Phases, in parts of half a step from its middle, between which one shift goes over to the next.
 BEGINS, ENDS = -0.8, 0.5
@@ -36,6 +45,8 @@ BEGINS, ENDS = -0.8, 0.5
 FADES = 0.8
 # The rate of the phase is taken to be no less than this part of the usual one.
 LEAST_RATE = 0.3
+# Part of the robot's weight that the stance foot is pressed with at least.
+PRESSED = 0.1
 # A foot that is less than this above the ground (m) has just stood there.
 STOOD = 0.01
 
@@ -51,6 +62,10 @@ class Parameters(Bundle):
         Shift, in largest ones, for an energy that is twice the usual one.
     trust : float
         Part of the difference to the slope of the last step that is believed.
+    friction : float
+        Friction that the law counts on.
+    press : float
+        Normal force that it keeps on the foot (N).
     steepest : float
         Largest slope of the family (tangent).
     rate : float
@@ -73,6 +88,8 @@ class Parameters(Bundle):
     kd: Floats = array("nu")
     response: float = number(float)
     trust: float = number(float)
+    friction: float = number(float)
+    press: float = number(float)
     steepest: float = number(float)
     rate: float = number(float)
     level: float = number(float)
@@ -124,6 +141,7 @@ class Memory(Bundle):
     gradient: Floats = array("nu")
     curvature: Floats = array("nu")
     wanted: Floats = array("nu")
+    force: Floats = array("nv")
     momentum: Floats = array(3)
     center: Floats = array("axes")
 
@@ -170,7 +188,7 @@ def excess(
     turning = memory.momentum[2]
     turning += (memory.center[1] - place[1]) * memory.momentum[0]
     turning -= (memory.center[0] - place[0]) * memory.momentum[1]
-    usual, _, _ = series(memory.energy, 0, min(max(x, -1.0), 1.0))
+    usual, _, _ = series(memory.energy, 0, x)
     return (0.5 * turning * abs(turning) - usual) / parameters.level
 
 
@@ -269,6 +287,50 @@ def take_up(memory: Memory, theta: float) -> None:
         memory.curvature[i] += 6.0 * left * (inner - left * along) / (width * width)
 
 
+@kernel
+def room(robot: ControlledRobot, parameters: Parameters, normal: Floats, force: Floats) -> Spatial:
+    """What is left of the least normal force and of friction on either side, (3,)."""
+    columns, rest = robot.columns, robot.unactuated
+    a, b, c = rest[0], rest[1], rest[2]
+    x, z, _ = solve_three_transposed(
+        spatial(columns, a), spatial(columns, b), spatial(columns, c),
+        (force[a], force[b], force[c]),
+    )  # fmt: skip
+    up, along = into_frame(normal, (x, z))
+    return (
+        up - parameters.press,
+        parameters.friction * up - along,
+        parameters.friction * up + along,
+    )
+
+
+@kernel
+def obey_within(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Write `robot.force` for the accelerations, or for as much of them as the ground can bear."""
+    foot = memory.stance
+    normal = contacts.normal[robot.foot_contact[foot]]
+    turning, drift = hold_foot(state, contacts, robot, parameters.phase, foot)
+    demand(state, robot, turning, drift, memory.wanted, memory.gradient)
+    asked = room(robot, parameters, normal, robot.force)
+    if min(asked[0], min(asked[1], asked[2])) >= 0.0:
+        return
+    for j in range(robot.nv):
+        memory.force[j] = robot.force[j]
+    for i in range(robot.nu):
+        memory.wanted[i] = 0.0
+    demand(state, robot, turning, drift, memory.wanted, memory.gradient)
+    idle = room(robot, parameters, normal, robot.force)
+    part = 1.0
+    for k in range(3):
+        if asked[k] < 0.0 and asked[k] < idle[k]:
+            part = min(part, max(idle[k], 0.0) / (max(idle[k], 0.0) - asked[k]))
+    for j in range(robot.nv):
+        robot.force[j] += part * (memory.force[j] - robot.force[j])
+
+
 @controller
 def stepping_constraints(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
@@ -297,8 +359,8 @@ def stepping_constraints(
         error_rate = state.joint_velocity[i] - memory.gradient[i] * rate
         memory.wanted[i] = memory.curvature[i] * rate * rate
         memory.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
-    foot = memory.stance
-    obey(state, contacts, robot, parameters.phase, foot, memory.wanted, memory.gradient, torque)
+    obey_within(state, contacts, robot, parameters, memory)
+    joint_torques(robot, torque)
 
 
 class SteppingConstraints(Law):
@@ -331,6 +393,7 @@ class SteppingConstraints(Law):
         kd: ArrayLike = 40.0,
         response: float = 1.0,
         trust: float = 0.5,
+        friction: float = 0.6,
     ) -> None:
         gait = family.gait
         robot = gait.robot
@@ -347,6 +410,8 @@ class SteppingConstraints(Law):
             kd=gains_of("kd", kd, robot),
             response=float(response),
             trust=float(trust),
+            friction=float(friction),
+            press=PRESSED * robot.weight,
             steepest=family.slope,
             rate=family.rate,
             level=float(family.energy[0].sum()),
