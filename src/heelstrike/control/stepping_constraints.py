@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.virtual_constraints import (
-    LANDS_AFTER,
     demand,
     gains_of,
     hold_foot,
@@ -41,6 +40,8 @@ from heelstrike.sim.controller.stance import joint_torques, solve_three_transpos
 
 # Phases, in parts of half a step from its middle, between which one shift goes over to the next.
 BEGINS, ENDS = -0.8, 0.5
+# A swing foot that meets the ground where it would be beyond this part of its own step scuffs.
+LANDS_BEFORE = 0.5
 # Part of a step in which the polynomial fades.
 FADES = 0.8
 # The rate of the phase is taken to be no less than this part of the usual one.
@@ -240,6 +241,21 @@ def follow(memory: Memory, theta: float, t: float, t1: float, t2: float) -> None
 
 
 @kernel
+def lands(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory,
+) -> bool:  # fmt: skip
+    """Whether the swing foot is on the ground, far enough ahead to stand on."""
+    swing = 1 - memory.stance
+    if contacts.force[robot.foot_contact[swing], 0] <= 0.0:
+        return False
+    theta, _ = phase_and_rate(state, parameters.phase, swing)
+    t = memory.shift
+    half = memory.half[0] + t * (memory.half[1] + t * memory.half[2])
+    return theta - parameters.middle[swing, 0, 0] < (2.0 * LANDS_BEFORE - 1.0) * half
+
+
+@kernel
 def begin_step(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
     memory: Memory,
@@ -337,15 +353,16 @@ def stepping_constraints(
     memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that follow the gait of a family which brings the energy back."""
-    theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
-    if memory.begun == 0:
+    if memory.begun == 0 or lands(state, contacts, robot, parameters, memory):
+        memory.stance = memory.stance if memory.begun == 0 else 1 - memory.stance
         begin_step(state, contacts, robot, parameters, memory)
-    elif contacts.force[robot.foot_contact[1 - memory.stance], 0] > 0.0:
-        x, _, _ = place_in_gait(memory, theta, memory.shift, 0.0, 0.0)
-        if x > 2.0 * LANDS_AFTER - 1.0:
-            memory.stance = 1 - memory.stance
-            begin_step(state, contacts, robot, parameters, memory)
-            theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
+    theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
+    behind = contacts.force[robot.foot_contact[1 - memory.stance], 0] > 0.0
+    if behind and rate < LEAST_RATE * parameters.rate:
+        memory.before = -1.0
+        for i in range(robot.nu):
+            memory.missing[i] = 0.0
+            memory.bend[i] = 0.0
     half = memory.half[0]
     x = (theta - memory.middle[0]) / half
     share, share1, share2 = blend(x)
