@@ -40,8 +40,6 @@ from heelstrike.sim.controller.stance import joint_torques, solve_three_transpos
 
 # Phases, in parts of half a step from its middle, between which one shift goes over to the next.
 BEGINS, ENDS = -0.8, 0.5
-# A swing foot that meets the ground where it would be beyond this part of its own step scuffs.
-LANDS_BEFORE = 0.5
 # Part of a step in which the polynomial fades.
 FADES = 0.8
 # The rate of the phase is taken to be no less than this part of the usual one.
@@ -245,14 +243,14 @@ def lands(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
     memory: Memory,
 ) -> bool:  # fmt: skip
-    """Whether the swing foot is on the ground, far enough ahead to stand on."""
+    """Whether the swing foot is on the ground, on the side to which the robot goes."""
     swing = 1 - memory.stance
     if contacts.force[robot.foot_contact[swing], 0] <= 0.0:
         return False
+    _, rate = phase_and_rate(state, parameters.phase, memory.stance)
     theta, _ = phase_and_rate(state, parameters.phase, swing)
-    t = memory.shift
-    half = memory.half[0] + t * (memory.half[1] + t * memory.half[2])
-    return theta - parameters.middle[swing, 0, 0] < (2.0 * LANDS_BEFORE - 1.0) * half
+    middle = parameters.middle[swing, 0, 0]
+    return theta < middle if rate >= 0.0 else theta > middle
 
 
 @kernel
@@ -357,12 +355,6 @@ def stepping_constraints(
         memory.stance = memory.stance if memory.begun == 0 else 1 - memory.stance
         begin_step(state, contacts, robot, parameters, memory)
     theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
-    behind = contacts.force[robot.foot_contact[1 - memory.stance], 0] > 0.0
-    if behind and rate < LEAST_RATE * parameters.rate:
-        memory.before = -1.0
-        for i in range(robot.nu):
-            memory.missing[i] = 0.0
-            memory.bend[i] = 0.0
     half = memory.half[0]
     x = (theta - memory.middle[0]) / half
     share, share1, share2 = blend(x)
