@@ -254,6 +254,20 @@ def lands(
 
 
 @kernel
+def shift_at_end(memory: Memory, theta: float) -> float:
+    """Shift with which a phase is where a step begins or, of the rear foot, ends."""
+    side = -1.0 if theta < memory.middle[0] else 1.0
+    a = memory.middle[2] + side * memory.half[2]
+    b = memory.middle[1] + side * memory.half[1]
+    c = memory.middle[0] + side * memory.half[0] - theta
+    t = 0.0
+    for _ in range(4):  # it is all but linear
+        t -= (c + t * (b + t * a)) / (b + 2.0 * a * t)
+        t = min(max(t, -1.0), 1.0)
+    return t
+
+
+@kernel
 def begin_step(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
     memory: Memory,
@@ -262,16 +276,17 @@ def begin_step(
     here = robot.foot_contact[memory.stance]
     there = robot.foot_contact[1 - memory.stance]
     length = contacts.position[here, 0] - contacts.position[there, 0]
-    if contacts.gap[there] < STOOD and abs(length) > STOOD:
+    landed = contacts.gap[there] < STOOD and abs(length) > STOOD
+    if landed:
         found = (contacts.position[here, 1] - contacts.position[there, 1]) / length
         found = min(max(found / parameters.steepest, -1.0), 1.0)
         memory.slope += parameters.trust * (found - memory.slope)
     take_slope(parameters, memory)
     theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
     rate = max(rate, LEAST_RATE * parameters.rate)
-    memory.before = memory.shift
+    memory.before = shift_at_end(memory, theta) if landed else 0.0
     memory.start = theta
-    follow(memory, theta, memory.shift, 0.0, 0.0)
+    follow(memory, theta, memory.before, 0.0, 0.0)
     for i in range(robot.nu):
         memory.missing[i] = state.joint_position[i] - memory.value[i]
         memory.bend[i] = state.joint_velocity[i] / rate - memory.gradient[i]

@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 # Postures of a step that are changed, for each coefficient that is fitted to them.
 POSTURES = 6
 # Degree of the series of the energy.
-LEVELS = 16
+LEVELS = 32
 # On slopes the hips are brought forward by no more than this part of the largest shift.
 SOUGHT = 0.6
 
