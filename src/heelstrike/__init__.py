@@ -71,6 +71,7 @@ if TYPE_CHECKING:
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
     from heelstrike.control import StandingLQR as StandingLQR
+    from heelstrike.control import SteppingConstraints as SteppingConstraints
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
     from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
@@ -90,6 +91,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
@@ -171,6 +173,8 @@ _HOME = {
     "Snapshot": "heelstrike.sim",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
+    "StepFamily": "heelstrike.gait",
+    "SteppingConstraints": "heelstrike.control",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",
