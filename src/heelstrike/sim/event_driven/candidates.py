@@ -11,6 +11,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import solve_mass_matrix
 from heelstrike.sim.contacts.latches import hold
+from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Assembly, Equations, Loops
 from heelstrike.sim.push import Pushes, add_pushes
@@ -61,7 +62,8 @@ def pose_problem(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        problem.set[place] = INTERVAL if contact >= phase.first_dry else CONE
+        is_dry = phase.first_dry <= contact < phase.first_second
+        problem.set[place] = INTERVAL if is_dry else CONE
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:
@@ -72,7 +74,7 @@ def pose_problem(
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
     hold(count, phase.latch_stop, loops.held, assembly)
-    problem.count = count + loops.unknown.shape[0]
+    problem.count = count + rows_of(loops)
     for place in range(count, problem.count):
         mode[place] = STICK
 

@@ -36,6 +36,7 @@ from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import mass_matrix
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import add_impulse, row_product
+from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.event_driven.candidates import known_force, pose_problem, solve_candidates
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration
 from heelstrike.sim.event_driven.phase import Phase, SaddlePoint
@@ -134,7 +135,7 @@ def state_accelerations(
         for row in range(2 * place, 2 * place + 2):
             bias[row] = problem.free[row]
         problem.free[2 * place], problem.free[2 * place + 1] = normal, tangent
-    for row in range(memory.loops.unknown.shape[0]):
+    for row in range(rows_of(memory.loops)):
         bias[2 * (count + row)] = memory.loops.rows.bias[row]
         bias[2 * (count + row) + 1] = 0.0
     known_force(model, state, memory.torque, phase, memory.pushes, equations)
