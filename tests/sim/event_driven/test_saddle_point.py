@@ -77,3 +77,23 @@ def test_a_push_on_a_wheel_without_inertia_is_held_by_its_spokes() -> None:
     np.testing.assert_allclose(pressed, [9.81 / 2.0 - shift, 9.81 / 2.0 + shift], rtol=1e-9)
     assert np.sum(tangent) == pytest.approx(-force, rel=1e-9)
     np.testing.assert_allclose(run.velocity[-1], 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("inertia", [1e-10, 1e-12])
+def test_a_wheel_without_inertia_slides_and_comes_to_rest_as_one_with_some(inertia: float) -> None:
+    """Too slippery to roll: a spoke comes down while another slides, and both slide on."""
+    rolling = [1.5 * np.cos(HALF), 1.5 * np.sin(HALF), 1.5]
+    runs = [
+        hs.simulate(
+            wheel(about), state=hs.State([0.0, np.cos(HALF), 0.0], rolling), duration=0.6,
+            method=hs.EventDriven(), ground=hs.Ground(friction=0.3), stop_when_fallen=False,
+        )
+        for about in (1e-7, inertia)
+    ]  # fmt: skip
+    assert runs[1].status is RunStatus.COMPLETED, runs[1].message
+    assert [event.kind for event in runs[0].events] == [event.kind for event in runs[1].events]
+    for event, other in zip(runs[0].events, runs[1].events, strict=True):
+        # 1e-7 of inertia change the motion by as much, relatively.
+        assert event.time == pytest.approx(other.time, abs=1e-6)
+        np.testing.assert_allclose(event.impulse, other.impulse, atol=1e-6)
+    np.testing.assert_allclose(runs[1].velocity[-1], 0.0, atol=1e-9)

@@ -424,6 +424,18 @@ def solve_at_once(count: int, model: Model, memory: Memory, phase: Phase) -> boo
 
 
 @kernel
+def guess_modes(total: int, phase: Phase, assembly: Assembly) -> None:
+    """Let the candidates of an impact slip as they would without it, and those open that leave."""
+    problem, answer, free = assembly.problem, assembly.answer, phase.saddle.bias
+    for place in range(total):
+        if problem.set[place] == LINE:
+            continue
+        answer.mode[place] = SLIP_FORWARD if free[2 * place + 1] > 0.0 else SLIP_BACKWARD
+        if problem.set[place] != INTERVAL and free[2 * place] > 0.0:
+            answer.mode[place] = OPEN
+
+
+@kernel
 def solve_once_more(
     status: int, count: int, accelerations: bool, model: Model, memory: Memory, phase: Phase
 ) -> bool:
@@ -431,13 +443,16 @@ def solve_once_more(
     assembly, saddle, tally = memory.assembly, phase.saddle, memory.assembly.solver.tally
     answer, total = assembly.answer, assembly.problem.count
     keep(total, answer, saddle)
-    for row in range(2 * total if status != SOLVED else 0):
-        answer.impulse[row] = 0.0
-    if solve_by_saddle_point(count, total, accelerations, model, memory, phase):
-        if status != SOLVED:
-            tally.failures -= 1
-            tally.fallbacks += 1
-        return True
+    for attempt in range(1 if status == SOLVED or accelerations else 2):
+        if attempt == 1:
+            guess_modes(total, phase, assembly)
+        for row in range(2 * total if status != SOLVED else 0):
+            answer.impulse[row] = 0.0
+        if solve_by_saddle_point(count, total, accelerations, model, memory, phase):
+            if status != SOLVED:
+                tally.failures -= 1
+                tally.fallbacks += 1
+            return True
     give_back(total, saddle, answer)
     return False
 
