@@ -11,7 +11,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
-from heelstrike.dynamics.loops import LoopRows, count_rows
+from heelstrike.dynamics.loops import LoopRows, most_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
@@ -191,7 +191,7 @@ class Reaction(Bundle):
 
 
 class Loops(Bundle):
-    """What holds besides the joints: closed loops, coupled joints and latches.
+    """What holds besides the joints: closed loops, coupled joints, latches and brakes.
 
     Attributes
     ----------
@@ -210,6 +210,12 @@ class Loops(Bundle):
         Whether each latch is engaged.
     latch_stop : (latches,) int
         The joint stop that each is, as candidates of time stepping are numbered.
+    braked : (brakes,) int
+        Whether each brake is on; see :mod:`heelstrike.sim.contacts.brakes`.
+    brake_position : (brakes,) float
+        Where those that are on hold their joints (rad, m).
+    brake_force : (brakes,) float
+        What they held them with in the last solve.
     """
 
     rows: LoopRows = part(LoopRows)
@@ -221,6 +227,9 @@ class Loops(Bundle):
     coupling_force: Floats = array("couplings")
     held: Integers = array("latches", of=int)
     latch_stop: Integers = array("latches", of=int)
+    braked: Integers = array("brakes", of=int)
+    brake_position: Floats = array("brakes")
+    brake_force: Floats = array("brakes")
 
 
 class Reported(Bundle):
@@ -315,10 +324,10 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     sides = capacity + nc  # in a concave corner a point is there twice
     extents = {
         **model.extents, "nd": len(dry), "capacity": sides,
-        "points": len(points), "components": 2, "loop_rows": count_rows(model),
+        "points": len(points), "components": 2, "loop_rows": most_rows(model),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
-    most = sides + count_rows(model)
+    most = sides + most_rows(model)
     assembly = Assembly.allocate(
         {**extents, "capacity": most},
         problem=ContactProblem.allocate(nc=most),

@@ -103,9 +103,10 @@ def observe_sides(
         if other == NO_FACE:
             continue
         locate_on_face(model, ground, tree, point, face, memory.contacts)
-        take_surface(ground, point, face, memory.surface)
+        take_surface(model, ground, point, point, face, memory.surface)
         locate_on_face(model, ground, tree, point, other, seconds)
-        corners.friction[point] = ground.friction[other // 2 - other % 2]
+        friction = ground.friction[other // 2 - other % 2]
+        corners.friction[point] = model.friction_scale[point] * friction
 
 
 @kernel

@@ -41,7 +41,7 @@ from heelstrike.dynamics.kernels import (
     passive_force,
     solve_factorized,
 )
-from heelstrike.dynamics.loops import count_rows, find_rows
+from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.compliant.corners import (
@@ -53,7 +53,7 @@ from heelstrike.sim.compliant.corners import (
 from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
 from heelstrike.sim.contacts.geometry import contact_rows, row_product, weigh
-from heelstrike.sim.contacts.loops import push_loops, respond, speed_along
+from heelstrike.sim.contacts.loops import find_loops, push_loops, respond, rows_of, speed_along
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
@@ -242,7 +242,7 @@ def compliant_workspace(
     """Allocate the scratch for a robot."""
     extents = {
         "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "axes": 2,
-        "stages": STAGES, "loop_rows": count_rows(robot.model),
+        "stages": STAGES, "loop_rows": most_rows(robot.model),
     }  # fmt: skip
     rates = Rates.allocate(
         extents,
@@ -379,8 +379,8 @@ def evaluate(
 def hold_loops(model: Model, memory: Memory, now: Rates) -> None:
     """Find the forces of the loops, and the accelerations under them."""
     loops, rate = memory.loops, now.acceleration
-    rows = now.loop.shape[0]
-    find_rows(model, memory.q, memory.v, memory.equations.tree, loops.rows)
+    rows = rows_of(loops)
+    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
     weigh(model, memory.equations)
     respond(model, memory.equations, loops)
     for row in range(rows):

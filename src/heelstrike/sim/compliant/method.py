@@ -47,10 +47,11 @@ from heelstrike.sim.compliant.dynamics import (
 )
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
+from heelstrike.sim.contacts.brakes import note_brakes, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.contacts.latches import react
-from heelstrike.sim.contacts.loops import close_loops, note_loop, steady_loops
+from heelstrike.sim.contacts.loops import close_loops, note_loop, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
@@ -177,7 +178,7 @@ class Compliant(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a sample may add to the record."""
-        return 1, 4 * robot.nc + robot.nv + robot.model.latches
+        return 1, 4 * robot.nc + robot.nv + robot.model.latches + robot.model.brakes
 
     def forget_ground(self, robot: Robot, work: CompliantWorkspace, clock: Clock) -> None:  # noqa: ARG002
         """Let no point be in a corner of it."""
@@ -269,10 +270,13 @@ def cone_residual(work: CompliantWorkspace) -> float:
 @kernel
 def sample(
     controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
-    memory: Memory, work: CompliantWorkspace,
+    memory: Memory, work: CompliantWorkspace, record: Record,
 ) -> int:  # fmt: skip
     """Integrate from one sample to the next; return DONE or what was in the way."""
     begin_sample(model, memory, work)
+    if take_hold(memory.loops):
+        brake(model, start, memory, work, record)
+        evaluate(controller, control, model, ground, HELD, start, memory, work)
     span, corners = work.step, work.corners
     elapsed = 0.0
     h = work.proposed
@@ -356,6 +360,19 @@ def begin_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None
 
 
 @kernel
+def brake(
+    model: Model, time: float, memory: Memory, work: CompliantWorkspace, record: Record
+) -> None:
+    """Let the brakes that have been put on stop their joints, by impulses."""
+    loops = memory.loops
+    steady_loops(model, memory.q, memory.equations, loops, memory.v)
+    for row in range(rows_of(loops)):
+        work.loop_impulse[row] = loops.unknown[row]
+        note_loop(model, row, loops.unknown[row], loops)
+    note_brakes(model, time, 1.0, record, loops)
+
+
+@kernel
 def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Put the mean forces since the sample before into the memory."""
     span = work.step
@@ -413,7 +430,7 @@ def note_forces(
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
-    for contact in range(force.shape[0]):
+    for contact in range(record.contact_force.shape[1]):
         record.contact_force[row, contact, 0] = force[contact, 0]
         record.contact_force[row, contact, 1] = force[contact, 1]
         record.slip_velocity[row, contact] = memory.reaction.slip[contact]
@@ -422,6 +439,8 @@ def note_forces(
         record.loop_force[row, loop, 1] = memory.loops.loop_force[loop, 1]
     for coupling in range(record.coupling_force.shape[1]):
         record.coupling_force[row, coupling] = memory.loops.coupling_force[coupling]
+    for joint in range(record.brake_torque.shape[1]):
+        record.brake_torque[row, joint] = memory.loops.brake_force[joint]
     record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
@@ -491,7 +510,7 @@ def move(
 ) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
     model = scene.model
-    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
+    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work, record)
     if code != DONE:
         return code
     step = work.step

@@ -172,8 +172,13 @@ def locate_on_face(
 
 
 @kernel
-def take_surface(ground: GroundModel, contact: int, face: int, surface: Surface) -> None:
-    """Write the coefficients of the ground of a face; those of a corner are the left segment's."""
+def take_surface(
+    model: Model, ground: GroundModel, point: int, contact: int, face: int, surface: Surface
+) -> None:
+    """Write the coefficients of a contact of a point with a face.
+
+    Those of a corner of the ground are the left segment's.
+    """
     segment = face // 2 - face % 2
-    surface.friction[contact] = ground.friction[segment]
-    surface.restitution[contact] = ground.restitution[segment]
+    surface.friction[contact] = model.friction_scale[point] * ground.friction[segment]
+    surface.restitution[contact] = model.restitution_scale[point] * ground.restitution[segment]

@@ -13,7 +13,6 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
-from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
@@ -26,7 +25,7 @@ from heelstrike.sim.contacts.geometry import (
     solve_mass_matrix,
     weigh,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, rows_of
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -290,7 +289,7 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
         if phase.first_dry <= contact < phase.first_second:
             joint = phase.dry_joint[contact - phase.first_dry]
             impulse[2 * place] = model.dry_friction[joint]
-    loops = memory.loops.unknown.shape[0]
+    loops = rows_of(memory.loops)
     total = count + loops
     free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)
     for row in range(2 * count, 2 * total):
@@ -346,8 +345,8 @@ def evaluate(
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    loops = memory.loops.unknown.shape[0]
-    find_rows(model, q, v, equations.tree, memory.loops.rows)
+    loops = rows_of(memory.loops)
+    find_loops(model, q, v, equations.tree, memory.loops)
     count = gather_closed(model, memory.contacts, phase, memory.loops, equations, assembly)
     phase.closed_count = count
     if count + loops > 0:
@@ -395,11 +394,11 @@ def project(
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
-    system, row, loops = phase.system, phase.row, memory.loops.unknown.shape[0]
+    system, row, loops = phase.system, phase.row, rows_of(memory.loops)
     for attempt in range(5):
         observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
-        find_rows(model, q, v, equations.tree, memory.loops.rows)
+        find_loops(model, q, v, equations.tree, memory.loops)
         count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
         total = count + loops
         if total == 0:

@@ -67,7 +67,7 @@ def locate_second(
         )
     if phase.face[second] != NO_FACE:
         locate_on_face(model, ground, tree, point, phase.face[second], seconds)
-        take_surface(ground, second, phase.face[second], surface)
+        take_surface(model, ground, point, second, phase.face[second], surface)
 
 
 @kernel
@@ -89,7 +89,7 @@ def locate(
             and normals[contact, 1] == normal[segment, 1]
         ):
             locate_on_face(model, ground, tree, contact, face, contacts)
-            take_surface(ground, contact, face, surface)
+            take_surface(model, ground, contact, contact, face, surface)
     for second in range(phase.first_second, phase.watched):
         point = second - phase.first_second
         locate_second(model, ground, tree, point, contacts, surface, phase)
@@ -258,7 +258,7 @@ def leave_second_face(
         _, its = second_face(ground, phase.face[point], phase.face[second], x, z, radius)
         phase.face[second] = its
         locate_on_face(model, ground, tree, point, its, phase.seconds)
-        take_surface(ground, second, its, surface)
+        take_surface(model, ground, point, second, its, surface)
         phase.fired[2 * second] = 1
     return True
 

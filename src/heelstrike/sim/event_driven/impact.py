@@ -7,7 +7,6 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.dynamics.loops import find_rows
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
@@ -16,7 +15,7 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.corners import impulse_of, is_cornered, is_struck, joined
@@ -86,9 +85,9 @@ def collide(
         free[2 * count + 1] = row_product(jacobian, 2 * count + 1, v)
         assembly.candidate[count] = contact
         count += 1
-    if count == 0:
+    if count + rows_of(memory.loops) == 0:
         return True, 0.0
-    find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
+    find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
     assemble_delassus(model, total, equations, assembly)
@@ -101,6 +100,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
+    note_loops(model, total, impulse, memory.loops)
     add_impulse(model, assembly, total, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
@@ -134,8 +134,8 @@ def short_bounces(
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
     locate(model, ground, equations.tree, phase, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    loops = memory.loops.unknown.shape[0]
-    find_rows(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops.rows)
+    loops = rows_of(memory.loops)
+    find_loops(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops)
     count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
     for place in range(count):
         contact = assembly.candidate[place]

@@ -26,10 +26,11 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
-from heelstrike.sim.contacts.loops import close_loops, steady_loops
+from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
@@ -193,8 +194,9 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        latches, contacts = robot.model.latches, contact_capacity(robot) + robot.nc
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + 2 * latches + 8
+        others = 2 * robot.model.latches + robot.model.brakes
+        contacts = contact_capacity(robot) + robot.nc
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
@@ -349,7 +351,7 @@ def begin_phase(
     Returns false if the state is not one of such modes.
     """
     assembly, friction = memory.assembly, memory.surface.friction
-    if memory.loops.unknown.shape[0] == 0:  # with loops neither matrix nor free term tell enough
+    if rows_of(memory.loops) == 0:  # with loops neither matrix nor free term tell enough
         leave_if_possible(count, friction, phase, assembly, record)
     if count > 0:
         note_residual(assembly.answer.residual, memory.tally)
@@ -466,7 +468,7 @@ def turns_over(
     if turn_corner(model, ground, contact, contacts, phase):
         face = phase.face[contact]
         locate_on_face(model, ground, tree, contact, face, contacts)
-        take_surface(ground, contact, face, surface)
+        take_surface(model, ground, contact, contact, face, surface)
         phase.closed[contact] = 0
     return True
 
@@ -634,7 +636,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.assembly.solver.settings.amendments = 0
-    if memory.loops.unknown.shape[0] > 0:
+    if rows_of(memory.loops) > 0:
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED
         steady_loops(model, q, equations, memory.loops, v)
@@ -664,6 +666,21 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 
 @kernel
+def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
+    """Let the brakes that have been put on take hold, by an impact of all that touches."""
+    model = scene.model
+    if phase.last_row < phase.time:
+        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    take_hold(memory.loops)
+    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    for contact in range(phase.closed.shape[0]):
+        phase.hit[contact] = 0
+    if not strike(model, scene.ground, memory, phase, record):
+        phase.bridging = 1
+    note_brakes(model, phase.time, 1.0, record, memory.loops)
+
+
+@kernel
 def decide(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
@@ -674,6 +691,8 @@ def decide(
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
+    if awaits_hold(memory.loops):
+        brake(scene, control, memory, phase, record)
     phase.at_event = phase.undecided
     open_modes = phase.at_event == 1 or jumped
     if phase.bridging == 0 and open_modes:

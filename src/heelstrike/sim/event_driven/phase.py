@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
-from heelstrike.dynamics.loops import count_rows
+from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.controller.interface import Contacts
@@ -234,7 +234,7 @@ def allocate_phase(robot: Robot) -> Phase:
     contacts = firsts + robot.nc
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        forces=2 * contacts + count_rows(model), functions=2 * contacts + robot.nc,
+        forces=2 * contacts + most_rows(model), functions=2 * contacts + robot.nc,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=firsts - len(dry),
         first_second=firsts, watched=firsts,
         weight=mass * gravity if gravity > 0.0 else mass,

@@ -6,7 +6,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.loops import note_loops
+from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.corners import record_corner
@@ -53,7 +53,7 @@ def write_row(
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
-    count, loops = phase.closed_count, memory.loops.unknown.shape[0]
+    count, loops = phase.closed_count, rows_of(memory.loops)
     if count + loops > 0:
         friction, guess = memory.surface.friction, memory.reaction.mode
         solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
