@@ -92,7 +92,7 @@ class Surface(Bundle):
     ----------
     friction, restitution : (capacity,) float
         Of contact points; zero for the joint stops after them, and friction 1 for the dry joints
-        after these.
+        after these; then of the second faces of the points.
     """
 
     friction: Floats = array("capacity")
@@ -321,12 +321,13 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     points = usual_points(robot)
     place = np.full(nc, -1)
     place[points] = np.arange(len(points))
+    sides = capacity + nc  # in a concave corner a point is there twice
     extents = {
-        **model.extents, "nd": len(dry), "capacity": capacity,
+        **model.extents, "nd": len(dry), "capacity": sides,
         "points": len(points), "components": 2, "loop_rows": most_rows(model),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
-    most = capacity + nc + most_rows(model)  # in a concave corner a point is there twice
+    most = sides + most_rows(model)
     assembly = Assembly.allocate(
         {**extents, "capacity": most},
         problem=ContactProblem.allocate(nc=most),
@@ -340,7 +341,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         dry_joint=dry.astype(np.int64),
         equations=Equations.allocate(extents, programs=programs),
         surface=Surface.allocate(
-            extents, friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0)
+            extents, friction=np.repeat([0.0, 1.0, 0.0], [capacity - len(dry), len(dry), nc])
         ),
         assembly=assembly,
         usual=UsualPoints.allocate(

@@ -28,7 +28,8 @@ def solve_candidates(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        problem.set[place] = INTERVAL if contact >= phase.first_dry else CONE
+        is_dry = phase.first_dry <= contact < phase.first_second
+        problem.set[place] = INTERVAL if is_dry else CONE
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:

@@ -48,11 +48,14 @@ def tangential_place(
     model: Model, tree: Workspace, contacts: Contacts, contact: int, phase: Phase
 ) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled."""
-    position, normal = contacts.position[contact], contacts.normal[contact]
-    rolled = model.contact_radius[contact] * tree.angle[model.contact_link[contact]]
+    its, point = contacts, contact
+    if contact >= phase.first_second:
+        its, point = phase.seconds, contact - phase.first_second
+    position, normal, radius = its.position[point], its.normal[point], model.contact_radius[point]
+    rolled = radius * tree.angle[model.contact_link[point]]
     if phase.face[contact] >= 0 and phase.face[contact] % 2 == 1:
         # The way of the contact point round the disc that pivots on a corner.
-        return model.contact_radius[contact] * math.atan2(normal[0], normal[1]) - rolled
+        return radius * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
 
 
@@ -123,7 +126,7 @@ def friction_limit(
 def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase) -> None:
     """Write the force of every contact point, that of a group split like its normal forces."""
     candidate, impulse, force = assembly.candidate, assembly.answer.impulse, phase.force
-    for contact in range(force.shape[0]):
+    for contact in range(phase.watched):
         force[contact, 0] = 0.0
         force[contact, 1] = 0.0
     for place in range(count):
@@ -143,6 +146,24 @@ def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
 
 
 @kernel
+def watch_second_faces(model: Model, tree: Workspace, phase: Phase) -> None:
+    """Event functions of the second faces: gaps to those that points on the ground could meet."""
+    value, rate, seconds = phase.value, phase.rate, phase.seconds
+    for point in range(model.nc):
+        contact = phase.first_second + point
+        value[2 * contact], value[2 * contact + 1] = 1.0, 1.0
+        rate[2 * contact] = 0.0
+        if phase.closed[point] == 0 or seconds.gap[point] == math.inf:
+            continue
+        normal, tangent = contact_velocity(model, tree, seconds, point)
+        if phase.closed[contact] == 0:
+            value[2 * contact] = seconds.gap[point]
+            rate[2 * contact] = normal
+        elif phase.slide[contact] != 0 and phase.group[contact] == contact:
+            value[2 * contact + 1] = phase.slide[contact] * tangent
+
+
+@kernel
 def watch_geometry(
     model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
     phase: Phase,
@@ -154,6 +175,8 @@ def watch_geometry(
     value, rate = phase.value, phase.rate
     if has_corners(ground):
         watch_corners(model, ground, contacts, phase, value)
+        if phase.watched > phase.first_second:
+            watch_second_faces(model, tree, phase)
     for dry in range(phase.dry_joint.shape[0]):
         contact = phase.first_dry + dry
         slide = phase.slide[contact]
@@ -240,8 +263,8 @@ def gather_closed(
     after those of the contacts and are not counted; they have been found for the state.
     """
     count = 0
-    for contact in range(phase.closed.shape[0]):
-        moves = contact >= phase.first_dry and phase.slide[contact] != 0
+    for contact in range(phase.watched):
+        moves = phase.first_dry <= contact < phase.first_second and phase.slide[contact] != 0
         if phase.closed[contact] == 1 and not moves:
             gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
             assembly.candidate[count] = contact
@@ -263,7 +286,7 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
         )
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
-        if contact >= phase.first_dry:
+        if phase.first_dry <= contact < phase.first_second:
             joint = phase.dry_joint[contact - phase.first_dry]
             impulse[2 * place] = model.dry_friction[joint]
     loops = rows_of(memory.loops)
@@ -352,7 +375,7 @@ def displacement(
         return memory.loops.rows.displacement[contact - phase.closed.shape[0]]
     if row % 2 == 0:
         return gap_now(contact, contacts, phase, state)
-    if contact >= phase.first_dry:
+    if phase.first_dry <= contact < phase.first_second:
         return state[phase.dry_joint[contact - phase.first_dry]] - phase.anchor[contact]
     if phase.stuck[contact] == 1:
         return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact, phase)
