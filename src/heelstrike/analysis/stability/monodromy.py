@@ -237,6 +237,11 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
             f"dry friction in the joints of {robot.name!r} cannot be linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
+    if np.any(run.brake_torque):
+        raise SimulationError(
+            f"brakes of {robot.name!r} are on, which is not linearised here; "
+            "hs.find_limit_cycle takes differences instead"
+        )
     if run.saturations:
         raise SimulationError(
             "torques were clipped at the limits of the motors: a law that cannot do what it asks "
@@ -370,7 +375,8 @@ class _Instant:
             gradient = self._gap_gradient(event, q)
             if count > 1 and gradient @ rate >= 0.0:
                 return None
-            active = _struck([*order[:count], *others], float(ground.model().friction[0]))
+            friction = float(ground.model().friction[0]) * robot.model.friction_scale
+            active = _struck([*order[:count], *others], friction)
             impact = linearize_impact(robot, q, v, active, ground=ground)
             v = impact.velocity
             if count < len(order):
@@ -405,11 +411,12 @@ class _Instant:
         return np.concatenate((at.jacobian[event.contact, 0], np.zeros(robot.nv)))
 
 
-def _struck(events: Sequence[Event], friction: float) -> ActiveContacts:
-    """What receives impulses in an impact, as its events tell."""
+def _struck(events: Sequence[Event], friction: Floats) -> ActiveContacts:
+    """What receives impulses in an impact, as its events tell; `friction` is that of all points."""
     points = [event for event in events if not event.kind.of_joint]
     on_the_cone = [
-        abs(event.impulse[1]) >= friction * event.impulse[0] * (1.0 - 1e-9) for event in points
+        abs(event.impulse[1]) >= friction[event.contact] * event.impulse[0] * (1.0 - 1e-9)
+        for event in points
     ]
     return ActiveContacts(
         resting=tuple(
