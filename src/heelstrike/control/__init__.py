@@ -13,6 +13,7 @@ from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadr
 from heelstrike.control.regulation.controller import ZeroMomentPointRegulation
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
 from heelstrike.control.standing_lqr import StandingLQR
+from heelstrike.control.stepping_constraints import SteppingConstraints
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -38,6 +39,7 @@ __all__ = [
     "QuadraticSolution",
     "Sensed",
     "StandingLQR",
+    "SteppingConstraints",
     "VirtualConstraints",
     "WholeBody",
     "ZeroMomentPointRegulation",
