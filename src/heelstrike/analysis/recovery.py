@@ -164,8 +164,7 @@ def _hips(run: Run) -> list[int]:
 
 def _hip_height(run: Run, motion: Motion) -> Floats:
     place = motion.link_origin[:, _hips(run)].mean(axis=1)
-    below = np.array([float(run.ground.height(x)) for x in place[:, 0]])
-    height: Floats = place[:, 1] - below
+    height: Floats = place[:, 1] - run.ground.height(place[:, 0])
     return height
 
 
