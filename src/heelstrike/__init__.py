@@ -33,6 +33,8 @@ if _plain_code.is_asked_for():  # before anything else is imported
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.analysis.stability.floquet import Floquet as Floquet
+    from heelstrike.analysis.stability.floquet import floquet_multipliers as floquet_multipliers
     from heelstrike.analysis.stability.largest import Largest as Largest
     from heelstrike.analysis.stability.largest import largest_ground_step as largest_ground_step
     from heelstrike.analysis.stability.largest import largest_push as largest_push
@@ -135,6 +137,7 @@ _HOME = {
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
+    "Floquet": "heelstrike.analysis.stability.floquet",
     "FootSensors": "heelstrike.control",
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
@@ -182,6 +185,7 @@ _HOME = {
     "contact_kinematics": "heelstrike.contact",
     "controller": "heelstrike.control",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
+    "floquet_multipliers": "heelstrike.analysis.stability.floquet",
     "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
     "largest_ground_step": "heelstrike.analysis.stability.largest",
