@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from heelstrike.analysis.stability.largest import largest_slope as largest_slope
     from heelstrike.analysis.stability.monodromy import Monodromy as Monodromy
     from heelstrike.analysis.stability.monodromy import monodromy as monodromy
+    from heelstrike.analysis.stability.sensitivity import (
+        gait_sensitivity_norm as gait_sensitivity_norm,
+    )
     from heelstrike.analysis.stability.trial import Trial as Trial
     from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
     from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
@@ -186,6 +189,7 @@ _HOME = {
     "controller": "heelstrike.control",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "floquet_multipliers": "heelstrike.analysis.stability.floquet",
+    "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",
     "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
     "largest_ground_step": "heelstrike.analysis.stability.largest",

@@ -226,9 +226,7 @@ def floquet_multipliers(
     walk = loop.follow(settling, returns, longest_step)
     section = Section(loop, walk.begins[0], walk.duration, memory)
     found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    return _combined(
-        walk.steps, walk.duration / walk.steps, walk.length / walk.steps, section, found
-    )
+    return _combined(walk, section, found, lasting(loop, section, walk, size))
 
 
 def _combined(walk: Walk, section: Section, found: list[Disturbed], decay: Floats) -> Floquet:
