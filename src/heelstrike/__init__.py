@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import ViewError as ViewError
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PhasedGait as PhasedGait
     from heelstrike.gait import load_gait as load_gait
@@ -171,6 +172,7 @@ _HOME = {
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
+    "SpringMass": "heelstrike.experiments.spring_mass",
     "State": "heelstrike.robot",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
-from heelstrike.analysis.stability.returns import Disturbed, lasting, returned
+from heelstrike.analysis.stability.returns import Disturbed, returned
 from heelstrike.analysis.stability.section import Section
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
@@ -66,10 +66,6 @@ class Floquet:
         The others, of a return, largest first.
     residual : float
         Largest difference of position and velocity between two returns (m, rad, m/s, rad/s).
-    decay : (returns,) float
-        The largest error of the robot after one, two, … returns, as a part of the disturbance, of
-        all disturbances of one coordinate either way; errors along the walk do not count. It holds
-        where the loop has kinks, too.
     neutral, one_sided, switched : tuple of str
         Numbers of the memory whose errors do nothing, which are left out; coordinates whose errors
         of either sign do different things, of which the mean counts: there the loop has a kink, and
@@ -87,7 +83,6 @@ class Floquet:
     along: complex | None
     multipliers: NDArray[np.complex128]
     residual: float
-    decay: Floats
     neutral: tuple[str, ...]
     one_sided: tuple[str, ...]
     switched: tuple[str, ...]
@@ -175,10 +170,9 @@ def floquet_multipliers(
         Returns of the walk over which the differences are averaged.
     disturbance : float, optional
         Size of the disturbances (m, rad, and times 1/s those of velocities; of what is remembered,
-        a part of how much it varies). Without samples 1e-5 by default. With them the map is uneven
-        at the scale of what moves in one, for touchdowns are felt up to a sample late: by default
-        then twice the seconds between two samples, or ten times those of a fixed step, in which
-        impacts fall, too.
+        a part of how much it varies). By default 1e-5; twice the seconds between two samples if
+        an event-driven simulation calls the controller only then, as touchdowns are felt up to a
+        sample late, and the map is uneven at the scale of what moves meanwhile.
     memory : sequence of str, optional
         Numbers of the controller's memory that are disturbed; by default all that matter.
     longest_step : float
@@ -197,6 +191,10 @@ def floquet_multipliers(
 
     Notes
     -----
+    Time stepping moves impacts to its steps: small errors are then those of the stepped map, whose
+    multipliers are sharp if every return takes the same number of steps, and mean little if not, as
+    `error` tells. ``EventDriven`` with a `control_period` is the better instrument.
+
     Two things are known beforehand and left out: where along the ground the robot is, which is
     nobody's affair, and being early or late (`along`). A controller that acts on where in the world
     it is has no walk that repeats. Cost: (returns) × 2 × (coordinates) walks of a return.
@@ -226,10 +224,10 @@ def floquet_multipliers(
     walk = loop.follow(settling, returns, longest_step)
     section = Section(loop, walk.begins[0], walk.duration, memory)
     found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    return _combined(walk, section, found, lasting(loop, section, walk, size))
+    return _combined(walk, section, found)
 
 
-def _combined(walk: Walk, section: Section, found: list[Disturbed], decay: Floats) -> Floquet:
+def _combined(walk: Walk, section: Section, found: list[Disturbed]) -> Floquet:
     """Put returns together; leave out what stays without doing anything."""
     matrices = [each.matrix for each in found]
     mean = np.mean(matrices, axis=0)
@@ -253,7 +251,6 @@ def _combined(walk: Walk, section: Section, found: list[Disturbed], decay: Float
         along=along,
         multipliers=others,
         residual=max(each.residual for each in found),
-        decay=decay,
         neutral=tuple(names[i] for i in inert),
         one_sided=tuple(names[i] for i in kept if names[i] in one_sided),
         switched=tuple(sorted(switched)),

@@ -24,9 +24,9 @@ from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 
-LATE, UNEVEN = 2.0, 10.0
+LATE = 2.0
 """Disturbances (m, rad) are this many times the seconds between two calls, as a touchdown falls
-somewhere between them and is felt at the end, or of the fixed steps in which impacts fall."""
+somewhere between them and is felt at the end."""
 
 SMOOTH, ROUGH = 1e-5, 0.05
 """Least and largest disturbance that is chosen so."""
@@ -100,7 +100,7 @@ class ClosedLoop:
     def usual_disturbance(self) -> float:
         """How large disturbances are if nobody says."""
         fixed = self.simulation.method.step_length is not None
-        return float(np.clip((UNEVEN if fixed else LATE) * self.grid, SMOOTH, ROUGH))
+        return SMOOTH if fixed else float(np.clip(LATE * self.grid, SMOOTH, ROUGH))
 
     @property
     def along(self) -> Floats:

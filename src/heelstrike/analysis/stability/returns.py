@@ -69,27 +69,6 @@ def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: f
     return Disturbed(np.array(columns).T, residual, frozenset(one_sided), frozenset(switched))
 
 
-def lasting(loop: ClosedLoop, section: Section, walk: Walk, size: float) -> Floats:
-    """How large the largest error of the robot is after every return, as a part of what it was.
-
-    Of all disturbances of one coordinate, both ways; errors along the walk, of being early or late,
-    do not count. No derivative is taken, so that this holds for loops with kinks, too.
-    """
-    simulation, way = loop.simulation, section.flow[: section.of_robot]
-    across = np.eye(len(way)) - np.outer(way, way) / float(way @ way)
-    usual = [np.concatenate((each.state.q, each.state.v)) for each in walk.begins[1:]]
-    worst = np.zeros(len(usual))
-    for coordinate in range(section.of_robot):
-        for sign in (1.0, -1.0):
-            section.disturb(simulation, walk.begins[0], coordinate, sign * size)
-            for place, state in enumerate(usual):
-                doing = f"a disturbance of {section.names[coordinate]} by {sign * size:.3g}"
-                loop.advanced(simulation, walk.begins[place + 1].time, doing)
-                error = across @ section.of(section.read(simulation)[0] - state)
-                worst[place] = max(worst[place], float(np.linalg.norm(error)) / size)
-    return worst
-
-
 def _same_feet(
     section: Section, usual: Snapshot, disturbed: Snapshot, name: str, size: float
 ) -> None:
