@@ -231,6 +231,9 @@ import json, os, resource, signal, sys
 from pathlib import Path
 import heelstrike as hs
 from heelstrike.experiments.results import Results
+from heelstrike.experiments.zoo import Cell, Settings, Results as Cells
+from heelstrike.experiments.zoo.campaign import Animal
+from heelstrike.experiments.zoo.writing import Targets
 
 folder, saved = Path(sys.argv[1]), Path(sys.argv[2])
 limit = int(sys.argv[3])
@@ -240,6 +243,10 @@ run = hs.load_run(sys.argv[4])
 gait = hs.load_gait(saved / "gait.json")
 before = {name: array.tobytes() for name, array in vars(run).items() if hasattr(array, "tobytes")}
 results = Results(folder)
+cells = Cells(Settings())
+cells.meet(Animal(robot="r", fingerprint="f", mass=1.0))
+cells.put(Cell(robot="r", controller="c", disturbance="price", withstood=(1.0,), failed=(2.0,)))
+zoo = Targets(folder, folder / "page.md", folder / "panels.svg")
 WRITERS = {
     "run.nc": run.save,
     "gait.json": gait.save,
@@ -251,6 +258,8 @@ WRITERS = {
     "zmp.pdf": lambda path: run.plot("torque", path=path),
     "film.gif": lambda path: run.animate(path, size=(64, 64), speed=0.1),
     "film.mp4": lambda path: run.animate(path, size=(64, 64), speed=0.1),
+    "zoo.json": cells.save,
+    "zoo.csv": lambda path: zoo.write(cells, "heelstrike zoo"),
 }
 # All once without a limit, which compiles what it needs.
 run.animate(folder / "film.gif", size=(64, 64), speed=0.1)
@@ -284,6 +293,8 @@ ERRORS = {
     "zmp.pdf": "ViewError",
     "film.gif": "ViewError",
     "film.mp4": "ViewError",
+    "zoo.json": "WriteError",
+    "zoo.csv": "WriteError",
 }
 
 

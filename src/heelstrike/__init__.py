@@ -71,11 +71,15 @@ if TYPE_CHECKING:
     from heelstrike.control import Feedforward as Feedforward
     from heelstrike.control import FootSensors as FootSensors
     from heelstrike.control import FootstepFeedback as FootstepFeedback
+    from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import StandingLQR as StandingLQR
+    from heelstrike.control import SteppingConstraints as SteppingConstraints
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
+    from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
     from heelstrike.errors import ContactProblemError as ContactProblemError
@@ -93,6 +97,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
@@ -146,6 +151,7 @@ _HOME = {
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
+    "GaitLQR": "heelstrike.control",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
@@ -173,7 +179,10 @@ _HOME = {
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
     "SpringMass": "heelstrike.experiments.spring_mass",
+    "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
+    "StepFamily": "heelstrike.gait",
+    "SteppingConstraints": "heelstrike.control",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",
@@ -181,6 +190,7 @@ _HOME = {
     "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
     "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
+    "ZeroMomentPointRegulation": "heelstrike.control",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",

@@ -5,28 +5,22 @@ from __future__ import annotations
 import json
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     AsJson,
-    Averaged,
     Debug,
-    Floating,
-    Forward,
     Friction,
     OnGround,
-    Packages,
-    Pose,
-    Projected,
     Pushed,
     RobotName,
     SavedGait,
     Steps,
     method_called,
-    reading,
+    reads_robots,
 )
 from heelstrike.cli.planning import planned_walk
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, tell_interruption, wrote
@@ -48,6 +42,7 @@ class Way(StrEnum):
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
+@reads_robots
 def compare(
     robot: RobotName = "bravo7",
     method: Annotated[
@@ -69,12 +64,7 @@ def compare(
         typer.Option(help="Restitution of the ground; methods that know none are left out."),
     ] = 0.0,
     push: Pushed = None,
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
+    how: Any = None,
     out: Annotated[
         Path, typer.Option(file_okay=False, help="Directory for the table and the figure.")
     ] = Path("compare"),
@@ -89,9 +79,7 @@ def compare(
 
     surface = ground_called(ground, friction=friction, restitution=restitution)
     pushes = pushes_called(push)
-    machine = hs.load_robot(
-        robot, **reading(floating, projected, forward, pose, mirror, package_path)
-    )
+    machine = hs.load_robot(robot, **how)
     for each in pushes:
         each.place(machine)
     ways = method or [way for way in Way if not way.startswith("paper")]

@@ -5,24 +5,18 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
 
 from heelstrike.cli.options import (
     AsJson,
-    Averaged,
     Debug,
-    Floating,
-    Forward,
     OnGround,
-    Packages,
-    Pose,
-    Projected,
     Pushed,
     RobotName,
-    reading,
+    reads_robots,
 )
 from heelstrike.cli.terminal import output, spoken, tell
 from heelstrike.cli.values import ground_called, pushes_called
@@ -39,6 +33,7 @@ FOUND = 1
 
 
 @spoken
+@reads_robots
 def inspect(
     robot: RobotName,
     picture: Annotated[
@@ -49,12 +44,7 @@ def inspect(
     ] = None,
     ground: OnGround = "flat",
     push: Pushed = None,
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
+    how: Any = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
@@ -70,9 +60,7 @@ def inspect(
         raise typer.BadParameter(
             "ground and pushes are drawn: say into which file", param_hint="--out"
         )
-    inspection = inspect_robot(
-        robot, **reading(floating, projected, forward, pose, mirror, package_path)
-    )
+    inspection = inspect_robot(robot, **how)
     look_at(inspection, picture, as_json=as_json, ground=surface, pushes=pushes)
     if not inspection.sound:
         raise typer.Exit(FOUND)

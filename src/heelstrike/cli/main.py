@@ -14,6 +14,7 @@ from heelstrike.cli.report import report
 from heelstrike.cli.robots import robots
 from heelstrike.cli.walk import walk
 from heelstrike.cli.watch import watch
+from heelstrike.cli.zoo import zoo
 
 app = typer.Typer(
     name="heelstrike",
@@ -23,7 +24,7 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
-for command in (walk, watch, report, paper, compare, robots, inspect):
+for command in (walk, watch, report, zoo, paper, compare, robots, inspect):
     app.command()(command)
 
 

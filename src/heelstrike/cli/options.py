@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from heelstrike.cli.values import pose_called
 
 if TYPE_CHECKING:
-    from heelstrike.robot.files.options import LoadOptions
     from heelstrike.sim.method import Method
 
 
@@ -97,22 +99,42 @@ Debug = Annotated[
 ]
 
 
-def reading(
-    floating: bool,
-    projected: bool,
-    forward: Way | None,
-    pose: list[str] | None,
-    averaged: bool,
-    packages: list[Path] | None,
-) -> LoadOptions:
-    """Return how a robot's file is to be read."""
+def reads_robots(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of how a robot's file is read, in the place of its ``how``.
+
+    That is what it is called with: the keywords of :func:`heelstrike.load_robot`.
+    """
+    own = inspect.signature(command, eval_str=True)
+    shared = inspect.signature(_reading, eval_str=True).parameters
+    options: list[inspect.Parameter] = []
+    for parameter in own.parameters.values():
+        options += shared.values() if parameter.name == "how" else [parameter]
+
+    @functools.wraps(command)
+    def reading(**given: Any) -> None:
+        how = _reading(**{name: given.pop(name) for name in shared if name in given})
+        command(**given, how=how)
+
+    reading.__signature__ = own.replace(parameters=options)  # type: ignore[attr-defined]
+    reading.__annotations__ = {each.name: each.annotation for each in options}
+    return reading
+
+
+def _reading(
+    floating: Floating = False,
+    projected: Projected = False,
+    forward: Forward = None,
+    pose: Pose = None,
+    mirror: Averaged = False,
+    package_path: Packages = None,
+) -> dict[str, Any]:
     return {
         "floating": floating,
         "projected": projected,
         "forward": None if forward is None else forward.value,
         "pose": pose_called(pose),
-        "mirror": "average" if averaged else None,
-        "package_path": packages or (),
+        "mirror": "average" if mirror else None,
+        "package_path": package_path or (),
     }
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,20 +13,14 @@ from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.compare import Way
 from heelstrike.cli.options import (
     AsJson,
-    Averaged,
     Debug,
-    Floating,
-    Forward,
     Friction,
     OnGround,
-    Packages,
-    Pose,
-    Projected,
     Pushed,
     SavedGait,
     Steps,
     method_called,
-    reading,
+    reads_robots,
 )
 from heelstrike.cli.planning import planned_walk
 from heelstrike.cli.terminal import (
@@ -54,6 +48,7 @@ FIRST_TIME = "(compiling the simulator, once: about 20 s)"
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
+@reads_robots
 def report(
     context: typer.Context,
     what: Annotated[
@@ -79,12 +74,7 @@ def report(
     ground: OnGround = "flat",
     friction: Friction = 0.75,
     push: Pushed = None,
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
+    how: Any = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
@@ -112,9 +102,7 @@ def report(
         raise typer.BadParameter("one robot is walked at a time; repeat --method for several ways")
     else:
         surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
-        machine = load_robot(
-            what[0], **reading(floating, projected, forward, pose, mirror, package_path)
-        )
+        machine = load_robot(what[0], **how)
         for each in pushes:
             each.place(machine)
         ways = method or [Way.TIME_STEPPING if machine.nu else Way.EVENT_DRIVEN]

@@ -10,7 +10,7 @@ import functools
 import io
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -182,6 +182,48 @@ def stage(doing: str, *, when_slow: str = "") -> Iterator[Stage]:
             raise
     if current.outcome and console.is_terminal:
         console.print(current.outcome)
+
+
+@contextmanager
+def many(doing: str) -> Iterator[Callable[[int, int, Mapping[str, float]], None]]:
+    """Show many pieces of work while they last, on a terminal: all of them, and each under way.
+
+    A KeyboardInterrupt that ends them learns how many were finished: its ``doing``.
+
+    Parameters
+    ----------
+    doing : str
+        What is being done.
+
+    Yields
+    ------
+    callable
+        Takes how many are finished, of how many, and the share that is done of each under way.
+    """
+    console, counted = messages(), [0, 0]
+    with ExitStack() as shown:
+        columns = (SpinnerColumn(), _Doing(""), BarColumn(bar_width=24), TimeElapsedColumn())
+        bars = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        shown.enter_context(bars)
+        whole = bars.add_task(doing, total=None)
+        under_way: dict[str, TaskID] = {}
+
+        def show(finished: int, all_of_them: int, shares: Mapping[str, float]) -> None:
+            counted[:] = finished, all_of_them
+            told = f"{doing}, {finished} of {all_of_them}"
+            bars.update(whole, description=told, completed=finished, total=all_of_them)
+            for what in [what for what in under_way if what not in shares]:
+                bars.remove_task(under_way.pop(what))
+            for what, share in shares.items():
+                if what not in under_way:
+                    under_way[what] = bars.add_task(what, total=1.0)
+                bars.update(under_way[what], completed=share)
+
+        try:
+            yield show
+        except KeyboardInterrupt as error:
+            error.doing = f"{doing}, {counted[0]} of {counted[1]} finished"  # type: ignore[attr-defined]
+            raise
 
 
 class _Doing(ProgressColumn):

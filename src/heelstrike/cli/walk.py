@@ -4,28 +4,22 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     AsJson,
-    Averaged,
     Debug,
-    Floating,
-    Forward,
     Friction,
     OnGround,
-    Packages,
-    Pose,
-    Projected,
     Pushed,
     RobotName,
     SavedGait,
     Steps,
     method_called,
-    reading,
+    reads_robots,
 )
 from heelstrike.cli.planning import planned_walk
 from heelstrike.cli.terminal import (
@@ -82,6 +76,7 @@ class Animation(StrEnum):
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
 @spoken
+@reads_robots
 def walk(
     robot: RobotName = "bravo7",
     step_length: Annotated[
@@ -114,12 +109,7 @@ def walk(
     ground: OnGround = "flat",
     friction: Friction = 0.75,
     push: Pushed = None,
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
+    how: Any = None,
     out: Annotated[
         Path,
         typer.Option(file_okay=False, help="For the results; those of an earlier walk go."),
@@ -150,9 +140,7 @@ def walk(
 
         # All that is cheap to refuse is refused before anything that takes long.
         surface, pushes = ground_called(ground, friction=friction), pushes_called(push)
-        machine = load_robot(
-            robot, **reading(floating, projected, forward, pose, mirror, package_path)
-        )
+        machine = load_robot(robot, **how)
         for each in pushes:
             each.place(machine)
         through = _through_time(method, scheme, step, passive=not machine.nu)

@@ -9,19 +9,13 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
-    Averaged,
     Debug,
-    Floating,
-    Forward,
     Friction,
     OnGround,
-    Packages,
-    Pose,
-    Projected,
     RobotName,
     SavedGait,
     method_called,
-    reading,
+    reads_robots,
 )
 from heelstrike.cli.terminal import spoken, stage, tell
 from heelstrike.cli.values import ground_called
@@ -42,6 +36,7 @@ METHODS = (
 
 # As many arguments as the command has options: a person's.
 @spoken
+@reads_robots
 def watch(
     robot: RobotName = "bravo7",
     gait: SavedGait = None,
@@ -63,12 +58,7 @@ def watch(
     browser: Annotated[
         bool, typer.Option("--browser/--no-browser", help="Open the page in a browser.")
     ] = True,
-    floating: Floating = False,
-    projected: Projected = False,
-    forward: Forward = None,
-    pose: Pose = None,
-    mirror: Averaged = False,
-    package_path: Packages = None,
+    how: Any = None,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
     """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
@@ -96,7 +86,6 @@ def watch(
         first = First(
             method=method, step=step, gait=gait, friction=friction, **_shape(ground, surface)
         )
-        how = reading(floating, projected, forward, pose, mirror, package_path)
         walks = WalkStage(robot, method_called, METHODS, first, **how)
         viewer = view(stage=walks, rate=speed, port=port)
     tell(f"watch at {viewer.url}")

@@ -14,15 +14,11 @@ import numpy as np
 
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.contact.ground import Ground
-from heelstrike.dynamics import contact_positions
 from heelstrike.errors import SimulationError
 from heelstrike.sim.push import Push
 
 FAR = 1000.0
 """How far ground that is not level goes, in m."""
-
-ON_IT = 1e-3
-"""A foot that is lifted by less than this (m) stands."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,7 +195,7 @@ def largest_slope(
     sign = 1.0 if uphill else -1.0
 
     def recovers(degrees: float) -> bool:
-        edge = _edge(trial)
+        edge = trial.edge
         rise = sign * np.tan(np.deg2rad(degrees)) * FAR
         ground = _ground(trial, [(edge - 1.0, 0.0), (edge, 0.0), (edge + FAR, rise)])
         return _walks_on(trial, ground, same_speed=False)
@@ -236,7 +232,7 @@ def largest_ground_step(
     sign = 1.0 if up else -1.0
 
     def recovers(height: float) -> bool:
-        edge, rise = _edge(trial), sign * height
+        edge, rise = trial.edge, sign * height
         corners = [(edge - 1.0, 0.0), (edge, 0.0), (edge, rise), (edge + FAR, rise)]
         ground = trial.ground if height == 0.0 else _ground(trial, corners)
         return _walks_on(trial, ground, same_speed=True)
@@ -277,7 +273,7 @@ def largest_roughness(
 
     def recovers(amplitude: float) -> bool:
         ground = Ground.rough(
-            amplitude=amplitude, spacing=spacing, length=length, seed=seed, start=_edge(trial),
+            amplitude=amplitude, spacing=spacing, length=length, seed=seed, start=trial.edge,
             friction=_friction(trial),
         )  # fmt: skip
         return _walks_on(trial, ground, same_speed=False)
@@ -288,15 +284,6 @@ def largest_roughness(
 def _walks_on(trial: Trial, ground: Ground, *, same_speed: bool) -> bool:
     run = trial.run(trial.begins, ground=ground)
     return bool(trial.recovered(run, (trial.begins, trial.begins), same_speed=same_speed))
-
-
-def _edge(trial: Trial) -> float:
-    """Where level ground ends: in the middle between two footholds of the undisturbed walk."""
-    points = contact_positions(trial.robot, trial.state.q)
-    feet = [points[list(foot.contacts)] for foot in trial.robot.feet if foot.contacts]
-    lowest = points[:, 1].min()
-    first = max(float(foot[:, 0].mean()) for foot in feet if foot[:, 1].min() < lowest + ON_IT)
-    return first + (trial.undisturbed + 0.5) * trial.step_length
 
 
 def _friction(trial: Trial) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.contact.ground import Ground
 from heelstrike.control import Law
+from heelstrike.dynamics import contact_positions
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -25,6 +26,8 @@ from heelstrike.sim.whole_run import whole
 ROWS = 5
 # Time (s) simulated beyond the verdict: methods with steps end on one.
 BEYOND = 0.02
+# A foot that is lifted by less than this (m) stands.
+ON_IT = 1e-3
 # Part of the speed that may differ after a push, and on other ground.
 NORMAL = 0.25
 GETS_ON = 0.7
@@ -43,7 +46,8 @@ class Trial:
     state : State
         Where it begins, on a walk that repeats.
     step_length, step_duration : float
-        Of a step of that walk, in m and s.
+        Of a step of that walk, in m and s. Of a robot that stands the length is zero; the duration
+        then counts the time before a disturbance, and its phase.
     method : Method
         Way through time; ``TimeStepping(step=1e-3)`` by default.
     ground : Ground
@@ -56,6 +60,9 @@ class Trial:
         Largest angle of the trunk from the upright, in rad.
     control_period : float or None
         As of :func:`~heelstrike.simulate`.
+    progress : callable or None
+        Called now and then, in every walk, with the simulated time. If it raises, that walk ends
+        there as if by Ctrl-C.
 
     Raises
     ------
@@ -74,6 +81,7 @@ class Trial:
     settling: float = 7.0
     pitch: float = 0.6
     control_period: float | None = None
+    progress: Callable[[float], None] | None = None
 
     def __post_init__(self) -> None:
         if not self.robot.floating:
@@ -81,10 +89,15 @@ class Trial:
                 f"trials of balance need a robot with a trunk that floats; {self.robot.name!r} is "
                 "none"
             )
-        for name in ("step_length", "step_duration", "settling", "pitch"):
+        for name in ("step_duration", "settling", "pitch"):
             value = getattr(self, name)
             if not (np.isfinite(value) and value > 0.0):
                 raise SimulationError(f"{name} of a trial must be positive, got {value!r}")
+        if not (np.isfinite(self.step_length) and self.step_length >= 0.0):
+            raise SimulationError(
+                f"step_length of a trial must not be negative, got {self.step_length!r}; zero is "
+                "that of a robot that stands"
+            )
 
     @property
     def speed(self) -> float:
@@ -96,9 +109,19 @@ class Trial:
         """When a disturbance may begin, in s."""
         return self.undisturbed * self.step_duration
 
+    @property
+    def edge(self) -> float:
+        """Where ground may change, in m: midway between two footholds of the undisturbed walk."""
+        points = contact_positions(self.robot, self.state.q)
+        feet = [points[list(foot.contacts)] for foot in self.robot.feet if foot.contacts]
+        lowest = points[:, 1].min()
+        first = max(float(foot[:, 0].mean()) for foot in feet if foot[:, 1].min() < lowest + ON_IT)
+        return first + (self.undisturbed + 0.5) * self.step_length
+
     def run(
-        self, until: float, *, pushes: Sequence[Push] = (), ground: Ground | None = None
-    ) -> Run:
+        self, until: float, *, pushes: Sequence[Push] = (), ground: Ground | None = None,
+        record_every: int = ROWS,
+    ) -> Run:  # fmt: skip
         """Walk for as long as it takes to settle after an instant.
 
         Parameters
@@ -109,6 +132,8 @@ class Trial:
             What pushes the robot.
         ground : Ground, optional
             What lies there instead of the trial's own ground.
+        record_every : int
+            Steps of the method between two rows.
 
         Returns
         -------
@@ -119,6 +144,8 @@ class Trial:
         ------
         SimulationError
             If an argument is not usable.
+        KeyboardInterrupt
+            If Ctrl-C, or `progress`, ended the walk.
         """
         return whole(
             simulate(
@@ -129,7 +156,8 @@ class Trial:
                 method=self.method,
                 ground=self.ground if ground is None else ground,
                 control_period=self.control_period,
-                record_every=ROWS,
+                record_every=record_every,
+                progress=self.progress,
                 pushes=pushes,
             )
         )

@@ -1,0 +1,115 @@
+"""``heelstrike zoo``: what controllers withstand on robots, in one table and one figure."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from heelstrike.cli.options import (
+    AsJson,
+    Debug,
+    method_called,
+    reads_robots,
+)
+from heelstrike.cli.terminal import many, output, spoken, stage, tell, this_command, wrote
+from heelstrike.cli.walk import Method
+
+ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
+
+
+# As many arguments as the command has options: a person's, none of which is handed on one by one.
+@spoken
+@reads_robots
+def zoo(
+    robots: Annotated[
+        str, typer.Option(help="Built-in robots, and MJCF, URDF or SDF files, with commas between.")
+    ] = ROBOTS,
+    controllers: Annotated[
+        str | None, typer.Option(help="Controllers, with commas between.", show_default="all")
+    ] = None,
+    disturbances: Annotated[
+        str | None, typer.Option(help="Disturbances, with commas between.", show_default="all")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of phases of pushes and of rough ground.")] = 0,
+    trials: Annotated[
+        int | None,
+        typer.Option(
+            min=1, help="Phases of a push, and shapes of rough ground.", show_default="4; quick 1"
+        ),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A coarse table, for a try.")] = False,
+    method: Annotated[Method, typer.Option(help="Way through time.")] = Method.TIME_STEPPING,
+    step: Annotated[
+        float, typer.Option(help="Time step in s of the methods that have one.")
+    ] = 1e-3,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Threads.", show_default="one a processor")
+    ] = None,
+    how: Any = None,
+    out: Annotated[
+        Path,
+        typer.Option(
+            file_okay=False, help="For what is found, and gaits; gone on with from there."
+        ),
+    ] = Path("zoo"),
+    page: Annotated[
+        Path | None,
+        typer.Option(dir_okay=False, help="Page to write.", show_default="zoo.md in --out"),
+    ] = None,
+    figure: Annotated[
+        Path | None,
+        typer.Option(
+            dir_okay=False,
+            help="Figure to write (SVG, PNG or PDF).",
+            show_default="zoo.svg in --out",
+        ),
+    ] = None,
+    afresh: Annotated[
+        bool, typer.Option("--afresh", help="Begin anew whatever is in --out.")
+    ] = False,
+    as_json: AsJson = False,
+    debug: Debug = False,  # noqa: ARG001 - for `spoken`
+) -> None:
+    """Find how large a disturbance each controller withstands on each robot.
+
+    Every cell that is finished is kept in zoo.json: after Ctrl-C the same command goes on. Writes
+    zoo.csv, a page and a figure, too. The options of reading are for files.
+    """
+    with stage("loading"):
+        from heelstrike.experiments.zoo import campaign
+        from heelstrike.experiments.zoo.table import on_terminal
+        from heelstrike.experiments.zoo.writing import Targets
+
+        entries = campaign.chosen_controllers(controllers)
+        kinds = campaign.chosen_disturbances(disturbances)
+        machines = campaign.loaded(robots, how)
+        targets = Targets(out, page or out / "zoo.md", figure or out / "zoo.svg")
+    settings = campaign.QUICK if quick else campaign.USUAL
+    with many("measuring") as show:
+
+        def reached(progress: campaign.Progress) -> None:
+            wrote(*progress.files)
+            show(progress.finished, progress.cells, progress.doing)
+
+        results = campaign.zoo(
+            machines,
+            controllers=entries,
+            disturbances=kinds,
+            settings=replace(settings, seed=seed, trials=trials or settings.trials),
+            method=method_called(method, step),
+            folder=out,
+            afresh=afresh,
+            workers=workers,
+            progress=reached,
+        )
+    with stage("writing"):
+        wrote(*targets.write(results, this_command()))
+    if as_json:
+        typer.echo(json.dumps(results.to_dict(), indent=2))
+    else:
+        output().print(on_terminal(results))
+    tell(f"in {out}: zoo.json, zoo.csv; {targets.page}, {targets.figure}")

@@ -1,0 +1,229 @@
+"""The controllers of the zoo: what robots each can drive, and how it is made for one.
+
+A new controller is one line of `CONTROLLERS`. Gains are those of bravo7, which go with weight and
+height; nothing is tuned for a robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.stability.trial import Trial
+from heelstrike.analysis.stability.zero_dynamics import zero_dynamics
+from heelstrike.contact.ground import Ground
+from heelstrike.control import (
+    ComputedTorque,
+    FootstepFeedback,
+    JointPD,
+    VirtualConstraints,
+    WholeBody,
+)
+from heelstrike.control.joint_feedback import JointFeedback
+from heelstrike.dynamics import mass_matrix
+from heelstrike.errors import HeelstrikeError
+from heelstrike.experiments.walk import StepSize, design, typical_step
+from heelstrike.gait import Gait, PhasedGait
+from heelstrike.gait.sole import sole
+from heelstrike.robot import Robot
+from heelstrike.sim.controller.law import Law
+from heelstrike.sim.method import Method
+from heelstrike.sim.time_stepping.method import TimeStepping
+
+SAMPLE = 1e-3
+"""Time between two calls of every controller, in s; a longer step of the method goes before."""
+
+BRAVO7_WEIGHT, BRAVO7_STEP = 75.0, 0.30
+"""Mass (kg) and step length (m, which goes with the height) of the robot whose gains are scaled."""
+
+POINT_FEET_STEP = StepSize(2.8, 0.95, 1.4)
+"""Steps on point feet, in those that suit flat feet: a slow step lets the weight tip the robot."""
+
+MOST_DAMPING = 0.5
+"""Largest damping of a joint in parts of what it moves, over `SAMPLE`: more of it, held over a
+sample, makes a joint that moves little inertia chatter."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A controller of the zoo.
+
+    Attributes
+    ----------
+    name : str
+        What it is called.
+    trial : callable
+        Takes a robot and its gait, returns the walk that is disturbed, under a new controller.
+    needs : callable
+        Takes a robot, returns what it lacks, in a word; nothing if the controller can drive it.
+    stands : bool
+        Whether it makes the robot stand, and needs no gait: None is what it is given.
+    """
+
+    name: str
+    trial: Callable[[Robot, Gait | None], Trial]
+    needs: Callable[[Robot], str]
+    stands: bool = False
+
+
+def two_feet(robot: Robot) -> str:
+    """Say what a robot lacks that shall walk on two feet of whatever kind."""
+    if not robot.nu:
+        return "no motors"
+    if not robot.floating:
+        return "trunk is fixed"
+    return "" if len(robot.feet) == 2 else "not on two feet"
+
+
+def flat_feet(robot: Robot) -> str:
+    """Say what a robot lacks that shall stand on flat soles."""
+    return two_feet(robot) or ("" if _flat(robot) else "needs flat feet")
+
+
+def point_feet(robot: Robot) -> str:
+    """Say what a robot lacks that shall walk on points."""
+    return two_feet(robot) or ("needs point feet" if _flat(robot) else "")
+
+
+def walking(
+    name: str, law: Callable[[Robot, Gait], Law], needs: Callable[[Robot], str] = flat_feet
+) -> Entry:
+    """Enter a controller that walks a gait from its beginning.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    law : callable
+        Takes a robot and its gait, returns the controller; the class of one, say.
+    needs : callable
+        Takes a robot, returns what it lacks, in a word; by default it must have two flat feet.
+
+    Returns
+    -------
+    Entry
+        An entry of the zoo.
+    """
+
+    def trial(robot: Robot, gait: Gait | None) -> Trial:
+        assert gait is not None
+        return Trial(
+            robot=robot, controller=law(robot, gait), state=gait.initial_state,
+            step_length=gait.step_length, step_duration=gait.step_duration,
+        )  # fmt: skip
+
+    return Entry(name, trial, needs)
+
+
+def standing(
+    name: str,
+    law: Callable[[Robot, NDArray[np.float64]], Law],
+    needs: Callable[[Robot], str] = flat_feet,
+) -> Entry:
+    """Enter a controller that makes a robot stand, as it does on level ground.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    law : callable
+        Takes a robot and the coordinates (nq,) in which it stands, returns the controller.
+    needs : callable
+        Takes a robot, returns what it lacks, in a word; by default it must have two flat feet.
+
+    Returns
+    -------
+    Entry
+        An entry of the zoo.
+    """
+
+    def trial(robot: Robot, _: Gait | None) -> Trial:
+        state = robot.standing(Ground())
+        return Trial(
+            robot=robot, controller=law(robot, state.q), state=state, step_length=0.0,
+            step_duration=typical_step(robot).duration,
+        )  # fmt: skip
+
+    return Entry(name, trial, needs, stands=True)
+
+
+def _joint_pd(robot: Robot, gait: Gait) -> Law:
+    size = _size(robot)
+    damping = _at_most(robot, 20.0 * size[0] * size[1] ** 1.5)
+    return JointPD(robot, gait, kp=1000.0 * size[0] * size[1], kd=damping, feedforward="full")
+
+
+def _joint_springs(robot: Robot, q: NDArray[np.float64]) -> Law:
+    size = _size(robot)
+    damping = _at_most(robot, 100.0 * size[0] * size[1] ** 1.5)
+    return JointFeedback(
+        robot, q[robot.model.actuator_joint], kp=2000.0 * size[0] * size[1], kd=damping
+    )
+
+
+def _virtual_constraints(robot: Robot, gait: Gait | None) -> Trial:
+    assert gait is not None
+    phased = PhasedGait.from_gait(robot, gait)
+    zero = zero_dynamics(phased)
+    return Trial(
+        robot=robot, controller=VirtualConstraints(phased, kp=100.0, kd=40.0),
+        state=zero.initial_state, step_length=zero.step_length, step_duration=zero.period,
+    )  # fmt: skip
+
+
+CONTROLLERS: tuple[Entry, ...] = (
+    walking("ComputedTorque", ComputedTorque, needs=two_feet),
+    walking("JointPD", _joint_pd),
+    walking("WholeBody", WholeBody),
+    walking("FootstepFeedback", FootstepFeedback),
+    Entry("VirtualConstraints", _virtual_constraints, needs=point_feet),
+    standing("JointFeedback", _joint_springs),
+)
+"""Controllers, in the order of the table; a new one is a line here."""
+
+
+def gait_for(robot: Robot) -> Gait:
+    """Design the gait that every controller of a robot follows.
+
+    Raises
+    ------
+    GaitError
+        If there is none.
+    """
+    size = typical_step(robot)
+    if point_feet(robot) == "":
+        size = StepSize(
+            length=round(POINT_FEET_STEP.length * size.length, 2),
+            duration=round(POINT_FEET_STEP.duration * size.duration, 2),
+            clearance=round(POINT_FEET_STEP.clearance * size.clearance, 3),
+        )
+    return design(robot, size)
+
+
+def sampled(trial: Trial, method: Method) -> Trial:
+    """Return a trial by another method, its controller called once a sample, or once a step."""
+    slow = isinstance(method, TimeStepping) and method.step >= SAMPLE
+    period = None if slow else SAMPLE
+    return replace(trial, method=method, control_period=period)
+
+
+def _flat(robot: Robot) -> bool:
+    try:
+        return all(sole(robot, foot).flat for foot in range(len(robot.feet)))
+    except HeelstrikeError:
+        return False
+
+
+def _size(robot: Robot) -> tuple[float, float]:
+    """Weight and height of a robot, in those of bravo7."""
+    return robot.total_mass / BRAVO7_WEIGHT, typical_step(robot).length / BRAVO7_STEP
+
+
+def _at_most(robot: Robot, damping: float) -> NDArray[np.float64]:
+    """Return a damping of all joints (N m s/rad) that none of them takes amiss."""
+    moved = np.diag(mass_matrix(robot, robot.model.reference))[robot.model.actuator_joint]
+    most: NDArray[np.float64] = MOST_DAMPING * moved / SAMPLE
+    return np.minimum(damping, most)
