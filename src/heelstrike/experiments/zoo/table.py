@@ -139,7 +139,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "# Zoo of controllers",
         "",
         "How large a disturbance each controller withstands on each robot: one gait a robot, one "
-        "set of gains a controller, which go with weight and height and are tuned for no robot. "
+        "set of gains a controller, found on one robot; on others they go with weight and height. "
         "This page, its figure and its numbers are made by",
         "",
         "```sh",
@@ -179,7 +179,7 @@ def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
         "A size counts if the walk recovers from it, strictly "
-        "([`recovery`](reference/analysis.md#heelstrike.analysis.recovery)), and from every "
+        "(`heelstrike.analysis.recovery`), and from every "
         f"smaller one tried: {settings.strides} strides upwards to the first failure, which is "
         f"halved {settings.halvings} times. ≥ says that nothing tried was too much, < that the "
         "smallest size tried was. Pushes begin at "
