@@ -156,7 +156,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         lines += [f"## {animal.robot}", "", _gait(animal), ""]
         filled = {controller: row for controller, row in rows.items() if not empty(row)}
         if filled:
-            heads = [f"{each.heading} {each.unit}".strip() for each in there]
+            heads = [f"{each.heading}<br>{each.unit}" for each in there]
             lines += [_line("controller", *heads), _line("---", *["--:"] * len(there))]
             for controller, row in filled.items():
                 lines.append(_line(controller, *(shown(row.get(d.name), d) for d in there)))
