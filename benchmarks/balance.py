@@ -5,11 +5,16 @@ of a step, the impulse is raised until the robot does not recover strictly
 (:func:`heelstrike.analysis.recovery.recovery`): what is told is the last one of which it and all
 smaller ones recovered. Everything else is 100 steps from a seed: where the ground changes, its
 random heights, noise. A run counts if it completes, the hip stays above 0.65 of its height above
-the ground, the trunk within 0.6 rad, and the robot comes at least 0.7 of the way that its steps
-should take it. Seeds below 1000 were used while the controller was made.
+the ground, the trunk within 0.6 rad of how the gait leans, and the robot comes at least 0.7 of the
+way that its steps should take it. Seeds below 1000 were used while the controller was made.
 
-Run: python benchmarks/balance.py [price push hard command] [--robot bravo7] [--phases 20]
-     [--rise 5] [--seeds 100] [--first 1000] [--method stepping]
+`small` tells what is left, step by step, of the error of the capture point after a push of 3 N s;
+`stand` the largest pushes of a robot that stands; `commands` how often it starts, walks at
+three speeds and stops. `--robot` may be a file, of three dimensions with `--projected`.
+
+Run: python benchmarks/balance.py [price small push hard stand commands] [--robot bravo7]
+     [--projected] [--torque 150] [--phases 20] [--rise 5] [--seeds 100] [--first 1000]
+     [--method stepping]
 """
 
 from __future__ import annotations
@@ -24,6 +29,7 @@ import numpy as np
 
 import heelstrike as hs
 from heelstrike.analysis.recovery import recovery
+from heelstrike.dynamics import contact_positions
 from heelstrike.gait.sole import sole, standing_height
 
 HEIGHT, WEIGHT = 0.9538, 75.0 * 9.81  # of bravo7
@@ -45,14 +51,35 @@ class Walker:
     method: dict[str, Any]
 
     @classmethod
-    def of(cls, name: str, method: str) -> Walker:
-        """Design its gait, scaled by its height, and its controller."""
-        robot = hs.load_robot(name)
+    def of(cls, name: str, method: str, torque: float | None, projected: bool) -> Walker:
+        """Design its gait, scaled by its height, and its controller, with weaker motors if asked.
+
+        The gait is that of the motors that the robot has.
+        """
+        robot = hs.load_robot(name, projected=projected)
         size = standing_height(robot, sole(robot, 0)) / HEIGHT
         gait = hs.optimize_gait(
             robot, step_length=round(0.30 * size, 3), step_duration=round(0.70 * size**0.5, 3)
         )
+        if torque is not None:
+            model = robot.model
+            weaker = model.replaced(
+                torque_lower=np.maximum(model.torque_lower, -torque),
+                torque_upper=np.minimum(model.torque_upper, torque),
+            )
+            robot = dataclasses.replace(robot, model=weaker)
         return cls(robot, gait, hs.FootstepFeedback(robot, gait), METHODS[method])
+
+    @property
+    def size(self) -> float:
+        """Its height, that of bravo7 being one."""
+        return standing_height(self.robot, sole(self.robot, 0)) / HEIGHT
+
+    @property
+    def unit(self) -> float:
+        """What an impulse of 1 N s on bravo7 is for this robot (N s)."""
+        weight = float(-self.robot.model.mass.sum() * self.robot.model.gravity[1])
+        return weight / WEIGHT * self.size**0.5
 
     def walk(self, duration: float, controller: Any = None, **options: Any) -> hs.Run:
         """Simulate it from the beginning of its gait."""
@@ -95,9 +122,7 @@ def recovers(walker: Walker, impulse: float, phase: float) -> bool:
 
 def pushes(walker: Walker, phases: int, rise: float) -> None:
     """Tell the largest push of which it recovers, with all smaller ones."""
-    weight = float(-walker.robot.model.mass.sum() * walker.robot.model.gravity[1])
-    size = standing_height(walker.robot, sole(walker.robot, 0)) / HEIGHT
-    rise *= weight / WEIGHT * size**0.5
+    rise *= walker.unit
     for name, sign in (("forwards", 1.0), ("backwards", -1.0)):
         found = []
         for phase in range(phases):
@@ -148,14 +173,15 @@ def ground(
 def stays_up(walker: Walker, run: hs.Run, surface: hs.Ground) -> bool:
     """Whether it walked on, hip up and trunk upright."""
     height = run.position[:, 1] - np.array([float(surface.height(x)) for x in run.position[:, 0]])
-    upright = np.abs(run.position[:, 2]).max() < PITCH
+    usual = run.position[run.time < 2.0 * walker.gait.step_duration, 2].mean()
+    upright = np.abs(run.position[:, 2] - usual).max() < PITCH
     way = run.position[-1, 0] - run.position[0, 0] > WAY * STEPS * walker.gait.step_length
     return bool(run.completed and height.min() > HIP * height[0] and upright and way)
 
 
 def hard(walker: Walker, seeds: range) -> None:
     """Tell of how many seeds it stays up, check by check."""
-    size = standing_height(walker.robot, sole(walker.robot, 0)) / HEIGHT
+    size = walker.size
     made: Callable[..., hs.Ground] = partial(ground, size)
     degree = np.pi / 180.0
 
@@ -202,30 +228,96 @@ def hard(walker: Walker, seeds: range) -> None:
         print(f"{name}: {len(seeds) - len(fallen)} of {len(seeds)}{told}", flush=True)
 
 
-def command(walker: Walker, seeds: range) -> None:
-    """Stand, start, walk at three speeds, stop and stand, at random times."""
+def small(walker: Walker) -> None:
+    """Tell how far the capture point is off as feet land after a push of 3 N s."""
+    duration = 10.0 * walker.gait.step_duration
+
+    def landings(**options: Any) -> np.ndarray:
+        run = walker.walk(duration, record_every=1, **options)
+        ends = np.nonzero(np.diff(run.log["phase"].values) < -0.5)[0]
+        found: np.ndarray = 1e3 * run.log["capture_point"].values[ends - 1]
+        return found
+
+    usual = landings()
+    for impulse in (3.0, -3.0):
+        for phase in (0.1, 0.3, 0.5, 0.7):
+            found = landings(pushes=walker.push(impulse * walker.unit, phase))
+            told = " ".join(f"{off:.2f}" for off in (found - usual[: len(found)])[2:])
+            print(f"small push {impulse:+g} N s at {phase}: off by {told} mm", flush=True)
+
+
+def stand(walker: Walker, rise: float) -> None:
+    """Tell the largest push of a robot that stands, without and with steps."""
+    law = hs.FootstepFeedback(walker.robot, walker.gait, speed=0.0)
+    rise *= walker.unit
+    for name, sign in (("forwards", 1.0), ("backwards", -1.0)):
+        firm, most = 0.0, 0.0
+        for count in range(1, 100):
+            impulse = rise * count
+            push = hs.Push(2, force=(10.0 * sign * impulse, 0.0), start=1.0, duration=0.1)
+            run = hs.simulate(
+                walker.robot, law, state=walker.robot.reference_state(), duration=9.11, pushes=push,
+                **(walker.method | {"record_every": 5}),
+            )  # fmt: skip
+            if not recovery(run, after=8.0):
+                break
+            most = impulse
+            if firm == impulse - rise and run.log["phase"].values.max() == 0.0:
+                firm = impulse  # the clock of its steps never ran
+        print(f"standing, push {name}: {firm:.3g} N s without a step, {most:.3g} with", flush=True)
+
+
+def standing(robot: hs.Robot, rng: np.random.Generator) -> hs.State:
+    """Return a robot that stands badly: joints and rates are off, one foot touches the ground."""
+    q, v = robot.model.reference.copy(), rng.uniform(-0.04, 0.04, robot.nv)
+    q[2:] += rng.uniform(-0.02, 0.02, robot.nv - 2)
+    q[1] -= (contact_positions(robot, q)[:, 1] - robot.model.contact_radius).min()
+    return hs.State(q, v)
+
+
+def commands(walker: Walker, seeds: range) -> None:
+    """Stand, start, walk at three speeds in random order, stop and stand, at random times."""
     usual = walker.gait.step_length / walker.gait.step_duration
-    good = 0
+    height = walker.robot.model.reference[1]
+    law = hs.FootstepFeedback(walker.robot, walker.gait, speed=0.0)
+    fallen, reached = [], []
     for seed in seeds:
         rng = np.random.default_rng(seed)
-        law = hs.FootstepFeedback(walker.robot, walker.gait, speed=0.0)
-        begin = walker.robot.reference_state()
+        begin = standing(walker.robot, rng)
         simulation = hs.Simulation(walker.robot, law, state=begin, **walker.method)
-        for speed in (0.0, 0.6 * usual, usual, 1.3 * usual, 0.0):
-            simulation.parameters.speed = speed
-            if simulation.status == hs.RunStatus.COMPLETED:
-                simulation.advance(simulation.time + rng.uniform(3.0, 5.0))
-        ended = simulation.status == hs.RunStatus.COMPLETED
-        good += bool(ended and np.abs(simulation.state.v).max() < 0.05)
-    print(f"stands, starts, three speeds, stops and stands: {good} of {len(seeds)}")
+        simulation.advance(rng.uniform(1.0, 3.0))
+        for share in rng.permutation([0.47, 1.0, 1.4]):
+            simulation.parameters.speed = share * usual
+            if simulation.status != hs.RunStatus.COMPLETED:
+                break
+            simulation.advance(simulation.time + rng.uniform(3.0, 5.0))
+            place, then = simulation.state.q[0], simulation.time
+            simulation.advance(then + 4.0 * walker.gait.step_duration)
+            speed = (simulation.state.q[0] - place) / (simulation.time - then)
+            reached.append(speed / (share * usual))
+        simulation.parameters.speed = 0.0
+        if simulation.status == hs.RunStatus.COMPLETED:
+            simulation.advance(simulation.time + rng.uniform(6.0, 8.0))
+        state = simulation.state
+        still = np.abs(state.v).max() < 0.05 and state.q[1] > 0.9 * height
+        if simulation.status != hs.RunStatus.COMPLETED or not still:
+            fallen.append(seed)
+    told = f"; not {' '.join(map(str, fallen))}" if fallen else ""
+    print(
+        f"stands, starts, three speeds, stops and stands: {len(seeds) - len(fallen)} of "
+        f"{len(seeds)}{told}; speeds reached: {min(reached):.3f} to {max(reached):.3f} of those "
+        "asked for"
+    )
 
 
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    known = ("price", "push", "hard", "command")
+    known = ("price", "small", "push", "hard", "stand", "commands")
     parser.add_argument("what", nargs="*", default=list(known))
     parser.add_argument("--robot", default="bravo7")
+    parser.add_argument("--projected", action="store_true", help="a file of three dimensions")
+    parser.add_argument("--torque", type=float, help="of motors at most, N m")
     parser.add_argument("--phases", type=int, default=20)
     parser.add_argument("--rise", type=float, default=5.0, help="N s, scaled by the robot")
     parser.add_argument("--seeds", type=int, default=100)
@@ -235,17 +327,21 @@ def main() -> None:
     unknown = set(asked.what) - set(known)
     if unknown:
         parser.error(f"there is no {', '.join(sorted(unknown))}; there are {', '.join(known)}")
-    walker = Walker.of(asked.robot, asked.method)
+    walker = Walker.of(asked.robot, asked.method, asked.torque, asked.projected)
     seeds = range(asked.first, asked.first + asked.seeds)
     print(f"{asked.robot}, {asked.method}, {walker.gait}")
     if "price" in asked.what:
         price(walker)
+    if "small" in asked.what:
+        small(walker)
     if "push" in asked.what:
         pushes(walker, asked.phases, asked.rise)
     if "hard" in asked.what:
         hard(walker, seeds)
-    if "command" in asked.what:
-        command(walker, seeds)
+    if "stand" in asked.what:
+        stand(walker, 0.2 * asked.rise)
+    if "commands" in asked.what:
+        commands(walker, seeds)
 
 
 if __name__ == "__main__":

@@ -165,6 +165,14 @@ def geared(polynomial: tuple[float, ...] = (0.0, 2.0)) -> Robot:
     return build.build()
 
 
+def braked(mass: float = 2.0, length: float = 0.8, inertia: float = 0.05) -> Robot:
+    """Pendulum with a brake."""
+    build = RobotBuilder("pendulum")
+    build.hinge("swing", None, mass=mass, inertia=inertia, center_of_mass=(0.0, -length))
+    build.brake("swing")
+    return build.build()
+
+
 def parallel_ankles(sides: tuple[str, ...] = ("right", "left"), dry_friction: float = 0.0) -> Robot:
     """Biped whose ankles are driven from the shank, by a lever and a rod."""
     build = RobotBuilder("parallel_ankles")

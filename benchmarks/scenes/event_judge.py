@@ -60,6 +60,8 @@ ENERGY = 1e-4
 """Energy that nothing explains over a run, relative to the greatest that is in it."""
 GAIN = 1e-8
 """Energy that an impact makes without saying so, relative to what there is."""
+IN_CORNER = 1e-9
+"""Distance (m) from a second face up to which a force may be that of both faces of a corner."""
 TOGETHER = 5e-11
 """Gap (m) up to which a point takes part in an impact elsewhere."""
 ROW = 1e-3
@@ -81,7 +83,7 @@ def judge_events(run: Any, start: Any = None) -> Findings:
         Where it began, before any impact of the first instant.
     """
     found = Findings()
-    rows = Rows(run)
+    rows = Rows(run, corners=IN_CORNER, instants=True)
     rows.geometry(found)
     found.figures["penetration"] = float(max(np.max(-rows.gap, initial=0.0), 0.0))
     if len(rows.time):
@@ -144,15 +146,23 @@ class _Events:
             apart = np.minimum(np.abs(rows.gap) / TOUCH * LAW, pressed)
             found.look("contact: force without touch", apart, LAW, time, names)
             leaving = np.minimum(np.abs(rows.speed[..., 0]) / speed_unit[..., 0], pressed)
-            found.look("contact: force while it leaves or enters", leaving, LAW, time, names)
+            # Both faces of a corner have a cone and a speed: their resultant obeys neither.
+            one_face = ~rows.cornered
+            found.look(
+                "contact: force while it leaves or enters",
+                np.where(one_face, leaving, 0.0),
+                LAW,
+                time,
+                names,
+            )
             cone = excess_over_cone(rows.force, rows.high) / (size / weight[..., 1])
-            found.look("friction cone", cone, LAW, time, names)
+            found.look("friction cone", np.where(one_face, cone, 0.0), LAW, time, names)
             slip = rows.speed[..., 1]
             slides = np.where(np.abs(slip) > MOVING, slip, 0.0)
             wrong = friction_that_does_not_oppose(
                 rows.force, slides, rows.low, rows.high, size / weight[..., 1], speed_unit[..., 1]
             )
-            found.look("friction opposes", wrong, LAW, time, names)
+            found.look("friction opposes", np.where(one_face, wrong, 0.0), LAW, time, names)
             recorded = np.abs(rows.run.slip_velocity - slip) / speed_unit[..., 1]
             recorded = np.where(pressed > LAW, recorded, 0.0)
             found.look("recorded slip", recorded, LAW, time, names)
@@ -169,6 +179,7 @@ class _Events:
         still = np.abs(rows.speed) < RESTING
         # At a corner a point, or a disc too small, has no acceleration of its gap to speak of.
         plain = ~rows.measured.at_corner & (rows.measured.tied.sum(axis=-1) == 1)
+        plain = plain & ~rows.cornered
         on = (np.abs(rows.gap) < CLOSED) & still[..., 0] & plain & self.settled[:, None]
         into = np.where(on, -rate[..., 0] / unit[..., 0], 0.0)
         found.look("contact: acceleration into it", into, LAW, rows.time, rows.contacts)
@@ -259,7 +270,7 @@ class _Events:
         for k, (a, b) in enumerate(zip(self.first, self.last, strict=True)):
             p = contact.get(k, np.zeros((points, 2)))
             s = joint.get(k, np.zeros(n))
-            kicked = generalised(rows.jacobian[a : a + 1], p[None])[0] + s
+            kicked = generalised(rows.acting[a : a + 1], p[None])[0] + s
             before, q_before = rows.v[a], rows.q[a]
             if a == b:
                 if not (k == 0 and self.start is not None):
@@ -274,6 +285,7 @@ class _Events:
             matrix = rows.matrix[a]
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
+            left -= self.couple(a, left, p)
             unexplained = rows.metric_of(one).of_force(left[None]) / size
             found.look("balance of an impact", unexplained, JUMP, time)
             if k in self.bridges:
@@ -284,6 +296,19 @@ class _Events:
                 found.look("impact makes energy", np.array([gained / size**2]), GAIN, time)
             if most.get(k, 0) == 1 and b - a <= 1:
                 self.impact_law(found, one, p, s, before, after, size)
+
+    def couple(self, row: int, left: Array, p: Array) -> Array:
+        """Part of a generalised impulse that couples on discs in corners explain.
+
+        An event has the resultant of both faces, and not the moment of friction on the other one.
+        """
+        rows = self.rows
+        discs = rows.cornered[row] & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
+        if not discs.any():
+            return np.zeros_like(left)
+        turns = rows.tree.turn[np.unique(rows.model.contact_link[discs])].T
+        weighed = np.linalg.solve(rows.matrix[row], turns)
+        return turns @ np.linalg.lstsq(turns.T @ weighed, weighed.T @ left, rcond=None)[0]
 
     def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
         """What holds at the end of the bridge that begins at instant k."""
@@ -317,15 +342,16 @@ class _Events:
         found.look("bridge: speed into the ground", into, 1.0, time, names)
         bounce = rows.measured.restitution[one] * np.maximum(-came[..., 0], 0.0)
         off = np.maximum(went[..., 0] - bounce, 0.0) / loose[..., 0]
-        off = np.where(on & (pressed > LAW), off, 0.0)
+        one_face = ~rows.cornered[one]
+        off = np.where(on & one_face & (pressed > LAW), off, 0.0)
         found.look("bridge: pressed and leaves", off, 1.0, time, names)
-        cone = excess_over_cone(p[None], high) / unit[..., 1]
+        cone = np.where(one_face, excess_over_cone(p[None], high) / unit[..., 1], 0.0)
         found.look("bridge: cone", cone, LAW, time, names)
         slides = np.where(np.abs(went[..., 1]) > loose[..., 1], went[..., 1], 0.0)
         wrong_way = friction_that_does_not_oppose(
             p[None], slides, low, high, unit[..., 1], weight[..., 1] * size
         )
-        found.look("bridge: friction opposes", wrong_way, LAW, time, names)
+        found.look("bridge: friction opposes", np.where(one_face, wrong_way, 0.0), LAW, time, names)
 
     def impact_law(
         self, found: Findings, one: slice, p: Array, s: Array, before: Array, after: Array,
@@ -338,6 +364,7 @@ class _Events:
             came = rates(rows.jacobian[one], before[None])
             went = rates(rows.jacobian[one], after[None])
             unit = size / weight
+            one_face = ~rows.cornered[one]
             on = (rows.gap[one] <= TOGETHER) & (came[..., 0] <= MOVING)
             bounce = rows.measured.restitution[one] * np.minimum(came[..., 0], 0.0)
             # Bounces too short to follow are plastic: their limit is computed instead.
@@ -352,17 +379,17 @@ class _Events:
                 / (weight[..., 0] * size),
                 pressed,
             )
+            off = np.where(one_face, off, 0.0)
             found.look("impact: other speed than restitution gives", off, LAW, time, names)
             apart = np.minimum(np.abs(rows.gap[one]) / TOUCH * LAW, pressed)
             found.look("impact: without touch", apart, LAW, time, names)
             high, low = rows.high[one], rows.low[one]
-            found.look(
-                "impact: cone", excess_over_cone(p[None], high) / unit[..., 1], LAW, time, names
-            )
+            cone = np.where(one_face, excess_over_cone(p[None], high) / unit[..., 1], 0.0)
+            found.look("impact: cone", cone, LAW, time, names)
             wrong = friction_that_does_not_oppose(
                 p[None], went[..., 1], low, high, unit[..., 1], weight[..., 1] * size
             )
-            found.look("impact: friction opposes", wrong, LAW, time, names)
+            found.look("impact: friction opposes", np.where(one_face, wrong, 0.0), LAW, time, names)
         weight = metric.joint_weight()
         pressed = np.abs(s)[None] * weight / size
         moving = np.minimum(np.abs(after)[None] / (weight * size), pressed)

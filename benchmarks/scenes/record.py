@@ -30,6 +30,8 @@ class Rows:
     corners : float
         How near (m) a point has to come to a second face by the next row, for its force to be that
         of both.
+    instants : bool
+        Whether forces are those of the instant, and not of the time to the next row.
 
     Attributes
     ----------
@@ -49,7 +51,7 @@ class Rows:
         Generalised force of motors, springs and dampers, less H; pushes are not in it.
     """
 
-    def __init__(self, run: Any, corners: float = -np.inf) -> None:
+    def __init__(self, run: Any, corners: float = -np.inf, *, instants: bool = False) -> None:
         model = run.robot.model
         self.run, self.model = run, model
         self.time, self.q, self.v = run.time, run.position, run.velocity
@@ -60,7 +62,8 @@ class Rows:
         self.terrain = Terrain(ground.vertices, ground.friction, ground.restitution)
         self.center = self.poses.points(model.contact_link, model.contact_position)
         self.measured = self.terrain.measure(self.center)
-        self.cornered = self.terrain.to_corner(self.center) - model.contact_radius <= corners
+        beside = self.terrain.to_corner(self.center, instants=instants)
+        self.cornered = beside - model.contact_radius <= corners
         self.point = self.center - model.contact_radius[:, None] * self.normal
         world = self.poses.jacobian(model.contact_link, self.point)
         self.jacobian = self.acting = self.along(world)
@@ -102,7 +105,7 @@ class Rows:
 
     def contact_force(self) -> Array:
         """Generalised force (T, n) of the recorded forces of contacts, stops and dry joints."""
-        pushed = generalised(self.jacobian, self.force)
+        pushed = generalised(self.acting, self.force)
         return pushed + self.run.stop_torque + self.run.friction_torque
 
     def bias_acceleration(self) -> Array:

@@ -52,13 +52,16 @@ class Terrain:
         foot = self.corner[:-1] + held[..., None] * self.tangent
         return np.linalg.norm(point[..., None, :] - foot, axis=-1), foot, held != along
 
-    def to_corner(self, point: Array) -> Array:
+    def to_corner(self, point: Array, *, instants: bool = False) -> Array:
         """How near points (T, n, 2) come, by the next row, to a second face of a concave corner.
 
-        Infinite where there is none. The last row is as near as it is.
+        Infinite where there is none. The last row is as near as it is, and so are all where
+        `instants` asks for how near they are.
         """
         distance, _, _ = self._feet(point)
         beside = self._beside(point, distance)
+        if instants:
+            return beside.min(axis=-1)
         second = np.argmin(beside, axis=-1)[..., None]
         now = np.take_along_axis(beside, second, -1)[..., 0]
         then = np.take_along_axis(np.concatenate((distance[1:], distance[-1:])), second, -1)[..., 0]
@@ -85,9 +88,19 @@ class Terrain:
         shortest = np.take_along_axis(distance, nearest[..., None], -1)[..., 0]
         outside = point[..., 1] >= self.height(point[..., 0])
         tied = distance <= shortest[..., None] + TIE
-        return Measurement(
-            self, point, np.where(outside, shortest, -shortest), tied, foot, on_corner
-        )
+        signed = np.where(outside, shortest, -shortest)
+        away = point[..., None, :] - self.corner[:-1]
+        height = np.einsum("...sc,sc->...s", away, self.normal)
+        deepest = np.where(tied, height, np.inf).min(axis=-1)
+        wedged = ~outside & self._concave(tied) & np.all(on_corner | ~tied, axis=-1)
+        signed = np.where(wedged, deepest, signed)
+        return Measurement(self, point, signed, tied, foot, on_corner, wedged)
+
+    def _concave(self, tied: Array) -> Array:
+        """Whether two neighbours among some segments (..., s) make a concave corner."""
+        first, second = self.normal[:-1], self.normal[1:]
+        turns = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] > 1e-9
+        return np.any(tied[..., :-1] & tied[..., 1:] & turns, axis=-1)
 
 
 class Measurement:
@@ -96,7 +109,8 @@ class Measurement:
     Attributes
     ----------
     distance : (...,) float
-        Signed distance (m), negative in the ground.
+        Signed distance (m), negative in the ground. Under both faces of a concave corner it is
+        that to the one that the place is deeper under.
     tied : (..., s) bool
         The segments that are nearest.
     lowest_friction, highest_friction, restitution : (...,) float
@@ -111,9 +125,10 @@ class Measurement:
         tied: Array,
         foot: Array,
         on_corner: Array,
+        wedged: Array,
     ) -> None:
         self.terrain, self.point, self.distance = terrain, point, distance
-        self.tied, self._foot = tied, foot
+        self.tied, self._foot, self._wedged = tied, foot, wedged
         self.lowest_friction = np.where(tied, terrain.friction, np.inf).min(axis=-1)
         self.highest_friction = np.where(tied, terrain.friction, -np.inf).max(axis=-1)
         self.restitution = np.where(tied, terrain.restitution, -np.inf).max(axis=-1)
@@ -129,7 +144,7 @@ class Measurement:
         unit = np.abs(np.linalg.norm(normal, axis=-1) - 1.0)
         to_foot = self.point[..., None, :] - self.distance[..., None, None] * normal[..., None, :]
         miss = np.linalg.norm(to_foot - self._foot, axis=-1)
-        far = np.abs(self.distance)[..., None] > 1e-6
+        far = (np.abs(self.distance) > 1e-6)[..., None] & ~self._wedged[..., None]
         turn = np.linalg.norm(normal[..., None, :] - terrain.normal, axis=-1)
         wrong = np.where(far, miss / np.maximum(np.abs(self.distance)[..., None], 1e-6), turn)
         best = np.where(self.tied, wrong, np.inf).min(axis=-1)

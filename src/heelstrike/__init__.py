@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from heelstrike.analysis.stability.largest import largest_push as largest_push
     from heelstrike.analysis.stability.largest import largest_roughness as largest_roughness
     from heelstrike.analysis.stability.largest import largest_slope as largest_slope
+    from heelstrike.analysis.stability.monodromy import Monodromy as Monodromy
+    from heelstrike.analysis.stability.monodromy import monodromy as monodromy
     from heelstrike.analysis.stability.trial import Trial as Trial
     from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
     from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
@@ -45,11 +47,15 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import array as array
     from heelstrike.compiler.bundle import cell as cell
     from heelstrike.compiler.bundle import number as number
+    from heelstrike.contact import ActiveContacts as ActiveContacts
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
     from heelstrike.contact import contact_forward_dynamics as contact_forward_dynamics
     from heelstrike.contact import contact_inverse_dynamics as contact_inverse_dynamics
     from heelstrike.contact import contact_kinematics as contact_kinematics
+    from heelstrike.contact import linearize_contact as linearize_contact
+    from heelstrike.contact import linearize_impact as linearize_impact
+    from heelstrike.contact import saltation_matrix as saltation_matrix
     from heelstrike.contact import solve_contact as solve_contact
     from heelstrike.contact import solve_lcp as solve_lcp
     from heelstrike.control import Actuated as Actuated
@@ -60,11 +66,15 @@ if TYPE_CHECKING:
     from heelstrike.control import Feedforward as Feedforward
     from heelstrike.control import FootSensors as FootSensors
     from heelstrike.control import FootstepFeedback as FootstepFeedback
+    from heelstrike.control import GaitLQR as GaitLQR
     from heelstrike.control import InertialUnit as InertialUnit
     from heelstrike.control import JointPD as JointPD
     from heelstrike.control import Sensed as Sensed
+    from heelstrike.control import StandingLQR as StandingLQR
+    from heelstrike.control import SteppingConstraints as SteppingConstraints
     from heelstrike.control import VirtualConstraints as VirtualConstraints
     from heelstrike.control import WholeBody as WholeBody
+    from heelstrike.control import ZeroMomentPointRegulation as ZeroMomentPointRegulation
     from heelstrike.control import controller as controller
     from heelstrike.control import solve_quadratic_program as solve_quadratic_program
     from heelstrike.errors import ContactProblemError as ContactProblemError
@@ -81,6 +91,7 @@ if TYPE_CHECKING:
     from heelstrike.experiments.comparison import compare as compare
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PhasedGait as PhasedGait
+    from heelstrike.gait import StepFamily as StepFamily
     from heelstrike.gait import load_gait as load_gait
     from heelstrike.gait import make_invariant as make_invariant
     from heelstrike.gait import optimize_gait as optimize_gait
@@ -116,6 +127,7 @@ __version__ = "0.1.0"
 # Public name -> the package that defines it. The imports above repeat this for type checkers,
 # which cannot follow `__getattr__`; a test keeps the two alike.
 _HOME = {
+    "ActiveContacts": "heelstrike.contact",
     "Actuated": "heelstrike.control",
     "Batch": "heelstrike.sim",
     "Bundle": "heelstrike.compiler.bundle",
@@ -132,6 +144,7 @@ _HOME = {
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
     "Gait": "heelstrike.gait",
+    "GaitLQR": "heelstrike.control",
     "GaitError": "heelstrike.errors",
     "Ground": "heelstrike.contact",
     "HeelstrikeError": "heelstrike.errors",
@@ -143,6 +156,7 @@ _HOME = {
     "Largest": "heelstrike.analysis.stability.largest",
     "LimitCycle": "heelstrike.analysis.limit_cycle",
     "LimitCycleError": "heelstrike.errors",
+    "Monodromy": "heelstrike.analysis.stability.monodromy",
     "PhasedGait": "heelstrike.gait",
     "Push": "heelstrike.sim",
     "Robot": "heelstrike.robot",
@@ -157,7 +171,10 @@ _HOME = {
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
+    "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
+    "StepFamily": "heelstrike.gait",
+    "SteppingConstraints": "heelstrike.control",
     "TimeStepping": "heelstrike.sim",
     "Trial": "heelstrike.analysis.stability.trial",
     "ViewError": "heelstrike.errors",
@@ -165,6 +182,7 @@ _HOME = {
     "WholeBody": "heelstrike.control",
     "WriteError": "heelstrike.errors",
     "ZeroDynamics": "heelstrike.analysis.stability.zero_dynamics",
+    "ZeroMomentPointRegulation": "heelstrike.control",
     "array": "heelstrike.compiler.bundle",
     "builtin_robots": "heelstrike.robot",
     "cell": "heelstrike.compiler.bundle",
@@ -180,14 +198,18 @@ _HOME = {
     "largest_push": "heelstrike.analysis.stability.largest",
     "largest_roughness": "heelstrike.analysis.stability.largest",
     "largest_slope": "heelstrike.analysis.stability.largest",
+    "linearize_contact": "heelstrike.contact",
+    "linearize_impact": "heelstrike.contact",
     "load_gait": "heelstrike.gait",
     "load_robot": "heelstrike.robot",
     "load_run": "heelstrike.sim",
     "load_snapshot": "heelstrike.sim",
     "make_invariant": "heelstrike.gait",
+    "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
     "report": "heelstrike.view.report",
+    "saltation_matrix": "heelstrike.contact",
     "simulate": "heelstrike.sim",
     "simulate_batch": "heelstrike.sim",
     "solve_contact": "heelstrike.contact",

@@ -45,6 +45,8 @@ def test_what_is_no_recovery_is_named() -> None:
     assert "ends at" in recovery(run, pushed=(10.0, 10.1)).reason
     fell = replace(run, status=hs.RunStatus.FELL, message="it fell")
     assert "it fell" in recovery(fell, pushed=PUSHED).reason
+    # A gait may lean all the time.
+    assert recovery(replace(run, position=run.position - 0.7 * pitch), pushed=PUSHED)
     # What was before the push does not count.
     early = replace(run, position=run.position - 0.05 * (run.time < 0.2)[:, None] * z)
     assert recovery(early, pushed=PUSHED)

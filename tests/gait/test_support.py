@@ -11,6 +11,7 @@ from gait_motion import contact_rates, foot_jacobian, place, selection, standing
 
 import heelstrike as hs
 from heelstrike import dynamics
+from heelstrike.dynamics.queries.following import drive_of
 from heelstrike.dynamics.queries.symbolic import expression, symbols
 from heelstrike.gait.sole import sole
 from heelstrike.gait.support import Impact, Support
@@ -37,7 +38,7 @@ def evaluated(robot: hs.Robot, *motion: np.ndarray) -> Evaluated:
     names = ("position", "velocity", "acceleration", "velocity_after")
     inputs = [casadi.SX.sym(name, robot.nv - 3) for name in names]
     q, v, a, after = (symbols(part) for part in inputs)
-    support = Support(robot, sole(robot, 0), q, v, a)
+    support = Support(robot, sole(robot, 0), drive_of(robot), q, v, a)
     impact = Impact(support, sole(robot, 1), after)
     function = casadi.Function(
         "evaluate",

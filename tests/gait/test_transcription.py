@@ -129,7 +129,10 @@ def test_motion_that_is_reported(robot: hs.Robot, program: Program, seed: int) -
     unknowns, gait = a_step(seed)
     now = instant(robot, gait, 0.4 * 0.6)  # type: ignore[arg-type]
     transcription, motion = program.transcription, program.motion(unknowns, at_phase(0.4))
-    wrench, torque, heights = (np.array(part).ravel() for part in transcription.motion(*motion))
+    wrench, torque, heights, joints = (
+        np.array(part).ravel() for part in transcription.motion(*motion)
+    )
+    np.testing.assert_allclose(joints, now.q[3:], atol=1e-12)
     scale = np.abs(now.wrench).max()
     np.testing.assert_allclose(wrench, now.wrench, atol=1e-9 * scale)
     np.testing.assert_allclose(torque, now.torque, atol=1e-9 * scale)

@@ -22,7 +22,7 @@ from heelstrike.robot import (
     inspect_robot,
     load_robot,
 )
-from heelstrike.robot.model import NUMBERS, PROPERTIES, label
+from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, label
 from heelstrike.sim.files.robot_dataset import robot_to_dataset, stored_robot
 
 DERIVED = {"limits", "torque", "gear", "motor_inertia"}  # what several numbers are made of
@@ -119,3 +119,15 @@ def test_a_number_has_its_bounds_and_its_place_in_an_inspection(name: str) -> No
     if number.alike:
         with pytest.warns(RobotWarning, match=f"{label(name)} of right_hip and left_hip"):
             assert built(**{key: value}, left={}).mirror is None
+
+
+@pytest.mark.parametrize("name", SCALES)
+def test_a_file_that_is_older_than_scales_means_the_ground_alone(name: str) -> None:
+    build = RobotBuilder("ball")
+    build.contact(build.floating_base("ball", mass=1.0, inertia=0.1), (0, 0), **{name: 0.5})
+    held = contents(build.build())
+    assert getattr(stored_robot(held).model, name) == [0.5]
+    with pytest.raises(ValueError, match=f"{name} must lie between 0 and"):
+        stored_robot({**held, name: np.array([-0.5])})
+    del held[name]
+    assert getattr(stored_robot(held).model, name) == [1.0]

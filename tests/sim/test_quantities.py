@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mechanisms import four_bar, geared
+from mechanisms import braked, four_bar, geared
 from stored_files import run_file
 from synthetic_runs import box, make_run
 
@@ -95,7 +95,9 @@ def test_every_quantity_is_documented_and_has_its_dimensions(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in QUANTITIES if name != "torque"])
 def test_every_quantity_is_drawn_by_its_name(name: str) -> None:
-    robot = {"loop_force": four_bar, "coupling_force": geared}.get(name, box)()
+    robot = {"loop_force": four_bar, "coupling_force": geared, "brake_torque": braked}.get(
+        name, box
+    )()
     run = make_run(robot, [0.0, 0.5, 1.0])
     getattr(run, name)[...] = np.arange(getattr(run, name).size).reshape(getattr(run, name).shape)
     figure = run.plot(name, span=(0.5, 1.0))

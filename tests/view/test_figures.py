@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import subprocess
 import sys
 from itertools import pairwise
@@ -313,3 +314,10 @@ def test_point_feet_and_walkers_without_motors() -> None:
     assert labels == ["point 0"]
     works = panel(plot(run, "energy"), "work since the start")
     assert "actuators" not in [line.get_label() for line in works.get_lines()]
+
+
+def test_a_dollar_in_a_name_is_a_dollar(tmp_path: Path) -> None:
+    """Read as a formula, such a name would keep the figure from being drawn."""
+    robot = dataclasses.replace(box(), name=r"$\frac$ of a_b^c")
+    plot(make_run(robot, np.linspace(0.0, 1.0, 5)), "gaps", path=tmp_path / "box.svg")
+    assert r"$\frac$ of a_b^c" in (tmp_path / "box.svg").read_text()

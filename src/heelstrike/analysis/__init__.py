@@ -14,6 +14,7 @@ from heelstrike.analysis.motion import Motion, run_motion
 from heelstrike.analysis.penetration import penetration
 from heelstrike.analysis.recovery import Recovery, recovery
 from heelstrike.analysis.slip import max_slip, slip_distance
+from heelstrike.analysis.stability.monodromy import Saltation
 from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics, zero_dynamics
 from heelstrike.analysis.summary import Summary, summarize
 from heelstrike.analysis.support import (
@@ -48,6 +49,7 @@ __all__ = [
     "Motion",
     "Recovery",
     "ReferenceMotion",
+    "Saltation",
     "Sole",
     "Stance",
     "Summary",

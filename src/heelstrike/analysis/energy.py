@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.actuation import actuator_power
 from heelstrike.analysis.intervals import (
+    brake_impulse,
     event_impulse,
     impulses_in_events,
     mean_over_intervals,
@@ -41,6 +42,8 @@ class EnergyBalance:
         Work of the joint stops, of which the same is true.
     dry_friction : (nt,) float
         Work of dry friction in the joints, never positive in exact motion.
+    brakes : (nt,) float
+        Work of the brakes, never positive in exact motion.
     pushes : (nt,) float
         Work of the pushes.
     """
@@ -53,6 +56,7 @@ class EnergyBalance:
     contacts: Floats
     stops: Floats
     dry_friction: Floats
+    brakes: Floats
     pushes: Floats
 
     @property
@@ -65,7 +69,7 @@ class EnergyBalance:
         """Change of energy that no work explains, (nt,), in J: the error of the time method."""
         gained = self.total - self.total[:1]
         known = self.actuators + self.dampers + self.contacts + self.stops
-        return gained - known - self.dry_friction - self.pushes
+        return gained - known - self.dry_friction - self.brakes - self.pushes
 
 
 def energy_balance(run: Run) -> EnergyBalance:
@@ -102,6 +106,8 @@ def energy_balance(run: Run) -> EnergyBalance:
     stop_work = mean_over_intervals(run, run.stop_torque) * held[:, None] + stop_impulse(run)
     damper_power = -(mean * mean_over_intervals(run, run.velocity)) @ model.damping
 
+    brake_work = mean_over_intervals(run, run.brake_torque) * held[:, None] + brake_impulse(run)
+
     def summed(work: Floats) -> Floats:
         return np.concatenate(([0.0], np.cumsum(work)))[: len(run.time)]
 
@@ -116,6 +122,7 @@ def energy_balance(run: Run) -> EnergyBalance:
         dry_friction=summed(
             (mean_over_intervals(run, run.friction_torque) * mean).sum(axis=1) * held
         ),
+        brakes=summed((brake_work * mean[:, model.brake_joint]).sum(axis=1)),
         pushes=summed(_push_work(run, mean)),
     )
 

@@ -66,11 +66,12 @@ def friction_use(run: Run) -> FrictionUse:
 
 
 def friction_coefficient(run: Run) -> Floats:
-    """Friction coefficient of the ground under every contact point, (nt, nc)."""
+    """Friction coefficient between the ground and every contact point, (nt, nc)."""
     ground = run.ground.model()
     corners = ground.vertices[:, 0]
     segment = np.searchsorted(corners, run.contact_point[..., 0], side="right") - 1
-    return np.asarray(ground.friction[np.clip(segment, 0, len(ground.friction) - 1)])
+    below: Floats = ground.friction[np.clip(segment, 0, len(ground.friction) - 1)]
+    return below * run.robot.model.friction_scale
 
 
 def _share(tangential: Floats, allowed: Floats, pressing: Floats, *, floor: float) -> Floats:

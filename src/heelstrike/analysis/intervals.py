@@ -65,6 +65,15 @@ def stop_impulse(run: Run) -> Floats:
     return impulse
 
 
+def brake_impulse(run: Run) -> Floats:
+    """Impulse of brakes that take hold, that only the events know, (nt − 1, brakes), in N m s."""
+    brakes = run.robot.model.brake_joint.tolist()
+    impulse = np.zeros((max(len(run.time) - 1, 0), len(brakes)))
+    for row, event in _jumps(run, (EventKind.JOINT_BRAKE,)):
+        impulse[row, brakes.index(event.contact)] += event.impulse[0]
+    return impulse
+
+
 def _jumps(run: Run, kinds: Sequence[EventKind]) -> Iterator[tuple[int, Event]]:
     """Events of some kinds that alone know their impulse, each with the interval of its jump."""
     if impulses_in_events(run) and len(run.time) > 1:

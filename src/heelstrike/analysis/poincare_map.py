@@ -143,7 +143,7 @@ class Chart:
         _, singular, directions = np.linalg.svd(gradient)
         rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
         self._normal = directions[:rank].T
-        self._tangent = directions[rank:].T
+        self.tangent = directions[rank:].T
         self._correction = self._normal @ np.linalg.pinv(
             gradient @ self._normal, rcond=RANK_TOLERANCE
         )
@@ -151,7 +151,7 @@ class Chart:
     @property
     def size(self) -> int:
         """Number of coordinates."""
-        return int(self._tangent.shape[1])
+        return int(self.tangent.shape[1])
 
     def _equations(self, x: Floats) -> Floats:
         """What vanishes on the section."""
@@ -167,7 +167,7 @@ class Chart:
 
     def state(self, coordinates: Floats) -> State:
         """Return the state on the section that has the coordinates."""
-        x = self._origin + self._tangent @ coordinates
+        x = self._origin + self.tangent @ coordinates
         for _ in range(20):
             change = self._correction @ self._equations(x)
             x = x - change
@@ -186,7 +186,7 @@ class Chart:
                 "the contact points that stand after the step are not those that stood before it "
                 f"({off:.3g} m or m/s between the two)"
             )
-        coordinates: Floats = (x - self._origin) @ self._tangent
+        coordinates: Floats = (x - self._origin) @ self.tangent
         return coordinates
 
 
@@ -194,13 +194,15 @@ class Chart:
 class Landing:
     """The end of a step: the state on the section, the time it took (s), its length (m).
 
-    And what the controller remembers of it, as far as that is carried on.
+    And what the controller remembers of it, as far as that is carried on, and the contact point
+    that landed last.
     """
 
     state: State
     time: float
     length: float
     memory: Floats
+    contact: int
 
 
 @dataclass(frozen=True)
@@ -296,15 +298,15 @@ class PoincareMap:
             self._feet = [frozenset(foot.contacts) for foot in robot.feet]
         else:
             self._feet = [frozenset((i,)) for i in range(robot.nc)]
-        self._relabelled: Callable[[State, int], State]
+        self.relabelled: Callable[[State, int], State]
         if symmetry is not None:
-            self._relabelled = lambda state, _: symmetry(state)
+            self.relabelled = lambda state, _: symmetry(state)
         elif landing is not None:
-            self._relabelled = lambda state, _: state
+            self.relabelled = lambda state, _: state
         elif (mirror := robot.mirror) is not None:
-            self._relabelled = lambda state, _: mirror.state(state)
+            self.relabelled = lambda state, _: mirror.state(state)
         elif is_wheel(robot):
-            self._relabelled = lambda state, contact: turned(robot, state, contact)
+            self.relabelled = lambda state, contact: turned(robot, state, contact)
         else:
             raise SimulationError(
                 f"robot {robot.name!r} has no mirror image: say which contact points complete a "
@@ -327,7 +329,7 @@ class PoincareMap:
         """
         run, time, contact = self._walk(state, memory)
         row = np.flatnonzero(run.time <= time + SAME_INSTANT)[-1]
-        after = self._relabelled(State(run.position[row], run.velocity[row]), contact)
+        after = self.relabelled(State(run.position[row], run.velocity[row]), contact)
         after, end = self._section.moved_back(after)
         _, begin = self._section.moved_back(state)
         left = np.zeros(0)
@@ -337,7 +339,7 @@ class PoincareMap:
             if self._carried.relabelled is not None:
                 self._carried.relabelled(again.memory, time)
             left = self._carried.of(again)
-        return Landing(after, time, abs(end - begin), left)
+        return Landing(after, time, abs(end - begin), left, contact)
 
     def _simulation(self, state: State, memory: Floats | None) -> Simulation:
         """Begin a step."""

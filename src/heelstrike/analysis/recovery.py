@@ -38,7 +38,8 @@ class Recovery:
     hip : float
         Lowest height of the hip above the ground from the push on, as a part of that before it.
     pitch : float
-        Largest angle of the trunk from the push on, without its sign, in rad.
+        Largest angle of the trunk from the push on, from the mean before it, without its sign, in
+        rad.
     speed, normal_speed : float
         Forward speed of the centre of mass when it is judged, and before the push, in m/s; the
         former is NaN of a run that does not last.
@@ -89,7 +90,8 @@ def recovery(
         Least height of the hip, the mean of the legs' first joints, above the ground below it, as
         a part of the mean before the disturbance.
     pitch : float
-        Largest angle of the trunk, in rad.
+        Largest angle of the trunk, in rad, from how it leant on average before the disturbance
+        (from upright if there is no time before): a gait may lean all the time.
     speed : float
         Largest difference of the speed to the normal one, as a part of it; less than 0.05 m/s is
         none.
@@ -117,7 +119,8 @@ def recovery(
     usual = float(np.mean(height[before])) if before.any() else float(height[0])
     judged = end + after
     lowest = float(np.min(height[from_then], initial=np.inf)) / usual
-    largest = float(np.max(angle[from_then], initial=0.0))
+    leant = float(np.mean(angle[before])) if before.any() else 0.0
+    largest = float(np.max(np.abs(angle[from_then] - leant), initial=0.0))
     normal = _speed(run, motion, begin, -np.inf) if normal_speed is None else normal_speed
     lasted = run.completed and run.time[-1] >= judged - 1e-6
     now = _speed(run, motion, judged, end) if lasted else float("nan")
@@ -161,15 +164,14 @@ def _hips(run: Run) -> list[int]:
 
 def _hip_height(run: Run, motion: Motion) -> Floats:
     place = motion.link_origin[:, _hips(run)].mean(axis=1)
-    below = np.array([float(run.ground.height(x)) for x in place[:, 0]])
-    height: Floats = place[:, 1] - below
+    height: Floats = place[:, 1] - run.ground.height(place[:, 0])
     return height
 
 
 def _trunk_angle(run: Run, motion: Motion) -> Floats:
     first = _hips(run)[0]
     trunk = int(run.robot.model.parent[first])
-    angle: Floats = np.abs(motion.link_angle[:, trunk if trunk >= 0 else first])
+    angle: Floats = motion.link_angle[:, trunk if trunk >= 0 else first]
     return angle
 
 

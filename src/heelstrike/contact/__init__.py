@@ -15,8 +15,17 @@ from heelstrike.contact.queries.inverse_dynamics import (
     contact_inverse_dynamics,
 )
 from heelstrike.contact.queries.kinematics import ContactKinematics, contact_kinematics
+from heelstrike.contact.queries.linearization import (
+    ActiveContacts,
+    ImpactLinearization,
+    PhaseLinearization,
+    linearize_contact,
+    linearize_impact,
+    saltation_matrix,
+)
 
 __all__ = [
+    "ActiveContacts",
     "Certificate",
     "ContactForwardDynamics",
     "ContactInverseDynamics",
@@ -25,12 +34,17 @@ __all__ = [
     "ContactSolution",
     "ForceDistribution",
     "Ground",
+    "ImpactLinearization",
     "LcpSolution",
+    "PhaseLinearization",
     "SolveStatus",
     "Solver",
     "contact_forward_dynamics",
     "contact_inverse_dynamics",
     "contact_kinematics",
+    "linearize_contact",
+    "linearize_impact",
+    "saltation_matrix",
     "solve_contact",
     "solve_lcp",
 ]

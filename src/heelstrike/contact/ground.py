@@ -374,7 +374,11 @@ def profile_contact(
 def nearest_segment(
     ground: GroundModel, x: float, z: float, radius: float, normal: Floats
 ) -> tuple[float, int]:
-    """Gap between a disc and the nearest feature of the ground, and the segment it is of."""
+    """Gap between a disc and the nearest feature of the ground, and the segment it is of.
+
+    Of a place in the ground that is nearest to a concave corner it is the face that it is deeper
+    under: there are two ways to go, and no face whose normal points from it to the corner.
+    """
     below = segment_below(ground, x)
     distance = line_contact(ground, below, x, z, normal)
     segments = ground.friction.shape[0]
@@ -386,6 +390,7 @@ def nearest_segment(
         first -= 1
     nearest = np.inf
     owner = below
+    corner = 0
     for segment in range(first, segments):
         ax = ground.vertices[segment, 0]
         az = ground.vertices[segment, 1]
@@ -403,6 +408,7 @@ def nearest_segment(
         if squared < nearest:
             nearest = squared
             owner = segment
+            corner = (segment if along == 0.0 else segment + 1) if on_corner else 0
             separation = np.sqrt(squared)
             if on_corner and separation > 1e-12:
                 sign = -1.0 if inside else 1.0
@@ -410,6 +416,13 @@ def nearest_segment(
                 normal[1] = sign * dz / separation
             else:
                 line_contact(ground, segment, x, z, normal)
+    if inside and corner > 0 and turn_at(ground, corner) > FLAT:
+        right = line_contact(ground, corner, x, z, normal)
+        left = line_contact(ground, corner - 1, x, z, normal)
+        if right < left:
+            left = line_contact(ground, corner, x, z, normal)
+            corner += 1
+        return left - radius, corner - 1
     separation = np.sqrt(nearest)
     return (-separation if inside else separation) - radius, owner
 

@@ -4,12 +4,16 @@ from heelstrike.control.actuation import Actuated
 from heelstrike.control.balance.controllers import FootstepFeedback, WholeBody
 from heelstrike.control.computed_torque import ComputedTorque, Encoder
 from heelstrike.control.estimation import Estimated
+from heelstrike.control.gait_lqr.law import GaitLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
 from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
 from heelstrike.control.quadratic.solution import QuadraticSolution, solve_quadratic_program
+from heelstrike.control.regulation.controller import ZeroMomentPointRegulation
 from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sensed
+from heelstrike.control.standing_lqr import StandingLQR
+from heelstrike.control.stepping_constraints import SteppingConstraints
 from heelstrike.control.virtual_constraints import VirtualConstraints
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
@@ -26,6 +30,7 @@ __all__ = [
     "Feedforward",
     "FootSensors",
     "FootstepFeedback",
+    "GaitLQR",
     "InertialUnit",
     "JointPD",
     "Law",
@@ -33,8 +38,11 @@ __all__ = [
     "Program",
     "QuadraticSolution",
     "Sensed",
+    "StandingLQR",
+    "SteppingConstraints",
     "VirtualConstraints",
     "WholeBody",
+    "ZeroMomentPointRegulation",
     "controller",
     "preview_control",
     "solve_or_relax",

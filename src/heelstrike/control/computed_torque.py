@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
@@ -17,6 +18,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.places import place_of, velocity_at
+from heelstrike.dynamics.queries.loops import loop_jacobian
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
@@ -30,6 +32,9 @@ from heelstrike.sim.controller.stance import hold_still
 
 # A point of the swing foot that comes down more slowly than this (m/s) has landed.
 LANDED_SPEED = 1e-3
+
+UNREACHED = 1e-9
+"""Share of a joint in a motion that counts as none."""
 
 READINGS = 4
 """Samples of an encoder that a velocity is estimated from."""
@@ -343,7 +348,8 @@ class ComputedTorque(Law):
     Parameters
     ----------
     robot : Robot
-        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated.
+        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated, or
+        driven by such through closed loops and couplings.
     gait : Gait
         The gait to follow.
     kp, kd : float or (nu,) array
@@ -366,8 +372,13 @@ class ComputedTorque(Law):
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
-        refuse_loops(robot, "computed torque", ControllerError)
+        refuse_loops(robot, "computed torque", ControllerError, loops=False)
         pitch = pitch_of(robot)
+        if encoder is not None and robot.model.loops + robot.model.couplings:
+            raise ControllerError(
+                "encoders of motors alone do not tell where joints are that follow by closed loops "
+                "or couplings; leave encoder out"
+            )
         try:
             gait.check_joints(robot)
         except GaitError as error:
@@ -406,13 +417,32 @@ def pitch_of(robot: Robot) -> int:
             f"computed torque needs a floating robot with two mirrored feet; "
             f"robot {robot.name!r} is not one"
         )
-    if len(unactuated) != 3:
+    if model.loops + model.couplings:
+        _check_reach(robot)
+    elif len(unactuated) != 3:
         names = ", ".join(robot.joint_names[j] for j in unactuated)
         raise ControllerError(
             f"computed torque on a flat foot needs every joint but the trunk's x, z and pitch "
             f"actuated; robot {robot.name!r} leaves {names} without a motor"
         )
     return next(j for j in unactuated if model.axis[j, 0])
+
+
+def _check_reach(robot: Robot) -> None:
+    """Refuse a robot of which closed loops and motors leave joints free."""
+    joints = np.arange(3, robot.nv)
+    at = robot.closed(robot.reference_state())
+    motors = np.eye(robot.nv)[robot.model.actuator_joint]
+    told = np.concatenate([loop_jacobian(robot, at.q), motors])[:, joints]
+    free = scipy.linalg.null_space(told, rcond=UNREACHED)
+    if free.size:
+        names = ", ".join(
+            robot.joint_names[j] for j in joints[np.abs(free).max(axis=1) > UNREACHED]
+        )
+        raise ControllerError(
+            f"computed torque needs motors that reach every joint, by closed loops or couplings if "
+            f"not their own; in robot {robot.name!r} nothing drives {names}"
+        )
 
 
 def _check_points(robot: Robot, encoder: Encoder | None) -> None:

@@ -183,15 +183,12 @@ def want(
             memory.wanted[k] += joints[k, i] * law
 
 
-@controller
-def virtual_constraints(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory, torque: Floats,
-) -> None:  # fmt: skip
-    """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
-    exchange_at_touchdown(state, contacts, robot, parameters, memory)
-    want(state, robot, parameters, memory)
-    foot, columns, wanted = memory.stance, robot.columns, robot.acceleration
+@kernel
+def hold_foot(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, phase: Floats, foot: int
+) -> tuple[Spatial, tuple[float, float]]:
+    """Write `robot.columns` of a point foot; return what turns about it, and its drift J̇v."""
+    columns, drift = robot.columns, robot.other
     contact = robot.foot_contact[foot]
     link, place = robot.model.contact_link[contact], contacts.position[contact]
     point_columns(robot.model, state.kinematics, link, place, columns)
@@ -201,23 +198,44 @@ def virtual_constraints(
     )
     # In the place of the rotation, which nothing holds: the phase.
     for j in range(robot.nv):
-        columns[j, 2] = parameters.phase[foot, j]
-    drift, along = robot.other, robot.passive  # both are written anew below
+        columns[j, 2] = phase[foot, j]
     point_bias_acceleration(state.kinematics, link, place, drift)
-    complete(robot, (-drift[0], -drift[1], 0.0), memory.wanted, wanted)
+    return turning, (drift[0], drift[1])
 
+
+@kernel
+def demand(
+    state: ControlState, robot: ControlledRobot, turning: Spatial, drift: tuple[float, float],
+    accelerations: Floats, slope: Floats,
+) -> None:  # fmt: skip
+    """Write `robot.force` that gives the joints the accelerations + θ̈ slope, the foot held."""
+    wanted, force, other = robot.acceleration, robot.force, robot.other
+    along = robot.passive  # it is written anew below
+    complete(robot, (-drift[0], -drift[1], 0.0), accelerations, wanted)
     # The moment about the foot at θ̈ = 0, and at θ̈ = 1; it is linear in θ̈.
-    force, other = robot.force, robot.other
     force_wanted(robot, state, force)
-    complete(robot, (0.0, 0.0, 1.0), memory.slope, along)
+    complete(robot, (0.0, 0.0, 1.0), slope, along)
     for j in range(robot.nv):
         wanted[j] += along[j]
     force_wanted(robot, state, other)
+    a, b, c = robot.unactuated[0], robot.unactuated[1], robot.unactuated[2]
     missing = turning[0] * force[a] + turning[1] * force[b] + turning[2] * force[c]
     with_phase = turning[0] * other[a] + turning[1] * other[b] + turning[2] * other[c]
     share = -missing / (with_phase - missing)
     for j in range(robot.nv):
         force[j] += share * (other[j] - force[j])
+
+
+@controller
+def virtual_constraints(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory, torque: Floats,
+) -> None:  # fmt: skip
+    """Joint torques that make the outputs obey ÿ = u(y, ẏ) on a point foot."""
+    exchange_at_touchdown(state, contacts, robot, parameters, memory)
+    want(state, robot, parameters, memory)
+    turning, drift = hold_foot(state, contacts, robot, parameters.phase, memory.stance)
+    demand(state, robot, turning, drift, memory.wanted, memory.slope)
     joint_torques(robot, torque)
 
 
@@ -274,8 +292,8 @@ class VirtualConstraints(Law):
         mirrored = matrix @ gait.joint_mirror()
         both = [matrix, mirrored] if gait.stance_foot == 0 else [mirrored, matrix]
         parameters = Parameters(
-            kp=_gains("kp", kp, robot),
-            kd=_gains("kd", kd, robot),
+            kp=gains_of("kp", kp, robot),
+            kd=gains_of("kd", kd, robot),
             epsilon=0.0 if finite_time is None else float(finite_time),
             exponent=float(exponent),
             phase=phase,
@@ -291,7 +309,8 @@ class VirtualConstraints(Law):
         self.gait = gait
 
 
-def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+def gains_of(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
+    """Return gains of each actuator, (nu,), that are not negative."""
     gains = per_actuator(name, value, robot)
     if np.any(gains < 0.0):
         raise ControllerError(f"{name} must not be negative, got {value!r}")

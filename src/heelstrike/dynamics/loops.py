@@ -48,6 +48,11 @@ def count_rows(model: Model) -> int:
     return 2 * model.loops + model.couplings
 
 
+def most_rows(model: Model) -> int:
+    """How many equations there are in a simulation while all brakes are on."""
+    return count_rows(model) + model.brakes
+
+
 @kernel
 def find_rows(model: Model, q: Floats, v: Floats, work: Workspace, rows: LoopRows) -> None:
     """Write displacements, Jacobian and bias of a state whose kinematics and velocities are in."""

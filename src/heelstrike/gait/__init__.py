@@ -5,6 +5,7 @@ from heelstrike.gait.file import load_gait
 from heelstrike.gait.gait import Footing, Gait, Phase
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.optimize import optimize_gait
+from heelstrike.gait.phased.family import StepFamily
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.surface import Touchdown, make_invariant
 
@@ -15,6 +16,7 @@ __all__ = [
     "Margins",
     "Phase",
     "PhasedGait",
+    "StepFamily",
     "Touchdown",
     "load_gait",
     "make_invariant",

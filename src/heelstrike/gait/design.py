@@ -71,7 +71,7 @@ def designed_gait(program: Program, unknowns: Floats) -> Gait:
     phase = Phase(
         contacts={stance.foot: Footing.FLAT if stance.flat else Footing.POINT},
         breakpoints=float(duration) * np.linspace(0.0, 1.0, len(pieces) + 1),
-        pieces=pieces[:, :, joint - stance.held],
+        pieces=pieces[:, :, [transcription.free.index(j) for j in joint]],
         pitch_pieces=None if stance.flat else pieces[:, :, 0],
     )
     legs = request.mirror.among(joint)
@@ -100,14 +100,13 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
     model = request.robot.model
     fine = checked_instants(program)
     motion = program.motion(unknowns, fine)
-    wrench, torque, heights = (
+    wrench, torque, heights, position = (
         np.array(part) for part in transcription.motion.map(fine.share.size)(*motion)
     )
-    position = motion[0][-request.robot.nu :]
     half = request.stance.half_length
     actuator = np.argsort(model.actuator_joint)
     velocity = np.zeros((fine.share.size, model.nv))
-    velocity[:, 3:] = motion[1][-request.robot.nu :].T
+    velocity[:, request.drive.driven] = motion[1][-request.robot.nu :].T
     lower, upper = (ends[:, actuator].T for ends in torque_range(model, velocity))
     limits = np.minimum(upper - torque, torque - lower)
     ranges = np.minimum(request.upper[3:, None] - position, position - request.lower[3:, None])
@@ -119,14 +118,14 @@ def margins_of(program: Program, unknowns: Floats) -> Margins:
     periodic = (groups == Group.IMPACT) | (groups == Group.PERIODIC)
     return Margins(
         normal_force=float(wrench[1].min()),
-        friction_use=_use(wrench, request.friction),
+        friction_use=_use(wrench, request.cone),
         zero_moment_point=_inside(wrench, half),
         clearance=float((heights - program.clearance(fine)).min()),
         joint_range=float(ranges.min()),
         torque=float(limits.min()),
         peak_torque=float(np.abs(torque).max()),
         impulse=float(impulse[1]) if request.impact else 0.0,
-        impulse_friction_use=_use(impulse, request.friction) if request.impact else 0.0,
+        impulse_friction_use=_use(impulse, request.cone) if request.impact else 0.0,
         impulse_center=_inside(impulse, half) if request.impact else half,
         landing_velocity=float(landing.max()),
         lift_velocity=float(lift.min()),

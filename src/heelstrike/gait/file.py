@@ -107,7 +107,9 @@ def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
 
 def _gait(entries: Entries) -> Gait:
     joints = entries.names("joints")
-    nu, size = len(joints), len(joints) + 3
+    nu, given = len(joints), entries.data.get("initial_position")
+    # More than trunk and motors where joints follow by closed loops.
+    size = max(nu + 3, len(given) if isinstance(given, list) else 0)
     values: dict[str, Any] = {
         name: entries.numbers(key, *(length or nu for length in shape)).tolist()
         for key, (name, shape) in _NUMBERS.items()

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.errors import GaitError, InfeasibleGaitError
+from heelstrike.dynamics.queries.following import Drive, drive_of
+from heelstrike.errors import GaitError, InfeasibleGaitError, RobotError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.sole import reach, sole, standing_height
 from heelstrike.robot.loops import refuse_loops
@@ -58,6 +59,8 @@ class Request:
     ----------
     mirror : Mirror
         The robot's exchange of left and right.
+    drive : Drive
+        Which joints have motors, and which follow from these by closed loops and couplings.
     stance, swing : Sole
         The feet in the first step.
     height : float
@@ -95,8 +98,8 @@ class Request:
 
     def __post_init__(self) -> None:
         robot = self.robot
-        refuse_loops(robot, "gait design", GaitError)
-        self.mirror = _mirror_of(robot)
+        refuse_loops(robot, "gait design", GaitError, loops=False)
+        self.mirror, self.drive = _mirror_of(robot), _drive_of(robot)
         self.lower, self.upper = ranges_kept(robot, self.mirror, self.joint_ranges)
         self.stance, self.swing = sole(robot, STANCE_FOOT), sole(robot, 1 - STANCE_FOOT)
         self.height = standing_height(robot, self.stance)
@@ -176,6 +179,12 @@ class Request:
             )
 
     @property
+    def cone(self) -> float:
+        """Coefficient of friction under the feet: that of the ground, as their points scale it."""
+        under = [i for foot in self.robot.feet for i in foot.contacts]
+        return self.friction * float(self.robot.model.friction_scale[under].min())
+
+    @property
     def pendulum_time(self) -> float:
         """Time scale sqrt(height / gravity), in s."""
         return float(np.sqrt(self.height / np.hypot(*self.robot.model.gravity)))
@@ -236,21 +245,35 @@ def _mirror_of(robot: Robot) -> Mirror:
         )
     if np.any(mirror.joint[:3] != np.arange(3)) or np.any(mirror.sign[:3] != 1.0):
         raise GaitError(f"{name}: the mirror image must leave the trunk's coordinates alone.")
-    driven = np.sort(robot.model.actuator_joint).tolist()
-    if driven != list(range(3, robot.nv)):
-        passive = [robot.joint_names[j] for j in range(3, robot.nv) if j not in driven]
-        trunk = [robot.joint_names[j] for j in driven if j < 3]
-        raise GaitError(
-            f"{name}: the optimiser needs a motor at every joint and none at the trunk; "
-            + (f"without one: {', '.join(passive)}. " if passive else "")
-            + (f"driven although of the trunk: {', '.join(trunk)}." if trunk else "")
-        )
     if not np.hypot(*robot.model.gravity) > 0.0 or robot.model.gravity[0] != 0.0:
         raise GaitError(
             f"{name}: gravity is {robot.model.gravity} m/s²; a gait on level ground needs it "
             "to point down."
         )
     return mirror
+
+
+def _drive_of(robot: Robot) -> Drive:
+    """Return which joints have motors and which follow from them, or refuse a robot."""
+    name, model = f"robot {robot.name!r}", robot.model
+    driven = np.sort(model.actuator_joint).tolist()
+    passive = [robot.joint_names[j] for j in range(3, robot.nv) if j not in driven]
+    trunk = [robot.joint_names[j] for j in driven if j < 3]
+    tree = not model.loops + model.couplings
+    if trunk or (tree and driven != list(range(3, robot.nv))):
+        raise GaitError(
+            f"{name}: the optimiser needs a motor at every joint and none at the trunk; "
+            + (f"without one: {', '.join(passive)}. " if passive else "")
+            + (f"driven although of the trunk: {', '.join(trunk)}." if trunk else "")
+        )
+    if np.any(model.loop_link < 0):
+        raise GaitError(f"{name}: a closed loop ties it to the world, so that it cannot walk.")
+    try:
+        return drive_of(robot)
+    except RobotError as error:
+        raise GaitError(f"{error} A gait needs one motor for each way in which joints move.") from (
+            None
+        )
 
 
 def ranges_kept(robot: Robot, mirror: Mirror, asked: JointRanges | None) -> tuple[Floats, Floats]:

@@ -10,6 +10,7 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, symbols
 from heelstrike.gait.request import Request
 from heelstrike.gait.sole import leg
@@ -64,7 +65,8 @@ def starts(request: Request) -> Iterator[Start]:
     Each goes from the mirror image of a posture with both feet on the ground, through one with the
     swing foot passing the stance foot, to that posture.
     """
-    length, duration, held = *typical_step(request), request.stance.held
+    length, duration = typical_step(request)
+    free = [*range(request.stance.held, 3), *request.drive.driven]
     kinematics = _Kinematics(request)
     bends = (1.0, -1.0) if kinematics.bend_is_free else (1.0,)
     for bend, lean, height in product(bends, LEANS, HEIGHTS):
@@ -74,7 +76,7 @@ def starts(request: Request) -> Iterator[Start]:
         end = kinematics.posture((length, 0.0), (0.5 * length, low, lean), bend)
         middle = kinematics.posture((0.0, lift), (0.0, legs, lean), bend)
         begin = request.mirror.position(end)
-        yield Start(begin[held:], middle[held:], end[held:], duration, length)
+        yield Start(begin[free], middle[free], end[free], duration, length)
 
 
 def typical_step(request: Request) -> tuple[float, float]:
@@ -107,6 +109,7 @@ class _Kinematics:
             turned = dynamics.work.angle[foot.link] - foot.angle
             places += [x, z - foot.radius, turned][: foot.held]
         places += [*dynamics.work.origin[2], dynamics.work.angle[2]]
+        places += [*dynamics.loop_displacement()]
         places_vector = casadi.vertcat(*places)
         self._places = casadi.Function(
             "places", [q], [places_vector, casadi.jacobian(places_vector, q)]
@@ -138,7 +141,8 @@ class _Kinematics:
             Sense (+1, -1) in which joints inside a leg are bent at first if they may both ways.
         """
         level = [0.0][: self._request.stance.held - 2]  # a flat foot's angle
-        target = np.array([0.0, 0.0, *level, *swing, *level, *trunk])
+        closed = [0.0] * count_rows(self._request.robot.model)
+        target = np.array([0.0, 0.0, *level, *swing, *level, *trunk, *closed])
         q = self._bent(bend)
         for _ in range(SWEEPS):
             value, jacobian = (np.array(part) for part in self._places(q))

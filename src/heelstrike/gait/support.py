@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.dynamics import kernels
+from heelstrike.dynamics.queries.following import Drive, Joints
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, traced
 from heelstrike.gait.sole import Sole, leg
 from heelstrike.robot.robot import Robot
@@ -35,8 +36,11 @@ class Support:
         A floating robot whose joints are all actuated.
     sole : Sole
         The stance foot; the middle of its sole, or its point of contact, is the origin.
+    drive : Drive
+        Its joints: which have motors, and which follow from these.
     position, velocity, acceleration : (n,) object arrays
-        Symbolic motion of the n = nv - `sole.held` coordinates that the foot leaves free.
+        Symbolic motion of the n coordinates that foot and loops leave free: on a point foot the
+        trunk's pitch, and the driven joints.
 
     Attributes
     ----------
@@ -48,21 +52,25 @@ class Support:
     missing : (3 - sole.held,) object array
         Moment (N m) missing in the equation of the trunk's pitch, on a point foot: zero in any
         motion that the robot can make.
-    torque : (nv - 3,) object array
-        Actuator torques Γ at the joints, dampers and springs accounted for.
+    torque : (driven,) object array
+        Actuator torques Γ at the driven joints, dampers and springs accounted for.
     """
 
     def __init__(
         self,
         robot: Robot,
         sole: Sole,
+        drive: Drive,
         position: Symbols,
         velocity: Symbols,
         acceleration: Symbols | None = None,
     ) -> None:
         self.robot = robot
         self.sole = sole
-        self._dynamics = TracedDynamics(robot, _posture(robot, sole, position))
+        self._pitched = 3 - sole.held  # whether the pitch is one of the free coordinates
+        self._joints = Joints(robot, drive, position[self._pitched :])
+        posture = np.array([*position[: self._pitched], *self._joints.position], dtype=object)
+        self._dynamics = TracedDynamics(robot, _posture(robot, sole, posture))
         self._origin: Symbols = np.zeros(2, dtype=object)
         self._origin = self.place(sole)
         self._jacobian = self.jacobian(sole)
@@ -71,21 +79,36 @@ class Support:
         # coordinates out of the expressions; what is told to the outside is shifted.
         for k in range(2):
             self.q[k] = self.q[k] - self._origin[k] / robot.model.axis[k, k + 1]
-        self.v = pinned(self._jacobian, velocity, np.zeros(sole.held))
+        self.v = self.moving(self._jacobian, velocity)
         self._dynamics.v = self.v
         traced(kernels.link_velocities)(robot.model, self.v, self._dynamics.work)
         if acceleration is not None:
             self._solve_forces(acceleration)
+
+    def moving(self, jacobian: Symbols, velocity: Symbols) -> Symbols:
+        """Whole velocity (nv,) from that of the free coordinates, with a foot held that way."""
+        first = self._pitched
+        joints = self._joints.velocity(velocity[first:])
+        free = np.array([*velocity[:first], *joints], dtype=object)
+        return pinned(jacobian, free, np.zeros(self.sole.held))
+
+    def free_force(self, rest: Symbols) -> Symbols:
+        """Generalised force on the free coordinates, of one on pitch, if free, and all joints."""
+        first = self._pitched
+        return np.array([*rest[:first], *self._joints.force(rest[first:])], dtype=object)
 
     def _solve_forces(self, acceleration: Symbols) -> None:
         dynamics, sole = self._dynamics, self.sole
         # The centre of a disc that rolls on level ground does not accelerate by itself.
         center = dynamics.point_position(sole.link, sole.point)
         drift = dynamics.point_bias_acceleration(sole.link, center)[: sole.held]
-        a = pinned(self._jacobian, acceleration, -drift)
+        first = self._pitched
+        joints = self._joints.acceleration(acceleration[first:], self.v[3:])
+        free = np.array([*acceleration[:first], *joints], dtype=object)
+        a = pinned(self._jacobian, free, -drift)
         force = dynamics.inverse_dynamics(a) - dynamics.passive_force()
         self.wrench, rest = reaction(self._jacobian, force)
-        self.missing, self.torque = np.split(rest, [3 - sole.held])
+        self.missing, self.torque = np.split(self.free_force(rest), [first])
 
     @property
     def rolled(self) -> Any:
@@ -158,9 +181,10 @@ class Impact:
 
     def __init__(self, before: Support, landing: Sole, velocity: Symbols) -> None:
         jacobian = before.jacobian(landing)
-        self.v = pinned(jacobian, velocity, np.zeros(landing.held))
+        self.v = before.moving(jacobian, velocity)
         momentum = before.mass_matrix() @ (self.v - before.v)
-        self.impulse, self.rest = reaction(jacobian, momentum)
+        self.impulse, rest = reaction(jacobian, momentum)
+        self.rest = before.free_force(rest)
 
 
 def foot_angle(robot: Robot, sole: Sole, q: Symbols) -> Any:

@@ -101,10 +101,10 @@ class Constraints:
 class Transcription:
     """Functions of the motion of a robot on one foot, and of the landing on the other.
 
-    The motion is that of the coordinates that the stance foot leaves free: the joints and, on a
-    point foot, the trunk's pitch before them. Torques and ground forces follow from it (inverse
-    dynamics), so that they are no unknowns. All functions are exact expressions traced from the
-    dynamics kernels.
+    The motion is that of the coordinates that stance foot and closed loops leave free: the joints
+    with motors and, on a point foot, the trunk's pitch before them. Torques and ground forces
+    follow from it (inverse dynamics), so that they are no unknowns. All functions are exact
+    expressions traced from the dynamics kernels.
 
     Parameters
     ----------
@@ -113,15 +113,17 @@ class Transcription:
 
     Attributes
     ----------
+    free : list of int
+        The coordinates that foot and closed loops leave free.
     size : int
-        Number n of free coordinates.
+        Their number n.
     path_rows, touchdown_rows : list of Row
         Meaning of the constraints.
     path : casadi.Function
         (q, v, a), each (n,), to ΓᵀΓ and the scaled constraints along the path.
     motion : casadi.Function
-        (q, v, a) to the ground's wrench (x, z and, on a flat foot, moment), the torques and the
-        heights of the swing foot's contact points.
+        (q, v, a) to the ground's wrench (x, z and, on a flat foot, moment), the torques, the
+        heights of the swing foot's contact points and the positions of all joints.
     mirror : Mirror
         Exchange of left and right among the free coordinates.
     start : casadi.Function
@@ -138,8 +140,9 @@ class Transcription:
         self.request = request
         self.robot = request.robot
         self.held = request.stance.held
-        self.size = self.robot.nv - self.held
-        self.mirror = request.mirror.among(range(self.held, self.robot.nv))
+        self.free = [*range(self.held, 3), *request.drive.driven]
+        self.size = len(self.free)
+        self.mirror = request.mirror.among(self.free)
         self._build_path()
         self._build_touchdown()
 
@@ -147,7 +150,7 @@ class Transcription:
         request, robot = self.request, self.robot
         arguments = [casadi.SX.sym(name, self.size) for name in "qva"]
         q, v, a = (symbols(part) for part in arguments)
-        support = Support(robot, request.stance, q, v, a)
+        support = Support(robot, request.stance, request.drive, q, v, a)
         heights = [support.height(i) for i in request.swing.contacts]
         weight = robot.weight
         constraints = Constraints()
@@ -160,15 +163,16 @@ class Transcription:
         )
         for i, height in zip(request.swing.contacts, heights, strict=True):
             constraints.add(Group.CLEARANCE, height, subject=robot.contact_names[i])
-        first = 3 - self.held  # of the joints among the free coordinates
-        _add_joint_limits(constraints, request, q[first:], v[first:], support)
+        _add_joint_limits(constraints, request, support)
         self.path_rows = constraints.rows
         torque = expression(support.torque)
         stacked = casadi.cse(casadi.vertcat(casadi.sumsqr(torque), *constraints.expressions))
         self.path = casadi.Function("path", arguments, [stacked[0], stacked[1:]])
         wrench = expression(support.wrench)
         self.motion = casadi.Function(
-            "motion", arguments, [wrench, torque, casadi.vertcat(*heights)]
+            "motion",
+            arguments,
+            [wrench, torque, casadi.vertcat(*heights), expression(support.q[3:])],
         )
 
     def _add_cone(
@@ -183,7 +187,7 @@ class Transcription:
         The sign is that of a moment about +y, which a force f_z at x > 0 makes negative.
         """
         x, z, *moments = wrench
-        friction, half = self.request.friction, self.request.stance.half_length
+        friction, half = self.request.cone, self.request.stance.half_length
         inside = half - self.request.zmp_margin
         for side, name in ((1.0, "forward"), (-1.0, "backward")):
             constraints.add(groups[0], friction * z - side * x, subject=name, unit=unit)
@@ -202,11 +206,12 @@ class Transcription:
         q, v, v_start = moving = [casadi.SX.sym(name, self.size) for name in ("q", "v", "v_start")]
         duration, length = casadi.SX.sym("duration"), casadi.SX.sym("length")
         q_start, after = self.mirror.position(symbols(q)), self.mirror.velocity(symbols(v_start))
-        start = Support(robot, request.stance, q_start, symbols(v_start))
+        drive = request.drive
+        start = Support(robot, request.stance, drive, q_start, symbols(v_start))
         self.start = casadi.Function(
             "start", [q, v_start], [expression(start.q), expression(start.v)]
         )
-        end = Support(robot, request.stance, symbols(q), symbols(v))
+        end = Support(robot, request.stance, drive, symbols(q), symbols(v))
         impact = Impact(end, request.swing, after)
         landing = [end.rise(i, end.v) for i in request.swing.contacts]
         lift = [end.rise(i, impact.v) for i in request.stance.contacts]
@@ -229,8 +234,9 @@ class Transcription:
             before = end.jacobian(request.swing) @ end.v
             for subject, speed in zip(("x", "z", "turn"), before, strict=False):
                 constraints.add(Group.REST, speed, subject=subject, upper=0.0)
-            for name, jump in zip(robot.joint_names[self.held :], after - symbols(v), strict=True):
-                constraints.add(Group.PERIODIC, jump, subject=name, upper=0.0)
+            for j, jump in zip(self.free, after - symbols(v), strict=True):
+                subject = robot.joint_names[j]
+                constraints.add(Group.PERIODIC, jump, subject=subject, upper=0.0)
         if request.speed is not None:
             speed, unit = length / duration, request.speed
             constraints.add(Group.SPEED, speed, lower=unit, upper=unit, unit=unit)
@@ -243,7 +249,8 @@ class Transcription:
     ) -> None:
         """Momentum balanced, impulse inside cone and sole, one foot coming down, one let go."""
         request, names, unit = self.request, self.robot.contact_names, self.robot.weight
-        for name, residual in zip(self.robot.joint_names[self.held :], impact.rest, strict=True):
+        for j, residual in zip(self.free, impact.rest, strict=True):
+            name = self.robot.joint_names[j]
             constraints.add(Group.IMPACT, residual, subject=name, upper=0.0, unit=unit)
         constraints.add(Group.IMPULSE, impact.impulse[1], unit=unit)
         groups = (Group.IMPULSE_FRICTION, Group.IMPULSE_CENTER)
@@ -254,28 +261,28 @@ class Transcription:
             constraints.add(Group.LIFT, speed, subject=names[i], lower=-LIFT_TOLERANCE)
 
 
-def _add_joint_limits(
-    constraints: Constraints, request: Request, position: Any, velocity: Any, support: Support
-) -> None:
-    """Add ranges, speeds, torques and motors of the joints, where robot or request have limits.
-
-    Positions and velocities are those of the joints from the first leg on, without the trunk.
-    """
+def _add_joint_limits(constraints: Constraints, request: Request, support: Support) -> None:
+    """Add ranges, speeds, torques and motors of the joints, where robot or request have limits."""
     robot, model = request.robot, request.robot.model
-    actuator = np.argsort(model.actuator_joint)
-    low, high = model.torque_lower[actuator], model.torque_upper[actuator]
+    torques = dict(zip(request.drive.driven, support.torque, strict=True))
+    actuators = {joint: i for i, joint in enumerate(model.actuator_joint.tolist())}
     speeds = np.minimum(request.joint_speed_limit, model.speed_limit)
-    for k, name in enumerate(robot.joint_names[3:]):
-        lower, upper, speed = request.lower[k + 3], request.upper[k + 3], speeds[k + 3]
-        largest = max((abs(limit) for limit in (low[k], high[k]) if np.isfinite(limit)), default=0)
-        stall, free = model.stall_torque[k + 3], model.no_load_speed[k + 3]
-        drag = stall / free * velocity[k] if np.isfinite(stall) else 0.0  # of the motor's winding
-        for group, value, least, most, unit in (
-            (Group.JOINT_RANGE, position[k], lower, upper, 1.0),
-            (Group.TORQUE, support.torque[k], low[k], high[k], largest or 1.0),
-            (Group.TORQUE, support.torque[k] + drag, -stall, stall, stall),
-            (Group.JOINT_SPEED, velocity[k], -speed, speed, speed),
-        ):
+    for j, name in enumerate(robot.joint_names):
+        if j < 3:
+            continue
+        position, velocity, speed = support.q[j], support.v[j], speeds[j]
+        limits = [(Group.JOINT_RANGE, position, request.lower[j], request.upper[j], 1.0)]
+        if j in torques:
+            low, high = (ends[actuators[j]] for ends in (model.torque_lower, model.torque_upper))
+            largest = max((abs(limit) for limit in (low, high) if np.isfinite(limit)), default=0)
+            stall, free = model.stall_torque[j], model.no_load_speed[j]
+            drag = stall / free * velocity if np.isfinite(stall) else 0.0  # of the motor's winding
+            limits += [
+                (Group.TORQUE, torques[j], low, high, largest or 1.0),
+                (Group.TORQUE, torques[j] + drag, -stall, stall, stall),
+            ]
+        limits.append((Group.JOINT_SPEED, velocity, -speed, speed, speed))
+        for group, value, least, most, unit in limits:
             if np.isfinite([least, most]).any():
                 ends = {"lower": float(least), "upper": float(most), "unit": float(unit)}
                 constraints.add(group, value, subject=name, **ends)

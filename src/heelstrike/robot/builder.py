@@ -14,12 +14,14 @@ from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
 from heelstrike.robot.model import (
     AXES,
+    NUMBERS,
     POWERS,
     PROPERTIES,
     JointProperties,
     Limits,
     Model,
     Pair,
+    bounds,
 )
 from heelstrike.robot.robot import Robot
 
@@ -71,6 +73,7 @@ class RobotBuilder:
         self._loops: list[tuple[tuple[int, int], tuple[Pair, Pair]]] = []
         self._couplings: list[tuple[tuple[int, int], tuple[float, ...]]] = []
         self._latches: list[tuple[int, int, int]] = []
+        self._brakes: list[int] = []
 
     def floating_base(
         self, link: str, at: Pair = (0.0, 0.0), **properties: Unpack[JointProperties]
@@ -185,7 +188,16 @@ class RobotBuilder:
         axis = (0.0, x / length, z / length)
         return self._add(name, link or name, parent, axis, _pair("at", at), properties)
 
-    def contact(self, link: str, at: Pair, *, radius: float = 0.0, friction: float = 1.0) -> None:
+    def contact(
+        self,
+        link: str,
+        at: Pair,
+        *,
+        radius: float = 0.0,
+        friction: float = 1.0,
+        friction_scale: float = 1.0,
+        restitution_scale: float = 1.0,
+    ) -> None:
         """Add a contact point: a disc fixed to a link, a point if its radius is zero.
 
         Parameters
@@ -197,14 +209,33 @@ class RobotBuilder:
         radius : float
             Radius (m).
         friction : float
-            Friction of its surface. A simulation takes friction from the ground; left and right are
-            compared by it.
+            Friction of its surface, as files give it. A simulation takes friction from the ground;
+            left and right are compared by it.
+        friction_scale, restitution_scale : float
+            What friction and restitution of the ground are multiplied by under it: 0.5 for a point
+            that is half as rough as those that the ground was measured with. Restitution cannot be
+            more than the ground's.
         """
         x, z = _pair("at", at)
         size, roughness = _number("radius", radius, 0.0), _number("friction", friction, 0.0)
-        self._points.append(ContactPoint(self._index(link), x, z, size, roughness))
+        scales = {"friction_scale": friction_scale, "restitution_scale": restitution_scale}
+        for name, scale in scales.items():
+            number = NUMBERS[name]
+            if not _number(name, scale, number.least) <= number.most:
+                raise self._error(f"{name} of a contact point must be {bounds(name)}, got {scale}.")
+        its = {name: float(scale) for name, scale in scales.items()}
+        self._points.append(ContactPoint(self._index(link), x, z, size, roughness, **its))
 
-    def sole(self, link: str, *, heel: Pair, toe: Pair, friction: float = 1.0) -> None:
+    def sole(
+        self,
+        link: str,
+        *,
+        heel: Pair,
+        toe: Pair,
+        friction: float = 1.0,
+        friction_scale: float = 1.0,
+        restitution_scale: float = 1.0,
+    ) -> None:
         """Add the two ends of a flat sole; see :meth:`contact`.
 
         Parameters
@@ -213,11 +244,17 @@ class RobotBuilder:
             Link that carries it.
         heel, toe : (2,) float
             Its ends in the frame of that link (m).
-        friction : float
-            Friction of its surface.
+        friction, friction_scale, restitution_scale : float
+            As for :meth:`contact`, alike for both.
         """
-        self.contact(link, heel, friction=friction)
-        self.contact(link, toe, friction=friction)
+        for end in (heel, toe):
+            self.contact(
+                link,
+                end,
+                friction=friction,
+                friction_scale=friction_scale,
+                restitution_scale=restitution_scale,
+            )
 
     def loop(self, link: str, other: str | None, *, at: Pair, other_at: Pair | None = None) -> None:
         """Close a loop: join two links, which hang on others already, by one more hinge.
@@ -322,6 +359,27 @@ class RobotBuilder:
         by = -1 if release is None else self._index(release, f"the latch of {joint!r} lets go by")
         self._latches.append((place, 1 if end == "upper" else -1, by))
 
+    def brake(self, joint: str) -> None:
+        """Give a joint a brake, which holds it wherever it is while it is on.
+
+        It is off until :attr:`Simulation.braked` says otherwise. What it takes to hold the joint is
+        recorded as ``Run.brake_torque``; it does not slip.
+
+        Parameters
+        ----------
+        joint : str
+            The joint.
+
+        Raises
+        ------
+        RobotError
+            If there is no such joint, or it has a brake already.
+        """
+        place = self._joint(joint, "brake")
+        if place in self._brakes:
+            raise self._error(f"joint {joint!r} has a brake already.")
+        self._brakes.append(place)
+
     def build(self) -> Robot:
         """Return the robot. The builder may go on and build others.
 
@@ -356,6 +414,7 @@ class RobotBuilder:
             latch_joint=[joint for joint, _, _ in self._latches],
             latch_side=[side for _, side, _ in self._latches],
             latch_release=[link for _, _, link in self._latches],
+            brake_joint=self._brakes,
             pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(

@@ -14,6 +14,7 @@ from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
 from heelstrike.robot.files.snapping import IN_PLANE
+from heelstrike.robot.model import NUMBERS, SCALES, bounds
 from heelstrike.robot.shapes.convex import lowest_chain, touches_first
 from heelstrike.robot.warning import warn
 
@@ -41,6 +42,8 @@ class ContactPoint:
     friction : float
         Sliding friction that the file gives its geom. The simulation takes friction from the
         ground; this number only serves to compare left and right.
+    friction_scale, restitution_scale : float
+        What friction and restitution of the ground are multiplied by under it.
     """
 
     link: int
@@ -48,6 +51,8 @@ class ContactPoint:
     z: float
     radius: float
     friction: float
+    friction_scale: float = 1.0
+    restitution_scale: float = 1.0
 
 
 def of_model(points: list[ContactPoint]) -> dict[str, Any]:
@@ -56,6 +61,7 @@ def of_model(points: list[ContactPoint]) -> dict[str, Any]:
         "contact_link": [point.link for point in points],
         "contact_position": [(point.x, point.z) for point in points],
         "contact_radius": [point.radius for point in points],
+        **{name: [getattr(point, name) for point in points] for name in SCALES},
     }
 
 
@@ -92,6 +98,7 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
     of_meshes: set[ContactPoint] = set()
     skipped: list[str] = []
     model, pose = file.model, file.pose
+    scales = _scales(file)
     for geom in _geoms_that_touch(file, links):
         link = int(links.of_body[model.geom_bodyid[geom]])
         turn = pose.geom_xmat[geom].reshape(3, 3)
@@ -108,7 +115,8 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
         centers, radius = shape
         friction = float(model.geom_friction[geom, 0])
         for x, z in centers - links.origin[link]:
-            points.append(ContactPoint(link, float(x), float(z), radius, friction))
+            own = scales.get(file.given_name("geom", geom), {})
+            points.append(ContactPoint(link, float(x), float(z), radius, friction, **own))
             if model.geom_type[geom] == MESH:
                 of_meshes.add(points[-1])
     if skipped:
@@ -125,6 +133,29 @@ def read_contact_points(file: MujocoFile, links: Links) -> list[ContactPoint]:
             'conaffinity="0".'
         )
     return points
+
+
+def _scales(file: MujocoFile) -> dict[str, dict[str, float]]:
+    """Return scales by the names of geoms: custom data called ``friction_scale:GEOM``.
+
+    Raises
+    ------
+    RobotError
+        If there is no such geom, or the number cannot be one.
+    """
+    geoms = {file.given_name("geom", geom) for geom in range(file.model.ngeom)} - {""}
+    found: dict[str, dict[str, float]] = {}
+    for numeric in range(file.model.nnumeric):
+        name, _, geom = file.given_name("numeric", numeric).partition(":")
+        if name not in SCALES:
+            continue
+        value = float(file.model.numeric_data[file.model.numeric_adr[numeric]])
+        if geom not in geoms:
+            raise file.error(f"{name}:{geom} in <custom>: there is no geom of that name.")
+        if not NUMBERS[name].least <= value <= NUMBERS[name].most:
+            raise file.error(f"{name}:{geom} in <custom> must be {bounds(name)}, got {value:g}.")
+        found.setdefault(geom, {})[name] = value
+    return found
 
 
 def _without_idle(points: list[ContactPoint], some: set[ContactPoint]) -> list[ContactPoint]:
@@ -241,7 +272,7 @@ def _sole(corners: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _merged(points: Iterable[ContactPoint]) -> list[ContactPoint]:
-    """Points without repetition; of two that coincide the first stays, the rougher friction too."""
+    """Points without repetition; of two that coincide the first stays, with the larger numbers."""
     kept: list[ContactPoint] = []
     near: dict[tuple[int, float], list[int]] = {}  # by link and x in steps of `SAME_PLACE`
     for point in points:
@@ -250,7 +281,9 @@ def _merged(points: Iterable[ContactPoint]) -> list[ContactPoint]:
             other = kept[i]
             apart = math.hypot(point.x - other.x, point.z - other.z)
             if max(apart, abs(point.radius - other.radius)) < SAME_PLACE:
-                kept[i] = replace(other, friction=max(other.friction, point.friction))
+                larger = ("friction", *SCALES)
+                most = {name: max(getattr(other, name), getattr(point, name)) for name in larger}
+                kept[i] = replace(other, **most)
                 break
         else:
             near.setdefault((point.link, step), []).append(len(kept))

@@ -21,7 +21,7 @@ from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.screening.inclusion import is_readable
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS, builtin_robots, load_robot
 from heelstrike.robot.loops import coupling_words, latch_words
-from heelstrike.robot.model import NUMBERS, PROPERTIES, Floats, label
+from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, label
 from heelstrike.robot.plausibility import (
     Finding,
     FindingKind,
@@ -292,13 +292,21 @@ def _description(robot: Robot) -> str:
                 f"  {name}: {points[i, 0]:.4g}, {points[i, 1]:.4g} m"
                 + (radius if robot.model.contact_radius[i] else "")
                 + (f", friction {robot.contact_friction[i]:g}" if robot.contact_friction else "")
+                + _scale_words(robot, i)
             )
     lines += [f"closed loop: {name}" for name in robot.loop_names]
     lines += [f"coupled: {coupling_words(robot, k)}" for k in range(robot.model.couplings)]
     lines += [f"latch: {latch_words(robot, k)}" for k in range(robot.model.latches)]
+    lines += [f"brake: {name}" for name in robot.brake_names]
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
+
+
+def _scale_words(robot: Robot, contact: int) -> str:
+    """What the ground's coefficients are multiplied by under a contact point, where not by one."""
+    scales = {name: getattr(robot.model, name)[contact] for name in SCALES}
+    return "".join(f", {label(name)} {x:g}" for name, x in scales.items() if x != 1.0)
 
 
 def _drives(robot: Robot) -> str:
@@ -444,10 +452,12 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "link_center_of_mass_m": model.center_of_mass.tolist(),
         "actuators": list(robot.actuator_names),
         "contact_points": list(robot.contact_names),
+        **{name: getattr(model, name).tolist() for name in SCALES},
         "feet": [foot.name for foot in robot.feet],
         "locked": [asdict(one) for one in robot.locked],
         "loops": list(robot.loop_names),
         "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
         "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
+        "brakes": list(robot.brake_names),
         **of_joints,
     }

@@ -9,7 +9,12 @@ from heelstrike.robot.robot import Robot
 
 
 def refuse_loops(
-    robot: Robot, what: str, kind: type[Exception] = RobotError, *, latches: bool = True
+    robot: Robot,
+    what: str,
+    kind: type[Exception] = RobotError,
+    *,
+    loops: bool = True,
+    latches: bool = True,
 ) -> None:
     """Refuse a robot with closed loops, coupled joints or latches where only trees will do.
 
@@ -21,16 +26,16 @@ def refuse_loops(
         What does not know of loops.
     kind : type
         Error to raise.
-    latches : bool
-        Whether latches matter to it, too.
+    loops, latches : bool
+        Whether loops and couplings matter to it; whether latches do.
 
     Raises
     ------
     Exception
         Of this kind, that names the loops.
     """
-    found = [f"loop {name}" for name in robot.loop_names]
-    found += [f"coupling of {name}" for name in robot.coupling_names]
+    found = [f"loop {name}" for name in robot.loop_names if loops]
+    found += [f"coupling of {name}" for name in robot.coupling_names if loops]
     found += [f"latch of {name}" for name in robot.latch_names if latches]
     if found:
         raise kind(

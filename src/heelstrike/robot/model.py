@@ -29,7 +29,7 @@ AXES = 2
 POWERS = 5
 """Coefficients of the polynomial by which a joint follows another."""
 
-SELDOM = ("loops", "couplings", "latches")
+SELDOM = ("loops", "couplings", "latches", "brakes")
 """Extents of what most robots have nothing of."""
 
 
@@ -43,8 +43,8 @@ class Number(Member):
         Unit of a hinge, and of a slide if that is another.
     default : float, optional
         What a robot has of which nobody said it.
-    least : float
-        The least that it may be.
+    least, most : float
+        The least and the most that it may be.
     infinite : bool
         Whether it may be infinite, which stands for none.
     alike : bool
@@ -62,6 +62,7 @@ class Number(Member):
     unit: str = ""
     default: float | None = None
     least: float = -math.inf
+    most: float = math.inf
     infinite: bool = False
     alike: bool = False
     given: bool = False
@@ -80,6 +81,7 @@ _POSE: dict[str, Any] = {"default": 0.0, "given": True}
 _PART: dict[str, Any] = {"default": 0.0, "given": True, "least": 0.0, "alike": True}
 _LIMIT: dict[str, Any] = {"infinite": True}
 _UNKNOWN: dict[str, Any] = {"default": math.inf}
+_SCALE: dict[str, Any] = {"default": 1.0, "least": 0.0, "later": True}
 _LATER: dict[str, Any] = {"default": 0, "later": True}
 
 
@@ -98,8 +100,8 @@ class Model(Bundle):
         are equal; each counts what it says.
     nc, nu : int
         Number of contact points and of actuators.
-    loops, couplings, latches : int
-        Number of closed loops, of coupled joints and of latches.
+    loops, couplings, latches, brakes : int
+        Number of closed loops, of coupled joints, of latches and of brakes.
     axes : int
         Dimension of space.
     parent : (nl,) int
@@ -143,6 +145,9 @@ class Model(Bundle):
         Centre of each contact disc in the link frame.
     contact_radius : (nc,) float
         Radius of each contact disc; zero for a point.
+    friction_scale, restitution_scale : (nc,) float
+        What friction and restitution of the ground are multiplied by under each contact point;
+        restitution by one at most.
     actuator_joint : (nu,) int
         Coordinate that each actuator drives.
     torque_lower, torque_upper : (nu,) float
@@ -162,6 +167,8 @@ class Model(Bundle):
         That end: 1 for the upper, -1 for the lower.
     latch_release : (latches,) int
         Link whose touchdown makes it let go; -1 if none does.
+    brake_joint : (brakes,) int
+        Joint that each brake holds wherever it is, while it is on.
     pivot : int
         Link whose origin serves as the reference point of spatial vectors, so that a robot far
         from the world origin loses no digits.
@@ -176,6 +183,7 @@ class Model(Bundle):
     loops: int = extent()
     couplings: int = extent()
     latches: int = extent()
+    brakes: int = extent()
     axes: int = extent()
 
     parent: Integers = of("nl", kind=int, points="nl", least=-1)
@@ -206,6 +214,8 @@ class Model(Bundle):
     contact_link: Integers = of("nc", kind=int, points="nl", least=0)
     contact_position: Floats = of("nc", "axes", unit="m")
     contact_radius: Floats = of("nc", unit="m", least=0.0)
+    friction_scale: Floats = of("nc", **_SCALE)
+    restitution_scale: Floats = of("nc", most=1.0, **_SCALE)
     actuator_joint: Integers = of("nu", kind=int, points="nv", least=0)
     torque_lower: Floats = of("nu", unit="N m, N", **_LIMIT)
     torque_upper: Floats = of("nu", unit="N m, N", **_LIMIT)
@@ -216,6 +226,7 @@ class Model(Bundle):
     latch_joint: Integers = of("latches", kind=int, points="nv", least=0, **_LATER)
     latch_side: Integers = of("latches", kind=int, least=-1, **_LATER)
     latch_release: Integers = of("latches", kind=int, points="nl", least=-1, **_LATER)
+    brake_joint: Integers = of("brakes", kind=int, points="nv", least=0, **_LATER)
     pivot: int = of(kind=int, points="nl", least=0)
 
     @classmethod
@@ -225,7 +236,7 @@ class Model(Bundle):
         Parameters
         ----------
         **members : array
-            Every member by its name; loops, couplings and latches only where there are any.
+            Every member by its name; loops, couplings, latches and brakes only where there are any.
 
         Returns
         -------
@@ -307,7 +318,16 @@ NUMBERS: dict[str, Number] = {
 PROPERTIES = {name: number for name, number in NUMBERS.items() if number.given}
 """Numbers of a link and its joint that a user gives, each by itself."""
 
+SCALES = ("friction_scale", "restitution_scale")
+"""Numbers of a contact point that tell it from others on the same ground."""
+
 
 def label(name: str) -> str:
     """Return what messages call a number."""
     return NUMBERS[name].label or name.replace("_", " ")
+
+
+def bounds(name: str) -> str:
+    """Return what messages say that a number may be."""
+    least, most = NUMBERS[name].least, NUMBERS[name].most
+    return f"between {least:g} and {most:g}" if math.isfinite(most) else f"{least:g} or more"

@@ -166,6 +166,11 @@ class Robot:
         return tuple(self.joint_names[joint] for joint in self.model.latch_joint)
 
     @property
+    def brake_names(self) -> tuple[str, ...]:
+        """Names of the joints that have a brake."""
+        return tuple(self.joint_names[joint] for joint in self.model.brake_joint)
+
+    @property
     def total_mass(self) -> float:
         """Mass of the whole robot in kg."""
         return float(np.sum(self.model.mass))

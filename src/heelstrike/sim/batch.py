@@ -388,7 +388,7 @@ def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
 
 _ALIKE = {
     "nv": "coordinates", "nu": "actuators", "nc": "contact points", "loops": "closed loops",
-    "couplings": "coupled joints",
+    "couplings": "coupled joints", "brakes": "brakes",
 }  # fmt: skip
 
 

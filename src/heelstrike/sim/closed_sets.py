@@ -61,6 +61,9 @@ class EventKind(enum.IntEnum):
         they are until that ends.
     ``JOINT_RELEASE``
         A latch let go of a joint, whose index the event's `contact` is.
+    ``JOINT_BRAKE``
+        A brake that was put on took hold of a joint, whose index the event's `contact` is, with the
+        impulse on its coordinate (N m s, N s of a slide) that it took.
     """
 
     TOUCHDOWN = 0
@@ -78,6 +81,7 @@ class EventKind(enum.IntEnum):
     BRIDGE = 12
     WEDGED = 13
     JOINT_RELEASE = 14
+    JOINT_BRAKE = 15
 
     @property
     def of_joint(self) -> bool:

@@ -11,7 +11,7 @@ from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.articulated import ArticulatedBodies
-from heelstrike.dynamics.loops import LoopRows, count_rows
+from heelstrike.dynamics.loops import LoopRows, most_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
@@ -92,7 +92,7 @@ class Surface(Bundle):
     ----------
     friction, restitution : (capacity,) float
         Of contact points; zero for the joint stops after them, and friction 1 for the dry joints
-        after these.
+        after these; then of the second faces of the points.
     """
 
     friction: Floats = array("capacity")
@@ -191,7 +191,7 @@ class Reaction(Bundle):
 
 
 class Loops(Bundle):
-    """What holds besides the joints: closed loops, coupled joints and latches.
+    """What holds besides the joints: closed loops, coupled joints, latches and brakes.
 
     Attributes
     ----------
@@ -210,6 +210,12 @@ class Loops(Bundle):
         Whether each latch is engaged.
     latch_stop : (latches,) int
         The joint stop that each is, as candidates of time stepping are numbered.
+    braked : (brakes,) int
+        Whether each brake is on; see :mod:`heelstrike.sim.contacts.brakes`.
+    brake_position : (brakes,) float
+        Where those that are on hold their joints (rad, m).
+    brake_force : (brakes,) float
+        What they held them with in the last solve.
     """
 
     rows: LoopRows = part(LoopRows)
@@ -221,6 +227,9 @@ class Loops(Bundle):
     coupling_force: Floats = array("couplings")
     held: Integers = array("latches", of=int)
     latch_stop: Integers = array("latches", of=int)
+    braked: Integers = array("brakes", of=int)
+    brake_position: Floats = array("brakes")
+    brake_force: Floats = array("brakes")
 
 
 class Reported(Bundle):
@@ -312,12 +321,13 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     points = usual_points(robot)
     place = np.full(nc, -1)
     place[points] = np.arange(len(points))
+    sides = capacity + nc  # in a concave corner a point is there twice
     extents = {
-        **model.extents, "nd": len(dry), "capacity": capacity,
-        "points": len(points), "components": 2, "loop_rows": count_rows(model),
+        **model.extents, "nd": len(dry), "capacity": sides,
+        "points": len(points), "components": 2, "loop_rows": most_rows(model),
     }  # fmt: skip
     programs = straight_line_programs(model, points)
-    most = capacity + nc + count_rows(model)  # in a concave corner a point is there twice
+    most = sides + most_rows(model)
     assembly = Assembly.allocate(
         {**extents, "capacity": most},
         problem=ContactProblem.allocate(nc=most),
@@ -331,7 +341,7 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
         dry_joint=dry.astype(np.int64),
         equations=Equations.allocate(extents, programs=programs),
         surface=Surface.allocate(
-            extents, friction=np.where(np.arange(capacity) < capacity - len(dry), 0.0, 1.0)
+            extents, friction=np.repeat([0.0, 1.0, 0.0], [capacity - len(dry), len(dry), nc])
         ),
         assembly=assembly,
         usual=UsualPoints.allocate(

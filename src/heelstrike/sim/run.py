@@ -223,6 +223,8 @@ class Run:
     coupling_force : (nt, couplings) float
         Generalised force on each joint that follows another (N m, or N for a slide); the leader
         feels it times minus the slope of the coupling.
+    brake_torque : (nt, brakes) float
+        Generalised force of each brake on its joint (N m, or N for a slide), zero while it is off.
     residual : (nt, 3) float
         Relative residuals of the contact problem: complementarity, cone, non-penetration.
     events : tuple of Event
@@ -293,6 +295,10 @@ class Run:
     coupling_force: Floats = recorded(
         "couplings", of="loops.coupling_force", unit="N m or N", later=True,
         label="force on the joints that follow others",
+    )  # fmt: skip
+    brake_torque: Floats = recorded(
+        "brakes", of="loops.brake_force", unit="N m or N", later=True,
+        label="force of the brakes on their joints",
     )  # fmt: skip
     residual: Floats = recorded(
         "conditions", of="assembly.answer.residual", unit="1",

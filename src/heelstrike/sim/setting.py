@@ -14,9 +14,10 @@ from heelstrike.contact.ground import Ground
 from heelstrike.dynamics.queries.loops import loop_displacement
 from heelstrike.dynamics.queries.momenta import center_of_mass
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import NUMBERS, Model
+from heelstrike.robot.model import NUMBERS, SCALES, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.contacts.brakes import brakes_of
 from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.push import Push
 from heelstrike.sim.snapshot import Snapshot
@@ -47,6 +48,7 @@ class Setup(TypedDict, total=False):
     stop_when_fallen: bool | None
     pushes: Sequence[Push] | Push
     latched: Iterable[str | int] | None
+    braked: Iterable[str | int]
     checked: bool
 
 
@@ -69,6 +71,8 @@ class Setting:
     pushes : tuple of Push
     held : tuple of bool
         Which latches of the robot are engaged as it begins.
+    braked : tuple of bool
+        Which of its brakes are on as it begins.
     checked : bool
         Whether compiled controllers run in Python, every index looked at.
     """
@@ -81,6 +85,7 @@ class Setting:
     fallen_height: float
     pushes: tuple[Push, ...]
     held: tuple[bool, ...]
+    braked: tuple[bool, ...]
     checked: bool
 
 
@@ -94,6 +99,7 @@ def checked_setting(
     stop_when_fallen: bool | None = None,
     pushes: Sequence[Push] | Push = (),
     latched: Iterable[str | int] | None = None,
+    braked: Iterable[str | int] = (),
     checked: bool = False,
 ) -> Setting:
     """Check what is to be simulated.
@@ -130,6 +136,7 @@ def checked_setting(
         fallen_height=fallen_height,
         pushes=checked_pushes(robot, pushes),
         held=latches_at(robot, state, ground, latched),
+        braked=brakes_of(robot, braked),
         checked=checked,
     )
 
@@ -164,7 +171,9 @@ def model_digest(model: Model) -> str:
     if model not in _DIGESTS:
         digest = hashlib.sha256()
         for name, value in model.members().items():
-            if NUMBERS[name].later and np.size(value) == 0:
+            number = NUMBERS[name]
+            usual = name in SCALES and np.all(value == number.default)
+            if number.later and (np.size(value) == 0 or usual):
                 continue  # snapshots that are older than the number stay good
             digest.update(f"{name} {np.shape(value)} ".encode() + np.asarray(value).tobytes())
         _DIGESTS[model] = digest.hexdigest()[:16]

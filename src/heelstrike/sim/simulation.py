@@ -21,7 +21,9 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, put_on
 from heelstrike.sim.contacts.latches import latches_at
+from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
@@ -90,6 +92,8 @@ class Simulation:
     latched : iterable of str or int, optional
         Joints that their latches hold as it begins. By default those at rest at their latched end,
         unless the link whose touchdown lets go stands on the ground.
+    braked : iterable of str or int
+        Joints that their brakes hold as it begins, where they are.
     checked : bool
         Run a compiled controller in Python, some hundred times slower, and look at every index: one
         that reads or writes beyond its arrays, or writes where it may not, ends the run with a
@@ -140,6 +144,7 @@ class Simulation:
         stop_when_fallen: bool | None = None,
         pushes: Sequence[Push] | Push = (),
         latched: Iterable[str | int] | None = None,
+        braked: Iterable[str | int] = (),
         checked: bool = False,
     ) -> None:
         begin, given = state.state if isinstance(state, Snapshot) else state, ground
@@ -147,7 +152,8 @@ class Simulation:
             ground = _ground_of(state)
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
-            stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, checked=checked,
+            stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, braked=braked,
+            checked=checked,
         )  # fmt: skip
         law_of(controller, begin=True)
         self._begin(setting, checked_method(method))
@@ -163,6 +169,8 @@ class Simulation:
             self.apply(setting.pushes)
             if latched is not None:
                 self.latched = latched
+            if any(setting.braked):
+                self.braked = braked
 
     def __reduce__(self) -> NoReturn:
         """Copies would share memory that compiled code finds by address."""
@@ -193,6 +201,7 @@ class Simulation:
         self._memory.q[:] = setting.state.q
         self._memory.v[:] = setting.state.v
         self._memory.loops.held[:] = setting.held
+        put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory.loops)
         self._work = method.new_work(self.robot)
         rows, events = method.room(self.robot)
         self._clock = Clock(
@@ -270,6 +279,20 @@ class Simulation:
     def latched(self, joints: Iterable[str | int]) -> None:
         held = self._memory.loops.held
         held[:] = latches_at(self.robot, self.state, self._ground, joints)
+        self.method.reconsider(self._work)
+
+    @property
+    def braked(self) -> tuple[str, ...]:
+        """Joints whose brakes are on; others that are set are held from now on, where they are.
+
+        The brakes of the rest let go at once.
+        """
+        return braked_joints(self.robot, self._memory.loops.braked)
+
+    @braked.setter
+    def braked(self, joints: Iterable[str | int]) -> None:
+        wanted = brakes_of(self.robot, joints)
+        put_on(self.robot, wanted, self.state, PUT_ON, self._memory.loops)
         self.method.reconsider(self._work)
 
     @property
@@ -809,7 +832,8 @@ def simulate(
         ``interrupted``.
     **setup
         How it begins and what it is simulated with: `state`, which has to be given, `method`,
-        `ground`, `control_period`, `record_every`, `stop_when_fallen`, `pushes`, `checked`; see
+        `ground`, `control_period`, `record_every`, `stop_when_fallen`, `pushes`, `latched`,
+        `braked`, `checked`; see
         :class:`Simulation`.
 
     Returns

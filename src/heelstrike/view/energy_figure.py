@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from heelstrike.analysis.energy import energy_balance
 from heelstrike.view.panels import Curve, Excerpt, Panel, draw_panels
-from heelstrike.view.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION
+from heelstrike.view.style import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILION
 
 CHANGES = {
     "kinetic": ("kinetic", BLUE),
@@ -19,6 +19,7 @@ WORKS = {
     "dampers": ("dampers", PURPLE),
     "stops": ("joint stops", SKY),
     "dry_friction": ("dry friction", ORANGE),
+    "brakes": ("brakes", GREY),
     "pushes": ("pushes", BLUE),
     "residual": ("residual", INK),
 }

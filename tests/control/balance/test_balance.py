@@ -13,7 +13,7 @@ import heelstrike as hs
 from heelstrike.analysis.recovery import recovery
 from heelstrike.control.balance.controllers import WholeBody
 from heelstrike.control.balance.reference import reference_of, slope_at, value_at
-from heelstrike.dynamics import link_poses
+from heelstrike.dynamics import contact_positions, link_poses
 from heelstrike.errors import ControllerError
 
 
@@ -62,6 +62,30 @@ def test_undisturbed_it_is_the_gait_at_its_price(kind: type[WholeBody]) -> None:
     assert length == pytest.approx(gait.step_length, rel=0.02)
     usual = walked(hs.ComputedTorque(robot, gait), 2.0 * gait.step_duration)  # type: ignore[arg-type]
     assert effort(run) < 1.5 * effort(usual)
+
+
+@pytest.mark.parametrize("phase", [0.1, 0.7])
+def test_a_small_push_is_answered_within_a_step_and_alarms_nobody(phase: float) -> None:
+    """The capture point at the second landing is off by a tenth of the push's own 12 mm."""
+    step = walking.gait().step_duration
+
+    def landings(run: hs.Run) -> np.ndarray:
+        ends = np.nonzero(np.diff(run.log["phase"].values) < -0.5)[0]
+        found: np.ndarray = run.log["capture_point"].values[ends - 1]
+        return found[3:]
+
+    run = walked(law(), 9.5 * step, pushes=pushed(3.0, (2.0 + phase) * step))
+    off = landings(run) - landings(walked(law(), 9.5 * step))
+    assert np.abs(off).max() < 1.5e-3
+    assert run.log["alarm"].values[run.time > 3.5 * step].max() == 0.0
+
+
+def test_an_alarm_ends() -> None:
+    """Also that of a large push, after which the gait itself goes on."""
+    step = walking.gait().step_duration
+    run = walked(law(), 16.0 * step, pushes=pushed(50.0, 2.3 * step))
+    assert run.log["alarm"].values.max() == 1.0
+    assert run.log["alarm"].values[-1] == 0.0
 
 
 @pytest.mark.parametrize("impulse", [40.0, -40.0])
@@ -124,6 +148,58 @@ def test_it_stands_starts_and_stops_on_command() -> None:
     assert memory.stands == 1
     assert np.abs(simulation.state.v).max() < 0.05
     assert simulation.state.q[1] > 0.9
+
+
+def test_it_stands_still() -> None:
+    """Both feet on the ground, for as long as it likes."""
+    robot = walking.bravo7()
+    simulation = hs.Simulation(robot, law(speed=0.0), state=robot.reference_state())
+    simulation.advance(6.0)
+    stood = simulation.state.q
+    simulation.advance(20.0)
+    assert simulation.state.q == pytest.approx(stood, abs=1e-3)
+    assert contact_positions(robot, simulation.state.q)[:, 1] == pytest.approx(0.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(("impulse", "steps"), [(16.0, False), (-16.0, False), (60.0, True)])
+def test_pushed_as_it_stands_it_stands_again(impulse: float, steps: bool) -> None:
+    """Without a step as long as the sole is long enough for the capture point."""
+    robot = walking.bravo7()
+    begin = robot.reference_state()
+    run = walked(law(speed=0.0), 9.1, state=begin, pushes=pushed(impulse, 1.0), record_every=5)
+    found = recovery(run, after=8.0)
+    assert found, found.reason
+    assert (run.log["phase"].values.max() > 0.0) == steps
+
+
+@pytest.mark.parametrize("corner", [1.1, 1.17, 1.2])
+def test_a_foot_that_hits_a_riser_steps_over_it(corner: float) -> None:
+    """It does not jam with its toe at the edge: the heel comes to stand on top, too."""
+    robot = walking.bravo7()
+    profile = [[-1.0, 0.0], [corner, 0.0], [corner, 0.04], [9.0, 0.04]]
+    simulation = hs.Simulation(
+        robot, law(), state=walking.gait().initial_state, ground=hs.Ground(profile=profile)
+    )
+    memory = simulation._numbers.memory
+    hit = 0
+    while simulation.time < 7.0:
+        steps = memory.steps
+        simulation.advance(simulation.time + 0.002)
+        hit += memory.lifting
+        if memory.steps > steps:
+            link = robot.feet[memory.stance].link
+            assert abs(link_poses(robot, simulation.state.q).angle[link]) < 0.3
+    assert hit > 0
+    assert simulation.status == hs.RunStatus.COMPLETED
+    assert simulation.state.q[0] > 2.3
+
+
+def test_a_slight_slope_is_believed_at_once() -> None:
+    """All but an eighth of it after a landing, and what is left of that after the next."""
+    slope = hs.Ground(profile=[[-1.0, 0.0], [0.6, 0.0], [5.6, 0.15]])
+    told = walked(law(), 5.6, ground=slope).log["slope"].values
+    steep = told[np.nonzero(np.diff(told))[0] + 1]
+    assert np.sum((steep > 1e-3) & (steep < 0.029)) <= 2
 
 
 def test_it_finds_the_ground_where_it_is_not_expected() -> None:

@@ -137,3 +137,29 @@ def test_rows_are_given_up_in_their_order() -> None:
 def test_what_cannot_be_solved_is_named(arguments: tuple[Floats, ...], said: str) -> None:
     with pytest.raises(ControllerError, match=said):
         hs.solve_quadratic_program(*arguments)
+
+
+def test_answers_of_ill_conditioned_programmes_are_refined() -> None:
+    """Curvatures that differ by 1e8 and rows by 1e6 in size cost no accuracy of the answer.
+
+    A point keeps all rows, eight of them without room, more than there are unknowns; one direction
+    leads inside all. Of the first 8000 seeds these are the ones of which a pass of the active set
+    leaves most: from 1e-4 to 2e-7.
+    """
+    worst = np.zeros(3)
+    for seed in (2281, 2272, 5271, 5662, 3974, 5905, 730, 2658, 5569, 7441, 801, 1576):
+        rng = np.random.default_rng(seed)
+        n, m = 6, 19
+        factor = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-4.0, 4.0, n)[:, None]
+        H = factor.T @ factor
+        H = 0.5 * (H + H.T) + 1e-8 * np.trace(H) * np.eye(n)
+        point, inwards = rng.normal(size=n), rng.normal(size=n)
+        C = rng.normal(size=(m, n)) * 10.0 ** rng.uniform(-3.0, 3.0, m)[:, None]
+        C *= np.sign(C @ inwards)[:, None]
+        room = np.abs(C * point).sum(axis=1) * rng.random(m)
+        room[:8] = 0.0
+        g = rng.normal(size=n) * 10.0 ** rng.uniform(-3.0, 3.0, n)
+        found = hs.solve_quadratic_program(H, g, C, C @ point - room)
+        residuals = found.stationarity, found.violation, found.complementarity
+        worst = np.maximum(worst, residuals)
+    assert worst.max() < 1e-9

@@ -314,7 +314,7 @@ def test_the_events_of_an_instant_have_room() -> None:
     simulation = hs.Simulation(robot, state=walking.gait().initial_state, method=hs.EventDriven())
     simulation.step()
     contacts = len(allocate_phase(robot).closed)
-    assert contacts == robot.nc + 3 * robot.nv
+    assert contacts == 2 * robot.nc + 3 * robot.nv
     assert len(simulation._records[0].event_time) > 2 * ((LOOKS + 6) * contacts + 8)
 
 

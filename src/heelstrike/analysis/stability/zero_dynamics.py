@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
 
 from heelstrike.contact.ground import Ground
@@ -26,8 +25,6 @@ from heelstrike.robot.state import State
 
 Floats = NDArray[np.float64]
 
-# Phases at which κ₁ and κ₂ are evaluated: series of analytic functions end long before.
-NODES = 96
 # Phases at which the least momentum is looked for, and of the quadrature of the period.
 GRID = 2001
 POINTS = 64
@@ -125,7 +122,7 @@ class ZeroDynamics:
     @property
     def period(self) -> float:
         """Duration of a step of the walk that repeats, in s."""
-        inertia, added = _series(self._surface, self.touchdown)
+        inertia, added = self._surface.motion(self.touchdown)
         nodes, weights = gauss(POINTS)
         width = self.touchdown.before - self.touchdown.after
         theta = self.touchdown.after + width * nodes
@@ -166,7 +163,7 @@ def zero_dynamics(gait: PhasedGait, ground: Ground | None = None) -> ZeroDynamic
     ground = Ground() if ground is None else ground
     surface = Surface(gait, ground)
     end = surface.touchdown()
-    _, added = _series(surface, end)
+    _, added = surface.motion(end)
     driven = gait.robot.model.actuator_joint
     place = gait.joints(end.after) - end.position[driven]
     speed = gait.joints(end.after, order=1) - end.velocity[driven] / end.rate
@@ -180,13 +177,3 @@ def zero_dynamics(gait: PhasedGait, ground: Ground | None = None) -> ZeroDynamic
         position_defect=float(np.abs(place).max()),
         velocity_defect=float(np.abs(speed).max()),
     )
-
-
-def _series(surface: Surface, end: Touchdown) -> tuple[Chebyshev, Chebyshev]:
-    """1/κ₁, and what gravity has added to ζ since the touchdown before, over the phase."""
-    domain = [end.after, end.before]
-    inertia = Chebyshev.interpolate(np.vectorize(surface.inertia), NODES, domain)
-    power = Chebyshev.interpolate(
-        np.vectorize(lambda theta: surface.inertia(theta) * surface.tipping(theta)), NODES, domain
-    )
-    return inertia, power.integ(lbnd=end.after)

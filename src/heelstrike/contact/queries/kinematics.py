@@ -80,7 +80,8 @@ def contact_kinematics(
     jacobian = np.zeros((*points, robot.nv))
     for i, link, center in at.contact_centers(None):
         radius = float(model.contact_radius[i])
-        gap[i], friction[i], _ = ground_contact(terrain, center[0], center[1], radius, normal[i])
+        gap[i], coefficient, _ = ground_contact(terrain, center[0], center[1], radius, normal[i])
+        friction[i] = model.friction_scale[i] * coefficient
         acceleration = at.bias_acceleration(link, center)
         bias[i] = into_frame(normal[i], tuple(acceleration[:axes]))
         bias[i, 1] -= radius * acceleration[axes]

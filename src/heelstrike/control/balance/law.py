@@ -6,7 +6,7 @@ from math import atan, cos, exp, inf, sin, sqrt
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import constrain, point_task
-from heelstrike.control.balance.footsteps import make_plan
+from heelstrike.control.balance.footsteps import COMMITTED, make_plan
 from heelstrike.control.balance.numbers import Log, Memory, Parameters
 from heelstrike.control.balance.reference import (
     Reference,
@@ -40,6 +40,9 @@ TURNING = 0.15
 STEEP = 0.6
 """Ground whose normal rises less cannot be stood upon."""
 
+BUMP = 0.1
+"""A slope that differs by as much from the one before may be but a bump."""
+
 STEEPEST = 0.35
 """No slope is believed to be steeper."""
 
@@ -51,18 +54,29 @@ def begin_step(t: float, reference: Reference, memory: Memory) -> None:
     memory.phase = 0.0
     memory.late = 0.0
     memory.raised = 0.0
+    memory.lifting = 0
     memory.rate = 1.0 / reference.duration
     memory.plan.remaining = reference.duration
 
 
 @kernel
-def touched(contacts: Contacts, robot: ControlledRobot, foot: int, upright: bool) -> bool:
-    """Whether a foot touches ground that it could stand on, or else what it cannot."""
+def touched(contacts: Contacts, robot: ControlledRobot, foot: int) -> bool:
+    """Whether a foot touches ground that it could stand on."""
     for i in range(robot.nc):
         steep = contacts.normal[i, 1] <= STEEP
-        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and steep != upright:
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and not steep:
             return True
     return False
+
+
+@kernel
+def wall_at(contacts: Contacts, robot: ControlledRobot, foot: int) -> float:
+    """Direction away from a wall that a foot touches, along the ground: ±1, and 0 of none."""
+    for i in range(robot.nc):
+        steep = contacts.normal[i, 1] <= STEEP
+        if robot.contact_foot[i] == foot and contacts.force[i, 0] > 0.0 and steep:
+            return 1.0 if contacts.normal[i, 0] > 0.0 else -1.0
+    return 0.0
 
 
 @kernel
@@ -74,12 +88,14 @@ def exchange_at_touchdown(
     if early or t - memory.start < 0.3 * parameters.planning.earliest:
         return
     swing = 1 - memory.stance
-    if touched(contacts, robot, swing, True):
+    if memory.lifting == 0 and touched(contacts, robot, swing):
         length = memory.swing[0] - memory.sole[0]
         rise = memory.swing[1] - memory.sole[1]
         if abs(length) > 0.1 * parameters.reference.length:
             slope = min(max(rise / length, -STEEPEST), STEEPEST)
-            memory.slope = 0.4 * memory.slope + 0.6 * slope
+            off = slope - memory.slope
+            doubt = (1.0 - parameters.believed) * min(abs(off) / BUMP, 1.0)
+            memory.slope += (1.0 - doubt) * off
         memory.stance = swing
         memory.landed = 0
         memory.steps += 1
@@ -90,15 +106,28 @@ def exchange_at_touchdown(
 def lift_over(
     t: float, contacts: Contacts, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
-    """Lift a swing foot that has hit a wall, such as the riser of a step, over it."""
-    if memory.stands == 1 or not touched(contacts, robot, 1 - memory.stance, False):
+    """Lift a swing foot that has hit a wall, such as the riser of a step, over it.
+
+    It is first taken back and up: a foot that is pressed on against the wall jams, and turns.
+    """
+    if memory.stands == 1:
         return
+    if memory.lifting == 1 and (memory.swing[1] > memory.top or t > memory.until):
+        memory.lifting = 0
+    away = wall_at(contacts, robot, 1 - memory.stance)
+    if memory.lifting == 0:
+        if away == 0.0 or memory.plan.remaining < COMMITTED * parameters.reference.duration:
+            return
+        memory.lifting = 1
+        memory.back = memory.swing[0] + away * parameters.away
+        memory.top = memory.swing[1] + parameters.lift
+        memory.until = t + parameters.search
+        height = memory.swing[1] - memory.sole[1]
+        memory.raised = min(max(memory.raised, height) + parameters.away, parameters.most_raised)
     memory.alarm = 1.0
     memory.phase = min(memory.phase, 0.5)
     memory.late = 0.0
     memory.plan.remaining = max(memory.plan.remaining, 0.3 * parameters.reference.duration)
-    more = parameters.fast * max(t - memory.time, 0.0)
-    memory.raised = min(memory.raised + more, parameters.most_raised)
 
 
 @kernel
@@ -132,13 +161,14 @@ def stand_or_walk(t: float, parameters: Parameters, memory: Memory) -> None:
         level = abs(memory.swing[1] - memory.sole[1]) < 0.1 * hold
         if level and abs(plan.swing) < hold and away < 0.5 * hold:
             memory.stands = 1
+            memory.back = memory.swing[0]
 
 
 @kernel
 def stay(t: float, parameters: Parameters, memory: Memory) -> None:
     """Stand: press beyond the capture point, so that it comes back to the middle of the sole."""
     plan, planning = memory.plan, parameters.planning
-    memory.alarm *= exp(-max(t - memory.time, 0.0) / parameters.calming)
+    memory.alarm = max(memory.alarm - max(t - memory.time, 0.0) / parameters.calming, 0.0)
     memory.time = t
     memory.rate = 0.0
     plan.foothold = plan.swing
@@ -164,12 +194,18 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     make_plan(parameters.planning, reference, parameters.adapts == 1, plan)
     rate = (1.0 - memory.phase) / plan.remaining
     memory.rate += min(elapsed / parameters.smoothing, 1.0) * (rate - memory.rate)
+    memory.alarm = max(memory.alarm - elapsed / parameters.calming, 0.0)
     if landed and parameters.adapts == 1:
-        span = parameters.alarmed - parameters.calm
-        alarm = min(max((sqrt(plan.cost) - parameters.calm) / span, 0.0), 1.0)
         # A foot that is late has found the ground lower than it should be.
-        alarm = max(alarm, min(2.0 * memory.late / parameters.search - 0.2, 1.0))
-        memory.alarm = max(alarm, memory.alarm * exp(-elapsed / parameters.calming))
+        alarm = min(2.0 * memory.late / parameters.search - 0.2, 1.0)
+        amiss = sqrt(plan.cost)
+        if plan.remaining < COMMITTED * reference.duration:
+            # A foot that is as good as down cannot be placed anew: the next one will be off by
+            # what this one misses, not by what missing it costs.
+            amiss /= sqrt(max(parameters.planning.capture_weight, 1.0))
+        span = parameters.alarmed - parameters.calm
+        alarm = max(alarm, min((amiss - parameters.calm) / span, 1.0))
+        memory.alarm = max(memory.alarm, alarm)
 
 
 @kernel
@@ -278,7 +314,11 @@ def want_foothold(
     pull = 6.0 * (goal - off) / (left * left) - damping * 4.0 * drift / left
     limit = parameters.planning.acceleration
     pull = min(max(pull, -limit), limit)
-    ahead = min(max(curvature_at(reference.swing_x, phase) * squared + pull, -limit), limit)
+    ahead = curvature_at(reference.swing_x, phase) * squared + pull
+    if memory.lifting == 1:
+        haste = parameters.haste
+        ahead = (6.0 * (memory.back - memory.swing[0]) / haste - 4.0 * plan.speed) / haste
+    ahead = min(max(ahead, -limit), limit)
     add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
 
     # Over the ground: the gait's way, higher when alarmed; a late foot looks for the ground.
@@ -297,6 +337,8 @@ def want_foothold(
     else:
         rise = bend + parameters.foot_kp * (up - height)
         rise += damping * parameters.foot_kd * (speed - memory.speed[1])
+    if memory.lifting == 1:
+        rise = parameters.foot_kd * (parameters.fast - memory.speed[1])
     rise = min(max(rise, -limit), limit)
     add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
 
@@ -313,13 +355,18 @@ def want_foothold(
 def want_rest(
     state: ControlState, robot: ControlledRobot, parameters: Parameters, memory: Memory
 ) -> None:
-    """Add the task of the other foot as the robot stands: to stay where it is."""
+    """Add the task of the other foot as the robot stands: to lie where it came to rest."""
     weights, on, program = parameters.weights, memory.on, memory.program
-    link, kd = robot.foot_link[1 - memory.stance], parameters.foot_kd
+    link, kp, kd = robot.foot_link[1 - memory.stance], parameters.foot_kp, parameters.foot_kd
     point_task(robot, state, link, memory.swing, on)
-    add_task(on.rows, 0, -kd * memory.speed[0] - on.shift[0], weights.swing, program)
-    add_task(on.rows, 1, -kd * memory.speed[1] - on.shift[1], weights.swing, program)
-    turn = -kd * state.kinematics.velocity[link, 0]
+    ahead = kp * (memory.back - memory.swing[0]) - kd * memory.speed[0]
+    add_task(on.rows, 0, ahead - on.shift[0], weights.swing, program)
+    # A little below the ground, so that it goes on touching it.
+    low = memory.sole[1] + memory.slope * memory.plan.swing - parameters.flat
+    rise = kp * (low - memory.swing[1]) - kd * memory.speed[1]
+    add_task(on.rows, 1, rise - on.shift[1], weights.swing, program)
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[1 - memory.stance]
+    turn = -kp * (tilt + atan(memory.slope)) - kd * state.kinematics.velocity[link, 0]
     add_task(on.rows, 2, turn - on.shift[2], weights.angle, program)
 
 
@@ -393,8 +440,8 @@ def keep_balance(
 ) -> None:  # fmt: skip
     """Joint torques that walk, by the gait or by where the next foot has to land."""
     exchange_at_touchdown(t, contacts, robot, parameters, memory)
-    lift_over(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
+    lift_over(t, contacts, robot, parameters, memory)
     landed = has_landed(t, state, contacts, robot, parameters, memory)
     stand_or_walk(t, parameters, memory)
     if memory.stands == 1:

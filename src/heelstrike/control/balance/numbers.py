@@ -97,13 +97,18 @@ class Parameters(Landing):
         Errors of the capture point at the end of the step (m) up to which the gait is followed,
         and from which on balance is all that counts.
     calming : float
-        Time constant in which an alarm fades (s).
+        Time in which an alarm fades, evenly (s).
+    believed : float
+        Part of the slope between two footholds by which the estimate follows it.
     flat : float
         Points of the stance foot less than this above the ground touch it (m).
     crouch, lift : float
         How much lower the hip, how much higher the swing foot is when alarmed (m).
+    away : float
+        How far a swing foot that has hit a wall is taken back, and how much higher than there the
+        ground behind it is taken to be (m).
     most_raised : float
-        How much higher a swing foot that has hit something is lifted at most (m).
+        How high that ground is taken to be at most (m).
     bent_knee, straight_knee : float
         How far a knee stays bent when alarmed, and otherwise (rad).
     slow, fast : float
@@ -137,9 +142,11 @@ class Parameters(Landing):
     calm: float = number(float)
     alarmed: float = number(float)
     calming: float = number(float)
+    believed: float = number(float)
     flat: float = number(float)
     crouch: float = number(float)
     lift: float = number(float)
+    away: float = number(float)
     most_raised: float = number(float)
     bent_knee: float = number(float)
     straight_knee: float = number(float)
@@ -164,6 +171,11 @@ class Memory(Stance):
         Where in the step the reference is, and how fast it moves (1/s).
     raised : float
         How much higher the swing foot is held, because it has hit something (m).
+    lifting : int
+        Whether the swing foot is lifted clear of a wall that it has hit.
+    back, top, until : float
+        Where it is held meanwhile, or as the robot stands (m), up to which height (m), and until
+        when at the latest (s).
     late : float
         For how long the swing foot has looked for the ground (s).
     alarm : float
@@ -189,6 +201,10 @@ class Memory(Stance):
     phase: float = cell(float)
     rate: float = cell(float)
     raised: float = cell(float)
+    lifting: int = cell(int)
+    back: float = cell(float)
+    top: float = cell(float)
+    until: float = cell(float)
     late: float = cell(float)
     alarm: float = cell(float)
     slope: float = cell(float)

@@ -30,6 +30,12 @@ VIOLATED = 1e-11
 DEPENDENT = 1e-12
 """A normal whose part beside those taken up is smaller, relative to itself, depends on them."""
 
+STRAYED = 1e-10
+"""An answer whose rows or forces are farther off than this, relative to their size, is refined."""
+
+REFINEMENTS = 3
+"""How often, at most."""
+
 
 @kernel
 def begin(program: Program) -> bool:
@@ -235,6 +241,69 @@ def satisfy(program: Program, row: int, taken: int) -> int:
 
 
 @kernel
+def sign_of(program: Program, row: int, signs: int) -> float:
+    """Return the sense in which a row was taken up: equalities may be, from either side."""
+    return -1.0 if row < program.equalities and (signs >> row) & 1 else 1.0
+
+
+@kernel
+def strayed(program: Program, taken: int, signs: int) -> bool:
+    """Whether x is off the rows taken up, or forces off balance; write Nu − H x − g into `step`."""
+    n = program.x.shape[0]
+    worst, force = 0.0, 0.0
+    for i in range(n):
+        total, size = -program.gradient[i], abs(program.gradient[i])
+        for j in range(n):
+            share = program.hessian[i, j] * program.x[j]
+            total -= share
+            size += abs(share)
+        for k in range(taken):
+            row = program.active[k]
+            share = sign_of(program, row, signs) * program.rows[row, i] * program.dual[k]
+            total += share
+            size += abs(share)
+        program.step[i] = total
+        worst, force = max(worst, abs(total)), max(force, size)
+    off = worst > STRAYED * force
+    for k in range(taken):
+        row = program.active[k]
+        off = off or abs(slack(program, row)) > STRAYED * (1e-30 + size_of(program, row))
+    return off
+
+
+@kernel
+def refine(program: Program, taken: int, signs: int) -> None:
+    """Solve once more for what is missing, which is in `step` and in the rows taken up.
+
+    H δx − N δu = ρ and Nᵀδx = r are, with δx = J z: z₁ = R⁻ᵀr, z₂ = J₂ᵀρ, R δu = z₁ − J₁ᵀρ.
+    """
+    n = program.x.shape[0]
+    along, turned, triangle = program.along, program.turned, program.triangle
+    for k in range(n):
+        total = 0.0
+        for i in range(n):
+            total += program.inverse[i, k] * program.step[i]
+        along[k] = total
+    for k in range(taken):
+        row = program.active[k]
+        total = -sign_of(program, row, signs) * slack(program, row)
+        for j in range(k):
+            total -= triangle[j, k] * turned[j]
+        turned[k] = total / triangle[k, k]
+    for k in range(taken):
+        along[k], turned[k] = turned[k], turned[k] - along[k]
+    for k in range(taken - 1, -1, -1):
+        total = turned[k]
+        for j in range(k + 1, taken):
+            total -= triangle[k, j] * turned[j]
+        turned[k] = total / triangle[k, k]
+        program.dual[k] += turned[k]
+    for i in range(n):
+        for k in range(n):
+            program.x[i] += program.inverse[i, k] * along[k]
+
+
+@kernel
 def solve(program: Program) -> None:
     """Solve a programme: write `x`, `multiplier`, `status` and `iterations`.
 
@@ -247,10 +316,14 @@ def solve(program: Program) -> None:
     if not begin(program):
         program.status = NOT_CONVEX
         return
-    taken, signs = 0, 0
+    taken, signs, refinements = 0, 0, 0
     while True:
         row = most_violated(program, taken)
         if row < 0:
+            if refinements < REFINEMENTS and strayed(program, taken, signs):
+                refine(program, taken, signs)
+                refinements += 1
+                continue
             program.status = SOLVED
             break
         if program.iterations > 10 * (n + program.count):
@@ -265,8 +338,7 @@ def solve(program: Program) -> None:
             signs |= 1 << row
     for k in range(taken):
         row = program.active[k]
-        sign = -1.0 if row < program.equalities and (signs >> row) & 1 else 1.0
-        program.multiplier[row] = sign * program.dual[k]
+        program.multiplier[row] = sign_of(program, row, signs) * program.dual[k]
 
 
 @kernel

@@ -70,6 +70,8 @@ def links(robot: Robot, *, least_radius: float = 0.0) -> list[Link]:
     """
     model = robot.model
     refuse_loops(robot, "what hands robots over to other engines", InvalidRunError)
+    if np.any(model.friction_scale != 1.0):
+        raise InvalidRunError("friction of single contact points is not handed over")
     for name in ("stiffness", "dry_friction"):
         if np.any(getattr(model, name)):
             raise InvalidRunError(f"{name} of joints is not handed over")

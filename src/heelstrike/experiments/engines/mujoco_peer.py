@@ -137,6 +137,10 @@ class MuJoCoPeer(Peer):
 def _spec(scenario: Scenario) -> Any:
     if scenario.robot.model.latches:
         raise InvalidRunError("latches of joints are not handed over")
+    if scenario.robot.model.brakes:
+        raise InvalidRunError("brakes of joints are not handed over")
+    if np.any(scenario.robot.model.friction_scale != 1.0):
+        raise InvalidRunError("friction of single contact points is not handed over")
     with tempfile.TemporaryDirectory() as folder:
         file = scenario.robot.save(Path(folder) / "robot.xml")
         spec = mujoco.MjSpec.from_file(str(file))

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial import Chebyshev
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
@@ -23,6 +24,8 @@ Floats = NDArray[np.float64]
 # A touchdown is looked for within this much of the range of the phase about its end.
 NEAR_THE_END = 0.05
 LOOKS = 21
+# Phases at which κ₁ and κ₂ are evaluated: series of analytic functions end long before.
+NODES = 96
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -124,6 +127,21 @@ class Surface:
         """Moment of gravity about the stance foot (N m), which is σ̇."""
         q = self.position(theta)
         return float(-self.turning(q) @ dynamics.gravity_force(self.robot, q))
+
+    def motion(self, end: Touchdown) -> tuple[Chebyshev, Chebyshev]:
+        """1/κ₁, and what gravity has added to σ²/2 since the touchdown before, over the phase.
+
+        Parameters
+        ----------
+        end : Touchdown
+            Of this surface: the step goes from one to the next.
+        """
+        domain = [end.after, end.before]
+        inertia = Chebyshev.interpolate(np.vectorize(self.inertia), NODES, domain)
+        power = Chebyshev.interpolate(
+            np.vectorize(lambda theta: self.inertia(theta) * self.tipping(theta)), NODES, domain
+        )
+        return inertia, power.integ(lbnd=end.after)
 
     def swing_gap(self, theta: float) -> float:
         """Height of the swing foot above the ground (m)."""

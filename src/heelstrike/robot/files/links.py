@@ -19,8 +19,8 @@ from heelstrike.robot.files.posture import followers
 from heelstrike.robot.model import POWERS, Floats, Integers
 
 MOST_JOINTS = 1000
-LATCH = "latch"
-"""What custom data of latches are called."""
+LATCH, BRAKE = "latch", "brake"
+"""What custom data of latches and brakes are called."""
 SAME_PLACE = 1e-9
 """Metres up to which two hinges are one: in space an axis takes two points."""
 
@@ -132,7 +132,7 @@ def _inertia(file: MujocoFile, of_body: Integers, origin: Floats) -> dict[str, F
 
 
 def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
-    """Return loops, couplings and latches, as numbers of :class:`~heelstrike.robot.model.Model`."""
+    """Return what holds beside the joints, as numbers of :class:`~heelstrike.robot.model.Model`."""
     loops: dict[tuple[Any, ...], tuple[Any, Any]] = {}
     for ends, places in _connections(file, links):
         rounded = np.round(np.ravel(places) / SAME_PLACE).astype(np.int64)
@@ -147,6 +147,7 @@ def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
         "latch_joint": [joint for joint, _, _ in latches],
         "latch_side": [side for _, side, _ in latches],
         "latch_release": [link for _, _, link in latches],
+        "brake_joint": list(_brakes(file)),
     }
 
 
@@ -241,3 +242,24 @@ def _latches(file: MujocoFile, links: Links) -> Iterator[tuple[int, int, int]]:
                 f"there is no such joint or link, or its data are {side:g}."
             )
         yield place[joint], int(side), int(links.of_body[bodies[0]]) if bodies else -1
+
+
+def _brakes(file: MujocoFile) -> Iterator[int]:
+    """Joints with a brake, custom data called ``brake:JOINT``.
+
+    Raises
+    ------
+    RobotError
+        If there is no such joint.
+    """
+    place = {one.name: i for i, one in enumerate(file.coordinates)}
+    for numeric in range(file.model.nnumeric):
+        held, _, joint = file.given_name("numeric", numeric).partition(":")
+        if held != BRAKE:
+            continue
+        if joint not in place:
+            raise file.error(
+                f"the brake {joint!r} in <custom> is called brake:JOINT after a joint: there is no "
+                "such joint."
+            )
+        yield place[joint]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from heelstrike.errors import RobotError
-from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
+from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, Model, label
 from heelstrike.robot.sides.mirror import Mirror
 from heelstrike.robot.sides.symmetry import (
     FLOOR,
@@ -103,6 +103,6 @@ def _images(model: Model, mirror: Mirror) -> Iterator[tuple[str, Floats, Integer
     ends = driven.velocity(model.torque_lower), driven.velocity(model.torque_upper)
     yield "torque_lower", np.minimum(*ends), model.actuator_joint, ROUND_OFF
     yield "torque_upper", np.maximum(*ends), model.actuator_joint, ROUND_OFF
-    for name in ("contact_position", "contact_radius"):
+    for name in ("contact_position", "contact_radius", *SCALES):
         values = mirror.at_contacts(getattr(model, name))
-        yield name, values, model.contact_link, SAME_PLACE
+        yield name, values, model.contact_link, ROUND_OFF if name in SCALES else SAME_PLACE

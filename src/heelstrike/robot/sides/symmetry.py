@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from heelstrike.robot.model import NUMBERS, Floats, Integers, Model, label
+from heelstrike.robot.model import NUMBERS, SCALES, Floats, Integers, Model, label
 from heelstrike.robot.robot import Foot
 from heelstrike.robot.sides.mirror import Mirror
 
@@ -100,6 +100,7 @@ def differences(
         *_differing_loops(model, mirror, link_names),
         *_differing_couplings(model, mirror, joint_names),
         *_differing_latches(model, mirror, joint_names),
+        *_differing_brakes(model, mirror, joint_names),
     ]
     return list(dict.fromkeys(findings))  # two points of a foot may say the same
 
@@ -266,6 +267,7 @@ def _differing_contacts(model: Model, mirror: Mirror, names: Sequence[str]) -> I
         compared = [
             ("contact points", *model.contact_position[[i, j]], SAME_PLACE),
             ("radius of the contact points", *model.contact_radius[[i, j]], SAME_PLACE),
+            *((label(name), *getattr(model, name)[[i, j]]) for name in SCALES),
         ]
         yield from _unequal(compared, f"of {names[link]} and {names[other]}")
 
@@ -317,6 +319,13 @@ def _differing_latches(model: Model, mirror: Mirror, names: Sequence[str]) -> It
         its = int(image[joint]), int(side * mirror.sign[joint]), int(image[release])
         if its not in known:
             yield f"the latch of {names[joint]} has no mirror image"
+
+
+def _differing_brakes(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
+    braked = set(model.brake_joint.tolist())
+    for joint in sorted(braked):
+        if int(mirror.joint[joint]) not in braked:
+            yield f"{names[joint]} has a brake, {names[int(mirror.joint[joint])]} has none"
 
 
 def _unequal(compared: Iterable[tuple[Any, ...]], pair: str) -> Iterator[str]:

@@ -41,13 +41,19 @@ from heelstrike.dynamics.kernels import (
     passive_force,
     solve_factorized,
 )
-from heelstrike.dynamics.loops import count_rows, find_rows
+from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.compliant.corners import (
+    Corners,
+    allocate_corners,
+    observe_sides,
+    show_forces,
+)
 from heelstrike.sim.compliant.law import FrictionForces, NormalForces
 from heelstrike.sim.compliant.rosenbrock import GAMMA, STAGES, TIMES, A, C, E, M
-from heelstrike.sim.contacts.geometry import contact_rows, observe, row_product, weigh
-from heelstrike.sim.contacts.loops import push_loops, respond, speed_along
+from heelstrike.sim.contacts.geometry import contact_rows, row_product, weigh
+from heelstrike.sim.contacts.loops import find_loops, push_loops, respond, rows_of, speed_along
 from heelstrike.sim.controller.asking import ask, consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.guard import guarded
@@ -132,8 +138,15 @@ class CompliantWorkspace(Bundle):
     ----------
     now, base : Rates
         At the state evaluated last, and at the start of the step.
-    force : (nc, 2) float
-        Contact forces at the state evaluated last, in newtons.
+    force : (2 nc, 2) float
+        Contact forces at the state evaluated last, in newtons: of the points, then of their second
+        faces.
+    base_force : (2 nc, 2) float
+        The same at the start of the step.
+    corners : Corners
+        Which points are in concave corners.
+    place : (nc, 2) float
+        Where the resultants of both faces acted since the last sample.
     now_words, base_words : (any,) int
         The memory of both.
     torque_by_q, torque_by_v : (nu, nv) float
@@ -143,7 +156,7 @@ class CompliantWorkspace(Bundle):
     trial_command, trial_torque : (nu,) float
         Commands and torques of a perturbed state.
     base_q, base_v : (nv,) float
-    base_rows : (2 nc, nv) float
+    base_rows : (4 nc, nv) float
     base_matrix : (nv, nv) float
         State, contact Jacobian and A at the start of the step.
     force_by_q : (nv, nv) float
@@ -158,12 +171,12 @@ class CompliantWorkspace(Bundle):
         Jacobian of the loops at the start of the step, what the system makes of its rows, and the
         products of both.
     stage_q, stage_v : (4, nv) float
-    stage_bristle : (4, nc) float
+    stage_bristle : (4, 2 nc) float
         The stages u_i.
     right_q, right_v : (nv,) float
-    right_bristle : (nc,) float
+    right_bristle : (2 nc,) float
         Right-hand side of a stage.
-    impulse : (nc, 2) float
+    impulse : (2 nc, 2) float
     stop_impulse, dry_impulse : (nv,) float
     loop_impulse : (loop_rows,) float
         Impulses of contacts, joint stops, dry friction and loops since the last sample, in N s
@@ -182,7 +195,10 @@ class CompliantWorkspace(Bundle):
 
     now: Rates = part(Rates)
     base: Rates = part(Rates)
-    force: Floats = array("nc", "components")
+    force: Floats = array("2 nc", "components")
+    base_force: Floats = array("2 nc", "components")
+    corners: Corners = part(Corners)
+    place: Floats = array("nc", "axes")
     now_words: Integers = array("words", of=int, address=True)
     base_words: Integers = array("words", of=int, address=True)
     torque_by_q: Floats = array("nu", "nv")
@@ -192,7 +208,7 @@ class CompliantWorkspace(Bundle):
     age: int = cell(int)
     base_q: Floats = array("nv")
     base_v: Floats = array("nv")
-    base_rows: Floats = array("2 nc", "nv")
+    base_rows: Floats = array("4 nc", "nv")
     base_matrix: Floats = array("nv", "nv")
     force_by_q: Floats = array("nv", "nv")
     system: Floats = array("nv", "nv")
@@ -202,11 +218,11 @@ class CompliantWorkspace(Bundle):
     loop_matrix: Floats = array("loop_rows", "loop_rows")
     stage_q: Floats = array("stages", "nv")
     stage_v: Floats = array("stages", "nv")
-    stage_bristle: Floats = array("stages", "nc")
+    stage_bristle: Floats = array("stages", "2 nc")
     right_q: Floats = array("nv")
     right_v: Floats = array("nv")
-    right_bristle: Floats = array("nc")
-    impulse: Floats = array("nc", "components")
+    right_bristle: Floats = array("2 nc")
+    impulse: Floats = array("2 nc", "components")
     stop_impulse: Floats = array("nv")
     dry_impulse: Floats = array("nv")
     loop_impulse: Floats = array("loop_rows")
@@ -225,12 +241,13 @@ def compliant_workspace(
 ) -> CompliantWorkspace:
     """Allocate the scratch for a robot."""
     extents = {
-        "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "stages": STAGES,
-        "loop_rows": count_rows(robot.model),
+        "nv": robot.nv, "nu": robot.nu, "nc": robot.nc, "components": 2, "axes": 2,
+        "stages": STAGES, "loop_rows": most_rows(robot.model),
     }  # fmt: skip
     rates = Rates.allocate(
         extents,
-        normal=NormalForces.allocate(n=robot.nc),
+        normal=NormalForces.allocate(n=2 * robot.nc),
+        friction=FrictionForces.allocate(nc=2 * robot.nc),
         stop=NormalForces.allocate(n=robot.nv),
     )
     now, now_words = in_one_block(rates)
@@ -238,7 +255,7 @@ def compliant_workspace(
     return CompliantWorkspace.allocate(
         extents, now=now, base=base, now_words=now_words, base_words=base_words,
         trial_command=guarded(np.zeros(robot.nu)), age=GAINS_LAST, laws=laws, step=step, rtol=rtol,
-        atol=atol, proposed=step,
+        atol=atol, proposed=step, corners=allocate_corners(robot),
     )  # fmt: skip
 
 
@@ -314,14 +331,14 @@ def evaluate(
     would do (``TRIED``), for good (``DECIDED``), or for good with the contact forces of this very
     state, which is ``ACCEPTED``.
     """
-    observe(model, ground, memory.q, memory.v, memory)
+    observe_sides(model, ground, memory.q, memory.v, memory, work.corners)
     now = work.now
     push_contacts(model, memory, work)
     push_stops(model, work.laws, memory, now)
     rub_joints(model, work.laws.joint_speed, memory, now)
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
-            copy_words(work.force, memory.contacts.force)
+            show_forces(model, work.force, work.corners, memory.contacts)
         q, v, command = memory.q, memory.v, memory.command
         if how == TRIED:
             consult(controller, time, q, v, model, memory, control, command)
@@ -344,7 +361,7 @@ def evaluate(
             + now.stop_force[j]
             + now.dry_force[j]
         )
-    for contact in range(model.contact_link.shape[0]):
+    for contact in range(work.corners.sides):
         normal = work.force[contact, 0]
         tangent = work.force[contact, 1]
         if normal > 0.0:
@@ -362,8 +379,8 @@ def evaluate(
 def hold_loops(model: Model, memory: Memory, now: Rates) -> None:
     """Find the forces of the loops, and the accelerations under them."""
     loops, rate = memory.loops, now.acceleration
-    rows = now.loop.shape[0]
-    find_rows(model, memory.q, memory.v, memory.equations.tree, loops.rows)
+    rows = rows_of(loops)
+    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
     weigh(model, memory.equations)
     respond(model, memory.equations, loops)
     for row in range(rows):
@@ -386,14 +403,33 @@ def push_contacts(model: Model, memory: Memory, work: CompliantWorkspace) -> Non
                 memory.assembly.jacobian, 2 * contact + 1, memory.v
             )
             normal.speed[contact] = row_product(memory.assembly.jacobian, 2 * contact, memory.v)
+    copy_words(memory.surface.friction[: model.nc], friction.friction)
+    copy_words(memory.reaction.slip, friction.speed)
+    if work.corners.sides > model.nc:
+        meet_second_faces(model, memory, work)
     call_at(laws.normal_code, (address_of(laws.normal), normal))
     copy_words(normal.force, friction.normal)
-    copy_words(memory.surface.friction, friction.friction)
-    copy_words(memory.reaction.slip, friction.speed)
     call_at(laws.friction_code, (address_of(laws.friction), friction))
-    for contact in range(model.contact_link.shape[0]):
+    for contact in range(work.corners.sides):
         work.force[contact, 0] = normal.force[contact]
         work.force[contact, 1] = friction.force[contact]
+
+
+@kernel
+def meet_second_faces(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
+    """Gaps and speeds of the points on their second faces, with their Jacobian rows."""
+    seconds, jacobian = work.corners.contacts, memory.assembly.jacobian
+    normal, friction = work.now.normal, work.now.friction
+    for contact in range(model.nc, work.corners.sides):
+        point = contact - model.nc
+        normal.gap[contact] = seconds.gap[point]
+        friction.friction[contact] = work.corners.friction[point]
+        friction.speed[contact] = 0.0
+        if normal.gap[contact] < 0.0:
+            tree = memory.equations.tree
+            contact_rows(model, tree, seconds, point, contact, memory.assembly)
+            normal.speed[contact] = row_product(jacobian, 2 * contact, memory.v)
+            friction.speed[contact] = row_product(jacobian, 2 * contact + 1, memory.v)
 
 
 @kernel
@@ -444,10 +480,11 @@ def rub_joints(model: Model, scale: float, memory: Memory, now: Rates) -> None:
 def begin_step(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Make the state evaluated last the start of the next step."""
     copy_words(work.now_words, work.base_words)
+    copy_words(work.force, work.base_force)
     copy_words(memory.q, work.base_q)
     copy_words(memory.v, work.base_v)
     copy_words(memory.equations.mass_matrix, work.base_matrix)
-    for row in range(2 * model.contact_link.shape[0]):
+    for row in range(2 * work.corners.sides):
         for j in range(model.parent.shape[0]):
             work.base_rows[row, j] = memory.assembly.jacobian[row, j]
     for row in range(work.loop_rows.shape[0]):
@@ -491,7 +528,7 @@ def factorize_step(
             joint = model.actuator_joint[i]
             damping = motor_damping(model, i, control.voltage, command[i], work.base_v)
             system[joint, joint] += g * damping
-    for contact in range(model.contact_link.shape[0]):
+    for contact in range(work.corners.sides):
         if base.normal.force[contact] <= 0.0:
             continue
         by_normal, by_speed, _ = tangent_gains(base.friction, contact, g)
@@ -577,7 +614,7 @@ def solve_stage(model: Model, g: float, stage: int, loops: Loops, work: Complian
         u_v[i] = g * (
             dot(work.base_matrix[i], work.right_v) + g * dot(work.force_by_q[i], work.right_q)
         )
-    for contact in range(u_s.shape[0]):
+    for contact in range(work.corners.sides):
         if base.normal.force[contact] <= 0.0:
             continue
         _, _, bend = tangent_gains(base.friction, contact, g)
@@ -588,7 +625,7 @@ def solve_stage(model: Model, g: float, stage: int, loops: Loops, work: Complian
     keep_loops(g, u_v, loops, work)
     for j in range(nv):
         u_q[j] = g * (work.right_q[j] + u_v[j])
-    for contact in range(u_s.shape[0]):
+    for contact in range(work.corners.sides):
         change = work.right_bristle[contact]
         if base.normal.force[contact] > 0.0:
             normal_row = work.base_rows[2 * contact]
@@ -630,7 +667,7 @@ def attempt_step(
     rtol, atol, now, base = work.rtol, work.atol, work.now, work.base
     how = DECIDED if h <= DECISIVE else TRIED
     nv = model.parent.shape[0]
-    nc = model.contact_link.shape[0]
+    nc = work.corners.sides
     g = GAMMA * h
     factorize_step(model, control, g, memory.command, work)
     for stage in range(STAGES):

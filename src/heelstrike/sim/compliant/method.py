@@ -17,13 +17,21 @@ from typing import Any
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.compliant.contact_law import BristleFriction, HuntCrossley, KelvinVoigt
+from heelstrike.sim.compliant.corners import (
+    begin_joining,
+    choose_sides,
+    join,
+    misses_corner,
+    observe_sides,
+    show_forces,
+    tell_resultants,
+)
 from heelstrike.sim.compliant.dynamics import (
     ACCEPTED,
     GAINS_LAST,
@@ -39,9 +47,11 @@ from heelstrike.sim.compliant.dynamics import (
 )
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
+from heelstrike.sim.contacts.brakes import note_brakes, take_hold
+from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.contacts.latches import react
-from heelstrike.sim.contacts.loops import close_loops, note_loop, steady_loops
+from heelstrike.sim.contacts.loops import close_loops, note_loop, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.motors import limit_torque
 from heelstrike.sim.frame import BAD_CONTROLLER, DIVERGED, DONE, Kernels, Scene
@@ -168,7 +178,12 @@ class Compliant(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a sample may add to the record."""
-        return 1, 4 * robot.nc + robot.nv + robot.model.latches
+        return 1, 4 * robot.nc + robot.nv + robot.model.latches + robot.model.brakes
+
+    def forget_ground(self, robot: Robot, work: CompliantWorkspace, clock: Clock) -> None:  # noqa: ARG002
+        """Let no point be in a corner of it."""
+        work.corners.first[:] = NO_FACE
+        work.corners.second[:] = NO_FACE
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with a restitution of its own."""
@@ -192,13 +207,20 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
         work.dry_impulse[joint] += 0.5 * h * (base.dry_force[joint] + now.dry_force[joint])
     for row in range(work.loop_impulse.shape[0]):
         work.loop_impulse[row] += 0.5 * h * (base.loop[row] + now.loop[row])
-    for contact in range(model.contact_link.shape[0]):
+    for contact in range(work.corners.sides):
         normal = base.normal.force[contact] + now.normal.force[contact]
         tangent = base.friction.force[contact] + now.friction.force[contact]
         work.impulse[contact, 0] += 0.5 * h * normal
         work.impulse[contact, 1] += 0.5 * h * tangent
-        gap = memory.contacts.gap[contact]
-        before = work.base.normal.gap[contact]
+    if work.corners.sides > model.nc:
+        join(model, h, work.base_force, memory.contacts, work.corners)
+        join(model, h, work.force, memory.contacts, work.corners)
+    for contact in range(model.contact_link.shape[0]):
+        gap = now.normal.gap[contact]
+        before = base.normal.gap[contact]
+        if work.corners.sides > model.nc:
+            gap = min(gap, now.normal.gap[model.nc + contact])
+            before = min(before, base.normal.gap[model.nc + contact])
         memory.tally.penetration = max(memory.tally.penetration, -gap)
         if memory.reported.closed[contact] == 0 and gap < 0.0:
             memory.reported.closed[contact] = 1
@@ -209,7 +231,7 @@ def account(model: Model, since: float, h: float, memory: Memory, work: Complian
             share = before / (before - gap) if before < 0.0 else 0.0
             work.left[contact] = since + share * h
     residual = memory.assembly.answer.residual
-    residual[1] = max(residual[1], cone_residual(memory.surface.friction, work))
+    residual[1] = max(residual[1], cone_residual(work))
     memory.tally.steps += 1
     work.age += 1
 
@@ -222,8 +244,9 @@ def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspac
     long step through the air may all lie above the ground that its end lies in.
     """
     first = 1.0
-    for contact in range(model.contact_link.shape[0]):
-        gap = gap_now[contact]
+    for contact in range(work.corners.sides):
+        is_second = contact >= model.nc
+        gap = work.corners.contacts.gap[contact - model.nc] if is_second else gap_now[contact]
         before = work.base.normal.gap[contact]
         if before > depth and gap < -depth:
             first = min(first, before / (before - gap))
@@ -231,10 +254,11 @@ def landing(model: Model, depth: float, gap_now: Floats, work: CompliantWorkspac
 
 
 @kernel
-def cone_residual(friction: Floats, work: CompliantWorkspace) -> float:
+def cone_residual(work: CompliantWorkspace) -> float:
     """Largest excess of a contact force over the friction cone, relative to the force."""
     worst = 0.0
-    for contact in range(work.touched.shape[0]):
+    friction = work.now.friction.friction
+    for contact in range(work.corners.sides):
         normal = work.force[contact, 0]
         tangent = abs(work.force[contact, 1])
         excess = max(-normal, tangent - friction[contact] * normal)
@@ -246,11 +270,14 @@ def cone_residual(friction: Floats, work: CompliantWorkspace) -> float:
 @kernel
 def sample(
     controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
-    memory: Memory, work: CompliantWorkspace,
+    memory: Memory, work: CompliantWorkspace, record: Record,
 ) -> int:  # fmt: skip
     """Integrate from one sample to the next; return DONE or what was in the way."""
-    begin_sample(memory, work)
-    span = work.step
+    begin_sample(model, memory, work)
+    if take_hold(memory.loops):
+        brake(model, start, memory, work, record)
+        evaluate(controller, control, model, ground, HELD, start, memory, work)
+    span, corners = work.step, work.corners
     elapsed = 0.0
     h = work.proposed
     begin_step(model, memory, work)
@@ -281,11 +308,14 @@ def sample(
             if not close_loops(model, equations, loops, q):
                 return DIVERGED
             steady_loops(model, q, equations, loops, memory.v)
-        observe(model, ground, memory.q, memory.v, memory)
+        observe_sides(model, ground, memory.q, memory.v, memory, corners)
         met = landing(model, work.atol, memory.contacts.gap, work)
+        if misses_corner(model, ground, work.atol, memory.contacts, corners):
+            met = min(met, 0.5)
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
+        choose_sides(model, ground, memory.contacts, corners, work.now.friction.bend)
         # At the sample itself the controller is called by the frame.
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
@@ -312,11 +342,13 @@ def rescaled(error: float, limit: float) -> float:
 
 
 @kernel
-def begin_sample(memory: Memory, work: CompliantWorkspace) -> None:
+def begin_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Forget the impulses and crossings of the sample before."""
-    for contact in range(work.touched.shape[0]):
+    begin_joining(model, memory.contacts, work.corners)
+    for contact in range(work.corners.sides):
         work.impulse[contact, 0] = 0.0
         work.impulse[contact, 1] = 0.0
+    for contact in range(work.touched.shape[0]):
         work.touched[contact] = -1.0
         work.left[contact] = -1.0
     for joint in range(work.stop_impulse.shape[0]):
@@ -324,7 +356,20 @@ def begin_sample(memory: Memory, work: CompliantWorkspace) -> None:
         work.dry_impulse[joint] = 0.0
     for row in range(work.loop_impulse.shape[0]):
         work.loop_impulse[row] = 0.0
-    memory.assembly.answer.residual[1] = cone_residual(memory.surface.friction, work)
+    memory.assembly.answer.residual[1] = cone_residual(work)
+
+
+@kernel
+def brake(
+    model: Model, time: float, memory: Memory, work: CompliantWorkspace, record: Record
+) -> None:
+    """Let the brakes that have been put on stop their joints, by impulses."""
+    loops = memory.loops
+    steady_loops(model, memory.q, memory.equations, loops, memory.v)
+    for row in range(rows_of(loops)):
+        work.loop_impulse[row] = loops.unknown[row]
+        note_loop(model, row, loops.unknown[row], loops)
+    note_brakes(model, time, 1.0, record, loops)
 
 
 @kernel
@@ -333,6 +378,7 @@ def finish_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> Non
     span = work.step
     for row in range(work.loop_impulse.shape[0]):
         note_loop(model, row, work.loop_impulse[row] / span, memory.loops)
+    tell_resultants(model, work.corners, work.impulse, work.place)
     for contact in range(work.touched.shape[0]):
         for k in range(2):
             memory.contacts.force[contact, k] = work.impulse[contact, k] / span
@@ -384,7 +430,7 @@ def note_forces(
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
         record.friction_torque[row, joint] = dry_force[joint]
-    for contact in range(force.shape[0]):
+    for contact in range(record.contact_force.shape[1]):
         record.contact_force[row, contact, 0] = force[contact, 0]
         record.contact_force[row, contact, 1] = force[contact, 1]
         record.slip_velocity[row, contact] = memory.reaction.slip[contact]
@@ -393,6 +439,8 @@ def note_forces(
         record.loop_force[row, loop, 1] = memory.loops.loop_force[loop, 1]
     for coupling in range(record.coupling_force.shape[1]):
         record.coupling_force[row, coupling] = memory.loops.coupling_force[coupling]
+    for joint in range(record.brake_torque.shape[1]):
+        record.brake_torque[row, joint] = memory.loops.brake_force[joint]
     record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
@@ -420,7 +468,10 @@ def prepare(
     work: CompliantWorkspace,
 ) -> None:
     """Kinematics and contact points of the state now."""
-    observe(model, ground, memory.q, memory.v, memory)
+    corners = work.corners
+    corners.sides = (1 + ground.concave) * model.nc
+    observe_sides(model, ground, memory.q, memory.v, memory, corners)
+    choose_sides(model, ground, memory.contacts, corners, work.now.friction.bend)
 
 
 @kernel
@@ -446,6 +497,10 @@ def report(
     if work.row >= 0:
         now = work.now
         note_forces(work.row, work.force, now.stop_force, now.dry_force, memory, record)
+        force, place = record.contact_force[work.row], record.contact_point[work.row]
+        begin_joining(scene.model, memory.contacts, work.corners)
+        join(scene.model, 2.0, work.force, memory.contacts, work.corners)
+        tell_resultants(scene.model, work.corners, force, place)
 
 
 @kernel
@@ -455,7 +510,7 @@ def move(
 ) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
     model = scene.model
-    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
+    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work, record)
     if code != DONE:
         return code
     step = work.step
@@ -469,8 +524,12 @@ def move(
             work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
             memory, record,
         )  # fmt: skip
+        for contact in range(work.corners.sides - model.nc):
+            if work.corners.joins[contact] == 1:
+                for i in range(2):
+                    record.contact_point[work.row, contact, i] = work.place[contact, i]
     if control.continuous == 1:
-        copy_words(work.force, memory.contacts.force)
+        show_forces(model, work.force, work.corners, memory.contacts)
     clock.time = clock.start + (clock.index + 1) * step
     return DONE
 

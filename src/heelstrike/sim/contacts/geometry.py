@@ -34,14 +34,16 @@ EVERYWHERE = -1
 def locate_contacts(
     model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, surface: Surface
 ) -> None:
-    """Contact points, gaps, normals and ground coefficients of the state now (eq. 6, 7)."""
+    """Contact points, gaps, normals and coefficients of the state now (eq. 6, 7)."""
     for i in range(model.nc):
         point, normal = contacts.position[i], contacts.normal[i]
         point_position(tree, model.contact_link[i], model.contact_position[i], point)
         radius = model.contact_radius[i]
-        contacts.gap[i], surface.friction[i], surface.restitution[i] = ground_contact(
+        contacts.gap[i], friction, restitution = ground_contact(
             ground, point[0], point[1], radius, normal
         )
+        surface.friction[i] = model.friction_scale[i] * friction
+        surface.restitution[i] = model.restitution_scale[i] * restitution
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
 

@@ -121,7 +121,7 @@ def latches_at(
         stands = (np.abs(at.gap) <= AT_THE_END) & (np.abs(at.velocity[:, 0]) <= AT_THE_END)
         standing = model.contact_link[stands]
         return tuple((rests & ~np.isin(model.latch_release, standing)).tolist())
-    chosen = [robot.joint_index(joint) for joint in _several(latched)]
+    chosen = [robot.joint_index(joint) for joint in several(latched)]
     for joint in chosen:
         of_joint = model.latch_joint == joint
         if not np.any(of_joint):
@@ -137,5 +137,6 @@ def latches_at(
     return tuple((np.isin(model.latch_joint, chosen) & there).tolist())
 
 
-def _several(joints: Iterable[str | int] | str | int) -> Iterable[str | int]:
+def several(joints: Iterable[str | int] | str | int) -> Iterable[str | int]:
+    """Return joints of which one may be given by itself."""
     return (joints,) if isinstance(joints, str | int) else joints

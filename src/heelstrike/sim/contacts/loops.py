@@ -22,6 +22,7 @@ from heelstrike.contact.sets import LINE
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.loops import find_rows
+from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import EVERYWHERE, solve_mass_matrix, weigh
 from heelstrike.sim.memory import Assembly, Equations, Loops
@@ -32,14 +33,40 @@ CLOSED = 1e-14
 ROUNDING = 1e-11
 """… or no further than this, and come no nearer."""
 
+OFF, PUT_ON, TAKES_HOLD, HOLDS = 0, 1, 2, 3
+"""A brake is off; shall hold from this instant on; does, as it could not before; holds."""
+
 ATTEMPTS = 20
 """Newton's method takes three steps from where a simulation is."""
+
+
+@kernel
+def rows_of(loops: Loops) -> int:
+    """How many rows there are now: those of loops and couplings, and of brakes that hold."""
+    rows = loops.unknown.shape[0]
+    for brake in range(loops.braked.shape[0]):
+        if loops.braked[brake] < TAKES_HOLD:
+            rows -= 1
+    return rows
+
+
+@kernel
+def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops) -> None:
+    """Write displacements, Jacobian and bias of a state whose kinematics and velocities are in."""
+    find_rows(model, q, v, tree, loops.rows)
+    row = 2 * model.loops + model.couplings
+    for brake in range(loops.braked.shape[0]):
+        if loops.braked[brake] >= TAKES_HOLD:
+            joint = model.brake_joint[brake]
+            loops.rows.displacement[row] = q[joint] - loops.brake_position[brake]
+            loops.rows.jacobian[row, joint] = 1.0
+            row += 1
 
 
 @dissolved_kernel
 def append_loops(first: int, count: int, loops: Loops, assembly: Assembly) -> int:
     """Append the rows of the loops to the candidates, numbered from `first`; return how many."""
-    for row in range(loops.unknown.shape[0]):
+    for row in range(rows_of(loops)):
         append_loop(first, row, count, loops, assembly)
         count += 1
     return count
@@ -52,7 +79,7 @@ def free_loops(count: int, loops: Loops, rate: Floats, time: float, assembly: As
     Of accelerations x the time t is 1, of the velocities of an impact 0, of those of a time step
     half of it.
     """
-    first = count - loops.unknown.shape[0]
+    first = count - rows_of(loops)
     for place in range(first, count):
         row = place - first
         ahead = time * loops.rows.bias[row]
@@ -86,7 +113,7 @@ def speed_along(row: int, loops: Loops, v: Floats) -> float:
 @dissolved_kernel
 def note_loops(model: Model, count: int, impulse: Floats, loops: Loops) -> None:
     """Keep the forces of the loops, whose rows end with the first `count` candidates."""
-    rows = loops.unknown.shape[0]
+    rows = rows_of(loops)
     for row in range(rows):
         note_loop(model, row, impulse[2 * (count - rows + row)], loops)
 
@@ -96,8 +123,15 @@ def note_loop(model: Model, row: int, force: float, loops: Loops) -> None:
     """Keep the force of a row."""
     if row < 2 * model.loops:
         loops.loop_force[row // 2, row % 2] = force
-    else:
+    elif row < 2 * model.loops + model.couplings:
         loops.coupling_force[row - 2 * model.loops] = force
+    else:
+        left = row - 2 * model.loops - model.couplings
+        for brake in range(loops.braked.shape[0]):
+            if loops.braked[brake] >= TAKES_HOLD:
+                if left == 0:
+                    loops.brake_force[brake] = force
+                left -= 1
 
 
 @kernel
@@ -107,7 +141,7 @@ def respond(model: Model, equations: Equations, loops: Loops) -> None:
     What the mass matrix is solved with is there.
     """
     response, system = loops.response, loops.system
-    rows = response.shape[0]
+    rows = rows_of(loops)
     for row in range(rows):
         for j in range(model.nv):
             response[row, j] = loops.rows.jacobian[row, j]
@@ -123,7 +157,7 @@ def push_loops(loops: Loops, v: Floats) -> None:
 
     The right-hand side is the last column of the system, after :func:`respond`.
     """
-    rows = loops.unknown.shape[0]
+    rows = rows_of(loops)
     solve_to_rank(rows, loops.system, loops.order, loops.unknown)
     for row in range(rows):
         for j in range(v.shape[0]):
@@ -136,21 +170,21 @@ def close_loops(model: Model, equations: Equations, loops: Loops, q: Floats) -> 
 
     Returns whether there is such a place nearby.
     """
-    tree, displacement = equations.tree, loops.rows.displacement
+    tree, displacement, rows = equations.tree, loops.rows.displacement, rows_of(loops)
     before = 0.0
     for attempt in range(ATTEMPTS):
         forward_kinematics(model, q, tree)
-        find_rows(model, q, tree.zero, tree, loops.rows)
+        find_loops(model, q, tree.zero, tree, loops)
         worst = 0.0
-        for row in range(displacement.shape[0]):
+        for row in range(rows):
             worst = max(worst, abs(displacement[row]))
         if worst <= CLOSED or (attempt > 0 and worst > 0.5 * before):
             return worst <= ROUNDING
         before = worst
         weigh(model, equations)
         respond(model, equations, loops)
-        for row in range(displacement.shape[0]):
-            loops.system[row, displacement.shape[0]] = -displacement[row]
+        for row in range(rows):
+            loops.system[row, rows] = -displacement[row]
         push_loops(loops, q)
     return False
 
@@ -161,10 +195,10 @@ def steady_loops(model: Model, q: Floats, equations: Equations, loops: Loops, v:
     tree = equations.tree
     forward_kinematics(model, q, tree)
     link_velocities(model, v, tree)
-    find_rows(model, q, v, tree, loops.rows)
+    find_loops(model, q, v, tree, loops)
     weigh(model, equations)
     respond(model, equations, loops)
-    rows = loops.unknown.shape[0]
+    rows = rows_of(loops)
     for row in range(rows):
         loops.system[row, rows] = -speed_along(row, loops, v)
     push_loops(loops, v)

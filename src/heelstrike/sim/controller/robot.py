@@ -30,6 +30,7 @@ from heelstrike.dynamics.kernels import (
     point_position,
     point_velocity,
 )
+from heelstrike.dynamics.loops import LoopRows, count_rows
 from heelstrike.dynamics.places import place_of, velocity_at, write_point_rows
 from heelstrike.dynamics.spatial import momentum_of, power, spatial
 from heelstrike.dynamics.workspace import Workspace
@@ -92,7 +93,10 @@ class ControlledRobot(Bundle):
     estimate : ControlState
         A second state for controllers that estimate the first, to be filled at each call; see
         :meth:`update`.
-    acceleration, force, passive, other, columns, reaching
+    motor : (nv,) int
+        Actuator of each coordinate, -1 for none. Like the rest of robots with closed loops or
+        coupled joints only.
+    acceleration, force, passive, other, columns, reaching, loops, tied, tied_row, shares
         Scratch of the queries.
     """
 
@@ -119,6 +123,11 @@ class ControlledRobot(Bundle):
     other: Floats = array("nv")
     columns: Floats = array("nv", 3)
     reaching: Reaching = part(Reaching)
+    motor: Integers = array("ties", of=int)
+    loops: LoopRows = part(LoopRows)
+    tied: Floats = array("tied_rows", "nv + 1")
+    tied_row: Integers = array("ties", of=int)
+    shares: Floats = array("shared", "shared")
 
     @kernel
     def update(self, state: ControlState) -> None:
@@ -344,11 +353,16 @@ def extents_of(robot: Robot) -> dict[str, int]:
 def controlled_robot(robot: Robot) -> ControlledRobot:
     """Make the view that a controller has of a robot."""
     driven = set(robot.model.actuator_joint.tolist())
-    legs = leg_joints(robot)
+    legs, rows = leg_joints(robot), count_rows(robot.model)
     view = ControlledRobot.allocate(
-        extents_of(robot), model=robot.model, nf=len(robot.feet), free=robot.nv - len(driven),
-        longest=max(map(len, legs), default=0), mass=robot.total_mass,
+        {**extents_of(robot), "loop_rows": rows}, model=robot.model, nf=len(robot.feet),
+        free=robot.nv - len(driven), longest=max(map(len, legs), default=0), mass=robot.total_mass,
+        tied_rows=rows + 3 if rows else 0, ties=robot.nv if rows else 0,
+        shared=robot.nu if rows else 0,
     )  # fmt: skip
+    if rows:
+        view.motor[:] = -1
+        view.motor[robot.model.actuator_joint] = np.arange(robot.nu)
     view.contact_foot[:] = -1
     view.leg_joint[:] = -1
     for index, foot in enumerate(robot.feet):

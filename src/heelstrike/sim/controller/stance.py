@@ -32,6 +32,7 @@ from heelstrike.dynamics.spatial import (
     spatial,
 )
 from heelstrike.robot.model import Floats
+from heelstrike.sim.controller.tied import tied_torque
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.interface import Contacts
@@ -114,14 +115,18 @@ def flat_foot_torque(
 ) -> None:
     """Torques (nu,) that give the joints an acceleration (nu,) while a foot is held flat.
 
-    For robots with three coordinates without a motor; NaN for others. `torque` may be the array
-    `acceleration`.
+    For robots with three coordinates without a motor, and those whose other joints follow by closed
+    loops and couplings (:mod:`heelstrike.sim.controller.tied`); NaN for others. `torque` may be the
+    array `acceleration`.
     """
-    if refused(self, torque):
-        return
     work, link, drift = state.kinematics, self.foot_link[foot], self.other
     point_columns(self.model, work, link, work.origin[link], self.columns)
     point_bias_acceleration(work, link, work.origin[link], drift)
+    if self.tied.shape[0] > 0:
+        tied_torque(self, state, 3, acceleration, torque)
+        return
+    if refused(self, torque):
+        return
     complete(self, (-drift[0], -drift[1], -drift[2]), acceleration, self.acceleration)
     force_wanted(self, state, self.force)
     joint_torques(self, torque)
@@ -135,15 +140,23 @@ def point_foot_torque(
     """Torques (nu,) that give the joints an acceleration (nu,) while a point foot stays in place.
 
     The foot's contact point is held, or its disc rolls. For robots with three coordinates without
-    a motor; NaN for others. `torque` may be the array `acceleration`.
+    a motor, and those whose other joints follow by closed loops and couplings; NaN for others.
+    `torque` may be the array `acceleration`.
     """
-    if refused(self, torque):
-        return
     model, columns, wanted = self.model, self.columns, self.acceleration
     contact = self.foot_contact[foot]
     link, radius = model.contact_link[contact], model.contact_radius[contact]
     position, normal = contacts.position[contact], contacts.normal[contact]
     point_columns(model, state.kinematics, link, position, columns)
+    center, drift = self.force, self.other  # both are written anew below
+    center[0] = position[0] + radius * normal[0]
+    center[1] = position[1] + radius * normal[1]
+    point_bias_acceleration(state.kinematics, link, center, drift)
+    if self.tied.shape[0] > 0:
+        tied_torque(self, state, 2, acceleration, torque)
+        return
+    if refused(self, torque):
+        return
     # In the place of the rotation, which nothing holds: the trunk's turning about the foot.
     for j in range(self.nv):
         columns[j, 2] = 0.0
@@ -151,10 +164,6 @@ def point_foot_torque(
     columns[a, 2], columns[b, 2], columns[c, 2] = cross(
         (columns[a, 0], columns[b, 0], columns[c, 0]), (columns[a, 1], columns[b, 1], columns[c, 1])
     )
-    center, drift = self.force, self.other  # both are written anew below
-    center[0] = position[0] + radius * normal[0]
-    center[1] = position[1] + radius * normal[1]
-    point_bias_acceleration(state.kinematics, link, center, drift)
     complete(self, (-drift[0], -drift[1], 0.0), acceleration, wanted)
 
     # Turning about the foot, without a motor; the force is linear in it.

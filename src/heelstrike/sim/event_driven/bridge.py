@@ -22,6 +22,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
@@ -30,16 +31,11 @@ from heelstrike.sim.contacts.geometry import (
 )
 from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.control import Control
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.corners import is_cornered, is_struck, joined
 from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
-from heelstrike.sim.event_driven.faces import (
-    NO_FACE,
-    closes_corner,
-    distance_to,
-    locate,
-    locate_on_face,
-    nearest_face,
-)
+from heelstrike.sim.event_driven.faces import locate, stand_on_face
 from heelstrike.sim.event_driven.gaps import (
     free_gap_acceleration,
     gap_now,
@@ -50,7 +46,7 @@ from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Assembly, Memory, Reported
+from heelstrike.sim.memory import Assembly, Memory, Reaction, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
 
@@ -89,7 +85,7 @@ def write_free(
         free[row] = row_product(jacobian, row, v) + length * free[row]
     phase.lean[place] = gap / length if gap > TOUCHING else 0.0
     free[2 * place] += phase.lean[place]
-    if contact >= phase.first_dry:
+    if phase.first_dry <= contact < phase.first_second:
         assembly.problem.bound[place] *= length
     assembly.candidate[place] = contact
 
@@ -103,11 +99,15 @@ def gather_near(model: Model, length: float, bouncing: bool, phase: Phase, memor
     assembly, state, trial = memory.assembly, phase.begin, phase.trial
     jacobian, restitution = assembly.jacobian, memory.surface.restitution
     count = 0
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         if contact < model.nc and phase.passing[contact] == 1:
             continue
+        if contact >= phase.first_second:
+            point = contact - phase.first_second
+            if phase.passing[point] == 1 or phase.seconds.gap[point] == np.inf:
+                continue
         gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
-        if contact >= phase.first_dry:
+        if phase.first_dry <= contact < phase.first_second:
             write_free(0.0, length, contact, count, model, phase, memory)
             count += 1
             continue
@@ -125,70 +125,35 @@ def gather_near(model: Model, length: float, bouncing: bool, phase: Phase, memor
 
 
 @kernel
-def gather_corners(
-    model: Model, ground: GroundModel, length: float, count: int, memory: Memory, phase: Phase
-) -> int:
-    """Add the other faces of concave corners that candidates are in, as far as there is room.
-
-    The face of each goes to ``phase.row``. Returns how many candidates there are then.
-    """
-    assembly, contacts, surface = memory.assembly, memory.contacts, memory.surface
-    tree, scratch = memory.equations.tree, phase.scratch[0]
-    first = count
-    room = assembly.candidate.shape[0] - memory.loops.unknown.shape[0]
-    for place in range(first):
-        contact = assembly.candidate[place]
-        if contact >= model.nc:
-            continue
-        radius, position = model.contact_radius[contact], contacts.position[contact]
-        normal = contacts.normal[contact]
-        scratch[0], scratch[1] = normal[0], normal[1]
-        x, z = position[0] + radius * normal[0], position[1] + radius * normal[1]
-        gap, friction = contacts.gap[contact], surface.friction[contact]
-        restitution, face = surface.restitution[contact], phase.face[contact]
-        if face == NO_FACE:
-            face = nearest_face(ground, x, z, radius)
-        for other in range(ground.friction.shape[0]):
-            far = distance_to(ground, other, x, z) - radius > length * CLOSING_SPEED
-            if far or count == room:
-                continue
-            if closes_corner(ground, face, other, x, z, radius):
-                locate_on_face(model, ground, tree, contact, 2 * other, contacts, surface)
-                gap_rows(model, tree, contacts, phase, contact, count, assembly)
-                gap_there = contacts.gap[contact]
-                write_free(gap_there, length, contact, count, model, phase, memory)
-                phase.row[count] = 2 * other
-                count += 1
-        normal[0], normal[1] = scratch[0], scratch[1]
-        position[0], position[1] = x - radius * normal[0], z - radius * normal[1]
-        contacts.gap[contact] = gap
-        surface.friction[contact] = friction
-        surface.restitution[contact] = restitution
-    return count
+def find_faces(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:
+    """Put the open points on their nearest faces, for what else they could meet from there."""
+    if phase.watched == phase.first_second:
+        return
+    contacts, tree, surface = memory.contacts, memory.equations.tree, memory.surface
+    for point in range(model.nc):
+        if phase.closed[point] == 0:
+            phase.face[point] = NO_FACE
+            stand_on_face(model, ground, tree, point, contacts, surface, phase)
 
 
 @kernel
-def collect_impulses(
-    ground: GroundModel, first: int, count: int, memory: Memory, phase: Phase
-) -> None:
-    """Write what the bridge found: impulses in the frames of the contact points, and modes.
+def leave_faces(model: Model, phase: Phase) -> None:
+    """Let the open points be on no face again."""
+    for point in range(model.nc):
+        if phase.closed[point] == 0:
+            phase.face[point] = NO_FACE
 
-    From candidate `first` on they are other faces of points in corners.
-    """
-    assembly, mode = memory.assembly, memory.reaction.mode
-    normals, nv = memory.contacts.normal, phase.begin.shape[0] // 2
+
+@kernel
+def collect_impulses(count: int, assembly: Assembly, reaction: Reaction, phase: Phase) -> None:
+    """Write what the bridge found: impulses, and modes of what does not leave by its end."""
+    impulse, nv = assembly.answer.impulse, phase.begin.shape[0] // 2
     for place in range(count):
-        contact, found = assembly.candidate[place], assembly.answer.mode[place]
-        press, rub = assembly.answer.impulse[2 * place], assembly.answer.impulse[2 * place + 1]
-        if place >= first:
-            own, its = normals[contact], ground.normal[phase.row[place] // 2]
-            cosine, sine = own[0] * its[0] + own[1] * its[1], own[0] * its[1] - own[1] * its[0]
-            press, rub = cosine * press + sine * rub, cosine * rub - sine * press
-        phase.impulse[contact, 0] += press
-        phase.impulse[contact, 1] += rub
-        leaves = row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING
-        if mode[contact] == OPEN and not leaves:
-            mode[contact] = found
+        contact = assembly.candidate[place]
+        phase.impulse[contact, 0] = impulse[2 * place]
+        phase.impulse[contact, 1] = impulse[2 * place + 1]
+        if not row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING:
+            reaction.mode[contact] = assembly.answer.mode[place]
 
 
 @kernel
@@ -220,19 +185,20 @@ def find_impulses(
     """
     model, equations, assembly = scene.model, memory.equations, memory.assembly
     begin, end, trial, answer = phase.begin, phase.end, phase.trial, memory.assembly.answer
+    leave_faces(model, phase)
     evaluate(scene, phase.time, begin, control, memory, phase, phase.slopes[0])
-    for contact in range(phase.first_dry, phase.closed.shape[0]):
+    for contact in range(phase.first_dry, phase.first_second):
         phase.slide[contact] = 0
     free_acceleration(model, begin, memory.torque, phase, memory.pushes, equations)
     for i in range(model.nv):
         trial[model.nq + i] = begin[model.nq + i] + length * equations.rate[i]
         end[model.nq + i] = trial[model.nq + i]
-    for contact in range(phase.closed.shape[0]):
+    find_faces(model, scene.ground, memory, phase)
+    for contact in range(phase.watched):
         memory.reaction.mode[contact] = OPEN
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
-    first = gather_near(model, length, bouncing, phase, memory)
-    count = gather_corners(model, scene.ground, length, first, memory, phase)
+    count = gather_near(model, length, bouncing, phase, memory)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, trial[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
@@ -247,9 +213,10 @@ def find_impulses(
         if made_energy(total, assembly, phase):
             return False
         add_impulse(model, assembly, total, equations, end[model.nq :])
-    collect_impulses(scene.ground, first, count, memory, phase)
+    collect_impulses(count, assembly, memory.reaction, phase)
     for place in range(count):
-        if assembly.candidate[place] >= phase.first_dry:  # a finite force works on the way
+        contact = assembly.candidate[place]
+        if phase.first_dry <= contact < phase.first_second:  # a finite force works on the way
             answer.impulse[2 * place] = 0.0
             answer.impulse[2 * place + 1] = 0.0
     finite = True
@@ -307,13 +274,17 @@ def find_bridge(
 
 @kernel
 def report_impulses(
-    model: Model, wrong: float, phase: Phase, reported: Reported, record: Record
+    model: Model, wrong: float, contacts: Contacts, phase: Phase, reported: Reported, record: Record
 ) -> None:
     """Append the bridge to the events, and the impulses of the contacts."""
     log_event(phase.time, BRIDGE, 0, phase.length, wrong, record)
     for contact in range(phase.first_dry):
         normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
-        if not normal > 0.0:
+        struck = normal > 0.0
+        if contact < model.nc and is_cornered(contact, phase):
+            struck = is_struck(contact, phase)
+            normal, tangent = joined(contact, phase.impulse, contacts, phase)
+        if not struck:
             continue
         if contact >= model.nc:
             joint = phase.stop_joint[contact - model.nc]
@@ -335,11 +306,16 @@ def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -
     evaluate_equations(model, phase.begin[: model.nq], phase.begin[model.nq :], memory.equations)
     for contact in range(model.nc):
         phase.face[contact] = NO_FACE
+        phase.meets[contact] = 0
     locate(model, ground, tree, phase, contacts, memory.surface)
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         phase.stuck[contact] = 0
         phase.slide[contact] = 0
-        if contact >= phase.first_dry:
+        if contact >= phase.first_second:
+            point = contact - phase.first_second
+            if contacts.gap[point] <= TOUCHING:
+                stand_on_face(model, ground, tree, point, contacts, memory.surface, phase)
+        elif contact >= phase.first_dry:
             if mode[contact] != STICK:
                 joint = phase.dry_joint[contact - phase.first_dry]
                 phase.slide[contact] = heading(phase.begin[model.nq + joint])
@@ -375,12 +351,13 @@ def cross(
             phase.bridges += 1
     if not found:
         return False
-    report_impulses(model, wrong, phase, memory.reported, record)
-    for contact in range(phase.closed.shape[0]):
-        if contact < phase.first_dry:
+    report_impulses(model, wrong, memory.contacts, phase, memory.reported, record)
+    for contact in range(phase.watched):
+        if not phase.first_dry <= contact < phase.first_second:
             phase.closed[contact] = 0
         phase.carrier[contact] = 0
         phase.holder[contact] = 0
+    leave_faces(model, phase)
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows

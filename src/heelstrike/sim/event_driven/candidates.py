@@ -8,6 +8,7 @@ from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, INTERVAL
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.sim.contacts.latches import hold
+from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Assembly, Loops
 
@@ -27,7 +28,8 @@ def solve_candidates(
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
         contact = assembly.candidate[place]
-        problem.set[place] = INTERVAL if contact >= phase.first_dry else CONE
+        is_dry = phase.first_dry <= contact < phase.first_second
+        problem.set[place] = INTERVAL if is_dry else CONE
         problem.friction[place] = friction[contact]
         mode[place] = STICK
         if accelerations:
@@ -38,7 +40,7 @@ def solve_candidates(
             elif guess[contact] < SLIDING_FORWARD:
                 mode[place] = guess[contact]
     hold(count, phase.latch_stop, loops.held, assembly)
-    problem.count = count + loops.unknown.shape[0]
+    problem.count = count + rows_of(loops)
     for place in range(count, problem.count):
         mode[place] = STICK
     return int(solve_contact_kernel(phase.order, problem, assembly.solver, assembly.answer))

@@ -13,7 +13,6 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
-from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
@@ -26,7 +25,7 @@ from heelstrike.sim.contacts.geometry import (
     solve_mass_matrix,
     weigh,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, rows_of
 from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
@@ -49,11 +48,14 @@ def tangential_place(
     model: Model, tree: Workspace, contacts: Contacts, contact: int, phase: Phase
 ) -> float:
     """Where a contact point is along the ground, less the length that its disc has rolled."""
-    position, normal = contacts.position[contact], contacts.normal[contact]
-    rolled = model.contact_radius[contact] * tree.angle[model.contact_link[contact]]
+    its, point = contacts, contact
+    if contact >= phase.first_second:
+        its, point = phase.seconds, contact - phase.first_second
+    position, normal, radius = its.position[point], its.normal[point], model.contact_radius[point]
+    rolled = radius * tree.angle[model.contact_link[point]]
     if phase.face[contact] >= 0 and phase.face[contact] % 2 == 1:
         # The way of the contact point round the disc that pivots on a corner.
-        return model.contact_radius[contact] * math.atan2(normal[0], normal[1]) - rolled
+        return radius * math.atan2(normal[0], normal[1]) - rolled
     return normal[1] * position[0] - normal[0] * position[1] - rolled
 
 
@@ -124,7 +126,7 @@ def friction_limit(
 def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase) -> None:
     """Write the force of every contact point, that of a group split like its normal forces."""
     candidate, impulse, force = assembly.candidate, assembly.answer.impulse, phase.force
-    for contact in range(force.shape[0]):
+    for contact in range(phase.watched):
         force[contact, 0] = 0.0
         force[contact, 1] = 0.0
     for place in range(count):
@@ -144,6 +146,24 @@ def share_forces(count: int, assembly: Assembly, friction: Floats, phase: Phase)
 
 
 @kernel
+def watch_second_faces(model: Model, tree: Workspace, phase: Phase) -> None:
+    """Event functions of the second faces: gaps to those that points on the ground could meet."""
+    value, rate, seconds = phase.value, phase.rate, phase.seconds
+    for point in range(model.nc):
+        contact = phase.first_second + point
+        value[2 * contact], value[2 * contact + 1] = 1.0, 1.0
+        rate[2 * contact] = 0.0
+        if phase.closed[point] == 0 or seconds.gap[point] == math.inf:
+            continue
+        normal, tangent = contact_velocity(model, tree, seconds, point)
+        if phase.closed[contact] == 0:
+            value[2 * contact] = seconds.gap[point]
+            rate[2 * contact] = normal
+        elif phase.slide[contact] != 0 and phase.group[contact] == contact:
+            value[2 * contact + 1] = phase.slide[contact] * tangent
+
+
+@kernel
 def watch_geometry(
     model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, state: Floats,
     phase: Phase,
@@ -155,6 +175,8 @@ def watch_geometry(
     value, rate = phase.value, phase.rate
     if has_corners(ground):
         watch_corners(model, ground, contacts, phase, value)
+        if phase.watched > phase.first_second:
+            watch_second_faces(model, tree, phase)
     for dry in range(phase.dry_joint.shape[0]):
         contact = phase.first_dry + dry
         slide = phase.slide[contact]
@@ -241,8 +263,8 @@ def gather_closed(
     after those of the contacts and are not counted; they have been found for the state.
     """
     count = 0
-    for contact in range(phase.closed.shape[0]):
-        moves = contact >= phase.first_dry and phase.slide[contact] != 0
+    for contact in range(phase.watched):
+        moves = phase.first_dry <= contact < phase.first_second and phase.slide[contact] != 0
         if phase.closed[contact] == 1 and not moves:
             gap_rows(model, equations.tree, contacts, phase, contact, count, assembly)
             assembly.candidate[count] = contact
@@ -264,10 +286,10 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
         )
         impulse[2 * place] = 0.0
         impulse[2 * place + 1] = 0.0
-        if contact >= phase.first_dry:
+        if phase.first_dry <= contact < phase.first_second:
             joint = phase.dry_joint[contact - phase.first_dry]
             impulse[2 * place] = model.dry_friction[joint]
-    loops = memory.loops.unknown.shape[0]
+    loops = rows_of(memory.loops)
     total = count + loops
     free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)
     for row in range(2 * count, 2 * total):
@@ -323,8 +345,8 @@ def evaluate(
         consult(scene.controller, time, q, v, model, memory, control, memory.command)
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    loops = memory.loops.unknown.shape[0]
-    find_rows(model, q, v, equations.tree, memory.loops.rows)
+    loops = rows_of(memory.loops)
+    find_loops(model, q, v, equations.tree, memory.loops)
     count = gather_closed(model, memory.contacts, phase, memory.loops, equations, assembly)
     phase.closed_count = count
     if count + loops > 0:
@@ -353,7 +375,7 @@ def displacement(
         return memory.loops.rows.displacement[contact - phase.closed.shape[0]]
     if row % 2 == 0:
         return gap_now(contact, contacts, phase, state)
-    if contact >= phase.first_dry:
+    if phase.first_dry <= contact < phase.first_second:
         return state[phase.dry_joint[contact - phase.first_dry]] - phase.anchor[contact]
     if phase.stuck[contact] == 1:
         return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact, phase)
@@ -372,11 +394,11 @@ def project(
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
-    system, row, loops = phase.system, phase.row, memory.loops.unknown.shape[0]
+    system, row, loops = phase.system, phase.row, rows_of(memory.loops)
     for attempt in range(5):
         observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
-        find_rows(model, q, v, equations.tree, memory.loops.rows)
+        find_loops(model, q, v, equations.tree, memory.loops)
         count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
         total = count + loops
         if total == 0:

@@ -1,28 +1,44 @@
 """Which face of the ground a closed contact point is on, and where on it it would leave it.
 
 As long as a point stays on a face, its gap and normal are those of this face, however the next one
-turns: the motion is smooth until the point comes to the end of the face, and that is an event. Face
-2 i is the line of segment i; a disc that pivots on corner i is on face 2 i + 1. Flat ground has one
-face, and none of this.
+turns: the motion is smooth until the point comes to the end of the face, and that is an event. In a
+concave corner a face has no end: there a point that is on it meets a second one, which is a contact
+of its own, with a gap, modes and forces. The second faces are numbered on from all other contacts.
+Flat ground has one face, and none of this.
 """
 
 from __future__ import annotations
 
-import math
+from typing import Any
 
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
-from heelstrike.contact.ground import GroundModel, line_contact
+from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import point_position
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.faces import (
+    NO_FACE,
+    along_segment,
+    center_of,
+    distance_to,
+    is_beside,
+    is_concave,
+    locate_on_face,
+    nearest_face,
+    second_face,
+    take_surface,
+)
 from heelstrike.sim.contacts.geometry import locate_contacts
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Surface
+from heelstrike.sim.memory import Reaction, Surface
 
-NO_FACE = -1
+# Two normals are one when one minus the cosine of the angle between them is below this.
+ONE_NORMAL = 1e-12
+# Faces whose gaps differ by less (m) are equally near.
+ONE_GAP = 1e-9
 
 
 @kernel
@@ -32,52 +48,109 @@ def has_corners(ground: GroundModel) -> bool:
 
 
 @kernel
-def along_segment(ground: GroundModel, segment: int, x: float, z: float) -> tuple[float, float]:
-    """How far beyond the beginning of a segment a place is along it, and how far before its end."""
-    begin, end = ground.vertices[segment], ground.vertices[segment + 1]
-    tangent_x, tangent_z = ground.normal[segment, 1], -ground.normal[segment, 0]
-    after = (x - begin[0]) * tangent_x + (z - begin[1]) * tangent_z
-    before = (end[0] - x) * tangent_x + (end[1] - z) * tangent_z
-    return after, before
+def locate_second(
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> None:  # fmt: skip
+    """Contact point, gap and normal of a point on its second face, the one it is on or could meet.
+
+    Where there is none the gap is infinite.
+    """
+    second, seconds = phase.first_second + point, phase.seconds
+    seconds.gap[point] = np.inf
+    if phase.face[point] == NO_FACE:
+        return
+    if phase.closed[second] == 0:
+        x, z = center_of(model, contacts, point)
+        _, phase.face[second] = second_face(
+            ground, phase.face[point], NO_FACE, x, z, model.contact_radius[point]
+        )
+    if phase.face[second] != NO_FACE:
+        locate_on_face(model, ground, tree, point, phase.face[second], seconds)
+        take_surface(model, ground, point, second, phase.face[second], surface)
 
 
 @kernel
-def distance_to(ground: GroundModel, segment: int, x: float, z: float) -> float:
-    """Distance of a place from a segment."""
-    after, before = along_segment(ground, segment, x, z)
-    if after < 0.0 and segment > 0:
-        corner = ground.vertices[segment]
-    elif before < 0.0 and segment < ground.friction.shape[0] - 1:
-        corner = ground.vertices[segment + 1]
-    else:
-        origin, normal = ground.vertices[segment], ground.normal[segment]
-        return abs((x - origin[0]) * normal[0] + (z - origin[1]) * normal[1])
-    return math.sqrt((x - corner[0]) ** 2 + (z - corner[1]) ** 2)
+def locate(
+    model: Model, ground: GroundModel, tree: Workspace, phase: Phase, contacts: Contacts,
+    surface: Surface,
+) -> None:  # fmt: skip
+    """Contact points, gaps, normals and ground coefficients of the state now."""
+    locate_contacts(model, ground, tree, contacts, surface)
+    if not has_corners(ground):
+        return
+    normals, normal = contacts.normal, ground.normal
+    for contact in range(model.nc):
+        face = phase.face[contact]
+        segment = face // 2
+        if face != NO_FACE and not (
+            face % 2 == 0
+            and normals[contact, 0] == normal[segment, 0]
+            and normals[contact, 1] == normal[segment, 1]
+        ):
+            locate_on_face(model, ground, tree, contact, face, contacts)
+            take_surface(model, ground, contact, contact, face, surface)
+    for second in range(phase.first_second, phase.watched):
+        point = second - phase.first_second
+        locate_second(model, ground, tree, point, contacts, surface, phase)
 
 
 @kernel
-def nearest_face(ground: GroundModel, x: float, z: float, radius: float) -> int:
-    """Face of the ground that a disc at a place is nearest to."""
-    segments = ground.friction.shape[0]
-    nearest = np.inf
-    face = 0
-    for segment in range(segments):
-        distance = distance_to(ground, segment, x, z)
-        if distance < nearest:
-            nearest = distance
-            after, before = along_segment(ground, segment, x, z)
-            face = 2 * segment
-            if radius > 0.0 and after < 0.0 and segment > 0:
-                face = 2 * segment + 1
-            elif radius > 0.0 and before < 0.0 and segment < segments - 1:
-                face = 2 * segment + 3
-    return face
+def stand_on_face(
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> None:  # fmt: skip
+    """Put a point that has reached the ground on the face that its normal is of.
+
+    In a corner two faces may be equally near.
+    """
+    if phase.face[point] == NO_FACE and has_corners(ground):
+        x, z = center_of(model, contacts, point)
+        phase.face[point] = nearest_face(ground, x, z, model.contact_radius[point])
+        if phase.watched > phase.first_second:
+            locate_second(model, ground, tree, point, contacts, surface, phase)
+            own, other = contacts.normal[point], phase.seconds.normal[point]
+            twice = own[0] * other[0] + own[1] * other[1] > 1.0 - ONE_NORMAL
+            if twice and abs(phase.seconds.gap[point] - contacts.gap[point]) < ONE_GAP:
+                phase.face[point] = phase.face[phase.first_second + point]
+                locate_second(model, ground, tree, point, contacts, surface, phase)
 
 
 @kernel
-def choose_faces(model: Model, ground: GroundModel, tree: Workspace, phase: Phase) -> None:
-    """Put the closed points that are on no face yet on the nearest; open ones are on none."""
+def exchange_entries(first: int, second: int, values: Any) -> None:
+    """Exchange two entries of an array."""
+    values[first], values[second] = values[second], values[first]
+
+
+@kernel
+def exchange(point: int, reaction: Reaction, phase: Phase) -> None:
+    """Let the first face of a point be the one that was its second."""
+    second = phase.first_second + point
+    exchange_entries(point, second, phase.closed)
+    exchange_entries(point, second, phase.slide)
+    exchange_entries(point, second, phase.stuck)
+    exchange_entries(point, second, phase.face)
+    exchange_entries(point, second, phase.hit)
+    exchange_entries(point, second, phase.plastic)
+    exchange_entries(point, second, phase.anchor)
+    exchange_entries(point, second, phase.last_impact)
+    exchange_entries(point, second, phase.accumulation)
+    exchange_entries(point, second, reaction.mode)
+
+
+@kernel
+def choose_faces(
+    model: Model, ground: GroundModel, tree: Workspace, reaction: Reaction, phase: Phase
+) -> None:
+    """Put the closed points that are on no face yet on the nearest; open ones are on none.
+
+    A point that is on one face only is there with its first contact.
+    """
     place = phase.scratch[0]
+    for second in range(phase.first_second, phase.watched):
+        point = second - phase.first_second
+        if phase.closed[second] == 1 and phase.closed[point] == 0:
+            exchange(point, reaction, phase)
     for contact in range(model.nc):
         if phase.closed[contact] == 0 or not has_corners(ground):
             phase.face[contact] = NO_FACE
@@ -90,61 +163,13 @@ def choose_faces(model: Model, ground: GroundModel, tree: Workspace, phase: Phas
 
 
 @kernel
-def locate_on_face(
-    model: Model, ground: GroundModel, tree: Workspace, contact: int, face: int,
-    contacts: Contacts, surface: Surface,
-) -> None:  # fmt: skip
-    """Contact point, gap and normal of a disc on a face, wherever it is along it."""
-    point, normal, segment = contacts.position[contact], contacts.normal[contact], face // 2
-    radius = model.contact_radius[contact]
-    if face % 2 == 0 and (
-        normal[0] == ground.normal[segment, 0] and normal[1] == ground.normal[segment, 1]
-    ):
-        return
-    point_position(tree, model.contact_link[contact], model.contact_position[contact], point)
-    if face % 2 == 0:
-        distance = line_contact(ground, segment, point[0], point[1], normal)
-    else:
-        corner = ground.vertices[segment]
-        distance = math.sqrt((point[0] - corner[0]) ** 2 + (point[1] - corner[1]) ** 2)
-        normal[0] = (point[0] - corner[0]) / distance
-        normal[1] = (point[1] - corner[1]) / distance
-        segment -= 1
-    contacts.gap[contact] = distance - radius
-    point[0] -= radius * normal[0]
-    point[1] -= radius * normal[1]
-    surface.friction[contact] = ground.friction[segment]
-    surface.restitution[contact] = ground.restitution[segment]
-
-
-@kernel
-def locate(
-    model: Model, ground: GroundModel, tree: Workspace, phase: Phase, contacts: Contacts,
-    surface: Surface,
-) -> None:  # fmt: skip
-    """Contact points, gaps, normals and ground coefficients of the state now."""
-    locate_contacts(model, ground, tree, contacts, surface)
-    if has_corners(ground):
-        for contact in range(model.nc):
-            if phase.face[contact] != NO_FACE:
-                face = phase.face[contact]
-                locate_on_face(model, ground, tree, contact, face, contacts, surface)
-
-
-@kernel
-def is_beside(face: int, other: int) -> bool:
-    """Whether a disc rolls from one face to another without a jump: a line and one of its ends."""
-    if face % 2 == other % 2:
-        return False
-    apart = face - other if face % 2 == 1 else other - face
-    return apart in (1, 3)
-
-
-@kernel
 def following_face(
     ground: GroundModel, face: int, x: float, z: float, radius: float
 ) -> tuple[float, int]:
-    """How far a disc at a place on a face is from the next one, and which that is."""
+    """How far a disc at a place on a face is from the end of it, and which face follows there.
+
+    Where the ground turns upwards there is no end: the disc meets the next face before.
+    """
     segments, segment = ground.friction.shape[0], face // 2
     after, before = along_segment(ground, segment, x, z)
     pivots = radius > 0.0
@@ -157,31 +182,13 @@ def following_face(
         if -beyond < left:
             left = -beyond
             following = 2 * segment - 2
-    else:
-        if segment > 0:
-            left = after
-            following = 2 * segment + 1 if pivots else 2 * segment - 2
-        if segment < segments - 1 and before < left:
-            left = before
-            following = 2 * segment + 3 if pivots else 2 * segment + 2
-    if not pivots:
         return left, following
-    for other in range(segments):
-        if other == segment or (face % 2 == 1 and other == segment - 1):
-            continue
-        ahead, behind = along_segment(ground, other, x, z)
-        its = 2 * other
-        if ahead < 0.0 and other > 0:
-            its += 1
-        elif behind < 0.0 and other < segments - 1:
-            its += 3
-        # A corner of the face is never nearer than the face.
-        if its % 2 == 1 and is_beside(face, its):
-            continue
-        room = distance_to(ground, other, x, z) - radius
-        if room < left:
-            left = room
-            following = its
+    if segment > 0 and not is_concave(ground, segment):
+        left = after
+        following = 2 * segment + 1 if pivots else 2 * segment - 2
+    if segment < segments - 1 and before < left and not is_concave(ground, segment + 1):
+        left = before
+        following = 2 * segment + 3 if pivots else 2 * segment + 2
     return left, following
 
 
@@ -191,8 +198,7 @@ def turn_corner(
 ) -> bool:
     """Let a point go over to the following face; return whether its normal jumps there."""
     face, radius = phase.face[contact], model.contact_radius[contact]
-    x = contacts.position[contact, 0] + radius * contacts.normal[contact, 0]
-    z = contacts.position[contact, 1] + radius * contacts.normal[contact, 1]
+    x, z = center_of(model, contacts, contact)
     _, following = following_face(ground, face, x, z, radius)
     phase.face[contact] = following
     phase.stuck[contact] = 0
@@ -203,34 +209,73 @@ def turn_corner(
 def watch_corners(
     model: Model, ground: GroundModel, contacts: Contacts, phase: Phase, value: Floats
 ) -> None:
-    """Event functions of the points on faces: how far each is from the next."""
-    first = 2 * phase.closed.shape[0]
+    """Event functions of the points on faces: how far each is from the end of its own."""
+    first = 2 * phase.watched
     for contact in range(model.nc):
         value[first + contact] = 1.0
         face, radius = phase.face[contact], model.contact_radius[contact]
         if face != NO_FACE:
-            x = contacts.position[contact, 0] + radius * contacts.normal[contact, 0]
-            z = contacts.position[contact, 1] + radius * contacts.normal[contact, 1]
-            value[first + contact], _ = following_face(ground, face, x, z, radius)
+            x, z = center_of(model, contacts, contact)
+            left, _ = following_face(ground, face, x, z, radius)
+            if phase.watched > phase.first_second:
+                left = min(left, *way_out(ground, contact, x, z, radius, phase))
+            value[first + contact] = min(left, 1.0)
 
 
 @kernel
-def closes_corner(
-    ground: GroundModel, face: int, other: int, x: float, z: float, radius: float
-) -> bool:
-    """Whether a segment and the face that a disc is on make a concave corner about it."""
-    segment = face // 2
-    if face % 2 == 1 or other == segment:
+def way_out(
+    ground: GroundModel, point: int, x: float, z: float, radius: float, phase: Phase
+) -> tuple[float, float]:
+    """How far a disc that is on two faces is from the end of the second, and from a third.
+
+    Between parallel walls a disc can move on both.
+    """
+    second = phase.first_second + point
+    if phase.closed[second] == 0:
+        return np.inf, np.inf
+    left, _ = following_face(ground, phase.face[second], x, z, radius)
+    third, _ = second_face(ground, phase.face[point], phase.face[second], x, z, radius)
+    return left, third
+
+
+@kernel
+def leave_second_face(
+    model: Model, ground: GroundModel, tree: Workspace, point: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> bool:  # fmt: skip
+    """Let a point that is on two faces go over from the second to a third that it meets.
+
+    Or off the end of the second. Returns false if it has come to the end of the first.
+    """
+    x, z = center_of(model, contacts, point)
+    second, radius = phase.first_second + point, model.contact_radius[point]
+    own, _ = following_face(ground, phase.face[point], x, z, radius)
+    left, third = way_out(ground, point, x, z, radius, phase)
+    if own < min(left, third):
         return False
-    own, normal, origin = ground.normal[segment], ground.normal[other], ground.vertices[other]
-    if abs(other - segment) == 1:
-        turn = (own[0] * normal[1] - own[1] * normal[0]) * (other - segment)
-        return bool(turn > 0.0)
-    return bool((x - origin[0]) * normal[0] + (z - origin[1]) * normal[1] >= radius)
+    phase.closed[second], phase.slide[second], phase.stuck[second] = 0, 0, 0
+    if third <= left:
+        _, its = second_face(ground, phase.face[point], phase.face[second], x, z, radius)
+        phase.face[second] = its
+        locate_on_face(model, ground, tree, point, its, phase.seconds)
+        take_surface(model, ground, point, second, its, surface)
+        phase.fired[2 * second] = 1
+    return True
 
 
 @kernel
-def face_curvature(contact: int, model: Model, phase: Phase) -> float:
+def is_at_second(
+    model: Model, ground: GroundModel, point: int, reach: float, contacts: Contacts, phase: Phase
+) -> bool:
+    """Whether a point is within reach of its second face itself, and not only of the line of it."""
+    face = phase.face[phase.first_second + point]
+    x, z = center_of(model, contacts, point)
+    far = distance_to(ground, face // 2, x, z) - model.contact_radius[point] > reach
+    return face % 2 == 1 or not far
+
+
+@kernel
+def face_curvature(contact: int, radius: float, phase: Phase) -> float:
     """Curvature (1/m) of the way of the centre of a disc on its face."""
     face = phase.face[contact]
-    return 1.0 / model.contact_radius[contact] if face >= 0 and face % 2 == 1 else 0.0
+    return 1.0 / radius if face >= 0 and face % 2 == 1 else 0.0

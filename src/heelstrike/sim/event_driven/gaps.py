@@ -22,10 +22,12 @@ from heelstrike.sim.memory import Assembly, Equations
 
 @kernel
 def gap_now(contact: int, contacts: Contacts, phase: Phase, state: Floats) -> float:
-    """Gap of a contact point or joint stop."""
+    """Gap of a contact point, on either face, or of a joint stop."""
     stop = contact - contacts.gap.shape[0]
     if stop < 0:
         return contacts.gap[contact]
+    if contact >= phase.first_second:
+        return phase.seconds.gap[contact - phase.first_second]
     return phase.stop_side[stop] * (state[phase.stop_joint[stop]] - phase.stop_limit[stop])
 
 
@@ -33,10 +35,12 @@ def gap_now(contact: int, contacts: Contacts, phase: Phase, state: Floats) -> fl
 def gap_velocity(
     contact: int, model: Model, contacts: Contacts, tree: Workspace, phase: Phase, state: Floats
 ) -> tuple[float, float]:
-    """Normal and tangential velocity of a contact point or joint stop."""
+    """Normal and tangential velocity of a contact point, on either face, or of a joint stop."""
     stop = contact - model.nc
     if stop < 0:
         return contact_velocity(model, tree, contacts, contact)
+    if contact >= phase.first_second:
+        return contact_velocity(model, tree, phase.seconds, contact - phase.first_second)
     return phase.stop_side[stop] * state[model.nq + phase.stop_joint[stop]], 0.0
 
 
@@ -51,6 +55,9 @@ def gap_rows(
         contact_rows(model, tree, contacts, contact, place, assembly)
     elif contact < phase.first_dry:
         write_unit_row(phase.stop_joint[stop], 2 * place, phase.stop_side[stop], assembly)
+    elif contact >= phase.first_second:
+        second = contact - phase.first_second
+        contact_rows(model, tree, phase.seconds, second, place, assembly)
     else:
         dry = contact - phase.first_dry
         write_unit_row(phase.dry_joint[dry], 2 * place + 1, 1.0, assembly)
@@ -70,17 +77,21 @@ def free_gap_acceleration(
     """
     along_normal = 0.0
     along_tangent = 0.0
-    if contact < model.nc:
-        position, normal = contacts.position[contact], contacts.normal[contact]
-        radius = model.contact_radius[contact]
+    is_second = contact >= phase.first_second
+    if contact < model.nc or is_second:
+        its, point = contacts, contact
+        if is_second:
+            its, point = phase.seconds, contact - phase.first_second
+        position, normal = its.position[point], its.normal[point]
+        radius = model.contact_radius[point]
         center, acceleration = phase.scratch[0], phase.scratch[1]
         center[0] = position[0] + radius * normal[0]
         center[1] = position[1] + radius * normal[1]
-        link = model.contact_link[contact]
+        link = model.contact_link[point]
         point_bias_acceleration(equations.tree, link, center, acceleration)
         along_normal, along_tangent = into_frame(normal, (acceleration[0], acceleration[1]))
         along_tangent -= radius * acceleration[2]
-        curvature = face_curvature(contact, model, phase)
+        curvature = face_curvature(contact, radius, phase)
         if curvature != 0.0:
             velocity = velocity_at(equations.tree.velocity, link, place_of(equations.tree, center))
             _, along = into_frame(normal, velocity)
@@ -91,6 +102,6 @@ def free_gap_acceleration(
         along_tangent += jacobian[2 * place + 1, j] * rate[j]
     assembly.problem.free[2 * place] = along_normal
     assembly.problem.free[2 * place + 1] = along_tangent
-    if contact >= phase.first_dry:
+    if phase.first_dry <= contact and not is_second:
         joint = phase.dry_joint[contact - phase.first_dry]
         assembly.problem.bound[place] = model.dry_friction[joint]

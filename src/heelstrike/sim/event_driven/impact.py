@@ -7,7 +7,6 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED
-from heelstrike.dynamics.loops import find_rows
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import (
@@ -16,8 +15,10 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.corners import impulse_of, is_cornered, is_struck, joined
 from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
 from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
@@ -69,9 +70,11 @@ def collide(
     equations, assembly = memory.equations, memory.assembly
     jacobian, free, impulse = assembly.jacobian, assembly.problem.free, assembly.answer.impulse
     count = 0
-    for contact in range(phase.first_dry):
+    for contact in range(phase.watched):
         phase.impulse[contact, 0] = 0.0
         phase.impulse[contact, 1] = 0.0
+        if phase.first_dry <= contact < phase.first_second:
+            continue
         if phase.closed[contact] == 0 and phase.hit[contact] == 0:
             continue
         gap_rows(model, equations.tree, memory.contacts, phase, contact, count, assembly)
@@ -82,9 +85,9 @@ def collide(
         free[2 * count + 1] = row_product(jacobian, 2 * count + 1, v)
         assembly.candidate[count] = contact
         count += 1
-    if count == 0:
+    if count + rows_of(memory.loops) == 0:
         return True, 0.0
-    find_rows(model, state[: model.nq], v, equations.tree, memory.loops.rows)
+    find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
     assemble_delassus(model, total, equations, assembly)
@@ -97,6 +100,7 @@ def collide(
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
+    note_loops(model, total, impulse, memory.loops)
     add_impulse(model, assembly, total, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
@@ -130,8 +134,8 @@ def short_bounces(
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
     locate(model, ground, equations.tree, phase, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
-    loops = memory.loops.unknown.shape[0]
-    find_rows(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops.rows)
+    loops = rows_of(memory.loops)
+    find_loops(model, state[: model.nq], state[model.nq :], equations.tree, memory.loops)
     count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
     for place in range(count):
         contact = assembly.candidate[place]
@@ -142,7 +146,7 @@ def short_bounces(
         solve_candidates(count, memory.loops, True, friction, memory.reaction.mode, phase, assembly)
         add_impulse(model, assembly, total, equations, equations.rate)
     found = False
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         touched = phase.hit[contact] == 1 or was_closed[contact] == 1
         if phase.closed[contact] == 1 or not touched:
             continue
@@ -170,9 +174,10 @@ def restore(before: Floats, reported: Reported, phase: Phase) -> None:
     """Go back to the state and the modes before an impact."""
     for i in range(before.shape[0]):
         phase.begin[i] = before[i]
-    for contact in range(phase.first_dry):
-        phase.closed[contact] = reported.closed[contact]
-        phase.slide[contact] = reported.slipping[contact]
+    for contact in range(phase.watched):
+        if not phase.first_dry <= contact < phase.first_second:
+            phase.closed[contact] = reported.closed[contact]
+            phase.slide[contact] = reported.slipping[contact]
 
 
 @kernel
@@ -182,7 +187,7 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     The equations of now have been evaluated. ``memory.reported`` still holds the modes from before.
     """
     state, before, reported = phase.begin, phase.end, memory.reported
-    time, impulse = phase.time, phase.impulse
+    time, contacts = phase.time, memory.contacts
     for i in range(state.shape[0]):
         before[i] = state[i]
     made = 0.0
@@ -195,19 +200,37 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
             break
         restore(before, reported, phase)
     phase.last_blow = time
-    largest = 0
-    for contact in range(phase.first_dry):
-        normal, tangent = impulse[contact, 0], impulse[contact, 1]
+    for contact in range(phase.watched):
         if phase.plastic[contact] != 0 and phase.closed[contact] == 0:
             # Others throw it up again, and it is followed.
             phase.accumulation[contact] = np.inf
         phase.plastic[contact] = 0
         if phase.hit[contact] == 1:
             phase.last_impact[contact] = time
-        if contact < model.nc and normal > impulse[largest, 0]:
+    made_at = report_impacts(model, time, contacts, phase, reported, record)
+    if made > NOTICEABLE:
+        normal, tangent = impulse_of(made_at, contacts, phase)
+        log_event(time, ENERGY_GAIN, made_at, normal, tangent, record)
+    return True
+
+
+@kernel
+def report_impacts(
+    model: Model, time: float, contacts: Contacts, phase: Phase, reported: Reported, record: Record
+) -> int:
+    """Append the impulses of an impact to the events; return the point with the largest."""
+    impulse = phase.impulse
+    largest = 0
+    for contact in range(phase.first_dry):
+        normal, tangent = impulse[contact, 0], impulse[contact, 1]
+        struck = normal > 0.0
+        if contact < model.nc and is_cornered(contact, phase):
+            struck = is_struck(contact, phase)
+            normal, tangent = joined(contact, impulse, contacts, phase)
+        if contact < model.nc and impulse[contact, 0] > impulse[largest, 0]:
             largest = contact
         pulls = contact >= model.nc and normal < 0.0  # as a latch may
-        if not (normal > 0.0 or pulls):
+        if not (struck or pulls):
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1
@@ -218,6 +241,4 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
         if landed:
             reported.slipping[contact] = 0
         log_event(time, TOUCHDOWN if landed else IMPACT, contact, normal, tangent, record)
-    if made > NOTICEABLE:
-        log_event(time, ENERGY_GAIN, largest, impulse[largest, 0], impulse[largest, 1], record)
-    return True
+    return largest

@@ -104,7 +104,7 @@ def take_step(scene: Scene, length: float, control: Control, memory: Memory, pha
             if not error <= 1.0:
                 return error
             copy_events(phase.value, phase.rate, phase.end_value, phase.end_rate)
-            for contact in range(phase.closed.shape[0]):
+            for contact in range(phase.watched):
                 phase.end_force[contact, 0] = phase.force[contact, 0]
                 phase.end_force[contact, 1] = phase.force[contact, 1]
             for i in range(memory.torque.shape[0]):
@@ -117,7 +117,7 @@ def take_step(scene: Scene, length: float, control: Control, memory: Memory, pha
 def is_geometric(function: int, phase: Phase) -> bool:
     """Whether an event function needs no forces: a gap, or the speed of what slides."""
     contact = function // 2
-    if contact >= phase.closed.shape[0]:
+    if contact >= phase.watched:
         return True
     slides = function % 2 == 1 and phase.slide[contact] != 0
     return bool(phase.closed[contact] == 0 or slides)
@@ -126,7 +126,7 @@ def is_geometric(function: int, phase: Phase) -> bool:
 @kernel
 def noise(function: int, phase: Phase) -> float:
     """How far an event function may be below zero without meaning it."""
-    if function >= 2 * phase.closed.shape[0]:
+    if function >= 2 * phase.watched:
         return CORNER_NOISE
     if phase.closed[function // 2] == 0:
         # An event is found to a time, and so a gap to what it closes in that time.
@@ -183,7 +183,7 @@ def crossing(
     before, begin = phase.before[function], low
     value, end = phase.sample[function], high
     rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
-    is_gap = function < 2 * phase.closed.shape[0]
+    is_gap = function < 2 * phase.watched
     is_gap = is_gap and function % 2 == 0 and phase.closed[function // 2] == 0
     if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
         # An open point came down and went up again: how close was it?
@@ -217,7 +217,9 @@ def first_event(
     ``phase.before_rate`` must hold the event functions at the start of the step.
     """
     sample, sample_rate = phase.sample, phase.sample_rate
-    functions = sample.shape[0] if has_corners(scene.ground) else 2 * phase.closed.shape[0]
+    functions = 2 * phase.watched
+    if has_corners(scene.ground):
+        functions += scene.model.nc
     together = EVENT_TIME / length
     low = 0.0
     for k in range(1, SAMPLES + 1):
@@ -310,7 +312,7 @@ def missed(phase: Phase) -> bool:
 
     The step is not the one on whose dense output that was found first.
     """
-    for contact in range(phase.first_dry):
+    for contact in range(phase.watched):
         gap = phase.value[2 * contact]
         if phase.closed[contact] == 0 and phase.fired[2 * contact] == 0 and gap < -TOGETHER:
             return True

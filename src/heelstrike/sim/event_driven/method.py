@@ -26,21 +26,23 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.geometry import (
-    evaluate_equations,
-)
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
+from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
+from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
-from heelstrike.sim.contacts.loops import close_loops, steady_loops
+from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
 from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
-    NO_FACE,
     choose_faces,
+    is_at_second,
+    leave_second_face,
     locate,
-    locate_on_face,
+    stand_on_face,
     turn_corner,
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
@@ -192,8 +194,9 @@ class EventDriven(Method):
 
         These are what each look of `decide_modes` finds, and what else may happen to a contact.
         """
-        latches = robot.model.latches
-        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contact_capacity(robot) + 2 * latches + 8
+        others = 2 * robot.model.latches + robot.model.brakes
+        contacts = contact_capacity(robot) + robot.nc
+        return ROWS_OF_AN_INSTANT, (LOOKS + 6) * contacts + others + 8
 
     def check(self, setting: Setting) -> None:
         """Refuse a state in the ground or beyond a joint stop: no motion leads out of it."""
@@ -236,8 +239,10 @@ class EventDriven(Method):
         """Look for what touches the ground as at the beginning."""
         for told in (work.closed, work.slide, work.stuck, work.passing):
             told[: robot.nc] = 0
+            told[work.first_second :] = 0
         work.face[:] = NO_FACE
         work.accumulation[: robot.nc] = np.inf
+        work.accumulation[work.first_second :] = np.inf
         work.fired[:] = 0
         clock.begun = 0
 
@@ -266,7 +271,7 @@ def extrapolate(model: Model, ahead: float, begin: Floats, slope: Floats, state:
 @kernel
 def insist(phase: Phase) -> None:
     """Switch what fired, without asking the acceleration-level problem first."""
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         if phase.closed[contact] == 1 and phase.fired[2 * contact] == 1:
             phase.closed[contact] = 0
             phase.slide[contact] = 0
@@ -286,23 +291,24 @@ def is_unclear(ahead: float, phase: Phase) -> bool:
 @kernel
 def jump(model: Model, memory: Memory, phase: Phase, record: Record) -> bool:
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
-    impulse, begin, before = phase.impulse, phase.begin, phase.end
+    begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    for contact in range(phase.first_dry):
+    for contact in range(phase.watched):
         phase.hit[contact] = 0
         phase.plastic[contact] = phase.closed[contact]
     solved, _ = collide(model, NUDGE, memory, phase, phase.begin)
-    for contact in range(phase.first_dry):
+    for contact in range(phase.watched):
         phase.plastic[contact] = 0
-        normal = impulse[contact, 0]
-        if not (solved and normal > 0.0):
+    for contact in range(phase.first_dry):
+        if not solved:
             continue
-        if contact >= model.nc:
+        if contact >= model.nc and phase.impulse[contact, 0] > 0.0:
             joint = phase.stop_joint[contact - model.nc]
-            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
-        else:
-            log_event(phase.time, PAINLEVE, contact, normal, impulse[contact, 1], record)
+            log_event(phase.time, JOINT_STOP, joint, phase.impulse[contact, 0], 0.0, record)
+        elif contact < model.nc and is_struck(contact, phase):
+            normal, tangent = impulse_of(contact, memory.contacts, phase)
+            log_event(phase.time, PAINLEVE, contact, normal, tangent, record)
     if not solved:
         for i in range(begin.shape[0]):
             begin[i] = before[i]
@@ -319,17 +325,20 @@ def leave_if_possible(
     apart = True
     for place in range(count):
         contact, row = assembly.candidate[place], 2 * place
-        if contact >= phase.first_dry:
+        if phase.first_dry <= contact < phase.first_second:
             continue
         apart = apart and free[row] >= 0.0
         lean = -phase.slide[contact] * friction[contact]
         if delassus[row, row] + lean * delassus[row, row + 1] <= 0.0:
             # Pressing it harder would push it into the ground: there are other solutions.
             several = True
-            log_event(phase.time, PAINLEVE, contact, 0.0, 0.0, record)
+            point = contact - phase.first_second if contact >= phase.first_second else contact
+            log_event(phase.time, PAINLEVE, point, 0.0, 0.0, record)
     if several and apart:
         for place in range(count):
-            if assembly.candidate[place] < phase.first_dry and assembly.problem.set[place] != LINE:
+            contact = assembly.candidate[place]
+            is_dry = phase.first_dry <= contact < phase.first_second
+            if not is_dry and assembly.problem.set[place] != LINE:
                 assembly.answer.mode[place] = OPEN
 
 
@@ -342,14 +351,14 @@ def begin_phase(
     Returns false if the state is not one of such modes.
     """
     assembly, friction = memory.assembly, memory.surface.friction
-    if memory.loops.unknown.shape[0] == 0:  # with loops neither matrix nor free term tell enough
+    if rows_of(memory.loops) == 0:  # with loops neither matrix nor free term tell enough
         leave_if_possible(count, friction, phase, assembly, record)
     if count > 0:
         note_residual(assembly.answer.residual, memory.tally)
     adopt_modes(model, count, assembly, phase, memory.reaction)
     tree, contacts = memory.equations.tree, memory.contacts
     forward_kinematics(model, phase.begin[: model.nq], tree)
-    choose_faces(model, ground, tree, phase)
+    choose_faces(model, ground, tree, memory.reaction, phase)
     locate(model, ground, tree, phase, contacts, memory.surface)
     form_groups(model, tree, contacts, friction, phase)
     begin, before = phase.begin, phase.end
@@ -445,6 +454,26 @@ def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
 
 
 @kernel
+def turns_over(
+    model: Model, ground: GroundModel, tree: Workspace, contact: int, contacts: Contacts,
+    surface: Surface, phase: Phase,
+) -> bool:  # fmt: skip
+    """Let a point that has come to the end of its face go over to the next; tell whether it has."""
+    if contact >= model.nc or phase.fired[2 * phase.watched + contact] == 0:
+        return False
+    phase.fired[2 * phase.watched + contact] = 0
+    two_faces = phase.watched > phase.first_second and phase.closed[phase.first_second + contact]
+    if two_faces and leave_second_face(model, ground, tree, contact, contacts, surface, phase):
+        return False
+    if turn_corner(model, ground, contact, contacts, phase):
+        face = phase.face[contact]
+        locate_on_face(model, ground, tree, contact, face, contacts)
+        take_surface(model, ground, contact, contact, face, surface)
+        phase.closed[contact] = 0
+    return True
+
+
+@kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
     contacts: Contacts, surface: Surface, phase: Phase,
@@ -458,19 +487,23 @@ def find_what_happened(
     impact = False
     forced = False
     rest = ON_THE_GROUND if starting else REST
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         phase.hit[contact] = 0
         first = phase.fired[2 * contact] == 1
         second = phase.fired[2 * contact + 1] == 1
-        turns = contact < model.nc and phase.fired[2 * phase.closed.shape[0] + contact] == 1
-        if turns:
-            phase.fired[2 * phase.closed.shape[0] + contact] = 0
-            if turn_corner(model, ground, contact, contacts, phase):
-                locate_on_face(model, ground, tree, contact, phase.face[contact], contacts, surface)
-                phase.closed[contact] = 0
+        turns = turns_over(model, ground, tree, contact, contacts, surface, phase)
+        if contact >= phase.first_second:
+            point = contact - phase.first_second
+            if phase.closed[point] == 0 and phase.hit[point] == 0:
+                continue  # it is met from the other face only
+            stand_on_face(model, ground, tree, point, contacts, surface, phase)
+            if phase.seconds.gap[point] == np.inf:
+                continue
+            if starting and not is_at_second(model, ground, point, rest, contacts, phase):
+                continue
         if phase.closed[contact] == 1:
             if second and phase.slide[contact] != 0:
-                for other in range(phase.closed.shape[0]):
+                for other in range(phase.watched):
                     if phase.group[other] == phase.group[contact]:
                         phase.slide[other] = 0
             elif first or second:
@@ -502,7 +535,7 @@ def find_what_happened(
                 phase.accumulation[contact] = phase.time
         elif gap <= TOGETHER and normal <= rest:
             phase.hit[contact] = UNPRESSED
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         if phase.hit[contact] == UNPRESSED:
             phase.hit[contact] = 1 if impact else 0
     return impact, forced and not impact
@@ -521,7 +554,7 @@ def next_due(phase: Phase, clock: Clock) -> float:
 def next_stop(phase: Phase, clock: Clock) -> float:
     """Time that the next step may not pass."""
     stop = next_due(phase, clock)
-    for contact in range(phase.accumulation.shape[0]):
+    for contact in range(phase.watched):
         stop = min(stop, phase.accumulation[contact])
     return stop
 
@@ -529,19 +562,12 @@ def next_stop(phase: Phase, clock: Clock) -> float:
 @kernel
 def end_bounces(model: Model, phase: Phase, record: Record) -> None:
     """Let the points rest whose accumulating impacts have come to an end by now."""
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         if phase.accumulation[contact] <= phase.time:
-            if contact < model.nc:
-                log_event(phase.accumulation[contact], ZENO, contact, 0.0, 0.0, record)
+            point = contact - phase.first_second if contact >= phase.first_second else contact
+            if point < model.nc:
+                log_event(phase.accumulation[contact], ZENO, point, 0.0, 0.0, record)
             phase.accumulation[contact] = np.inf
-
-
-@kernel
-def copy_forces(source: Floats, force: Floats) -> None:
-    """Copy the forces of the contact points; what stands after them is of joints."""
-    for contact in range(force.shape[0]):
-        force[contact, 0] = source[contact, 0]
-        force[contact, 1] = source[contact, 1]
 
 
 @kernel
@@ -559,7 +585,7 @@ def end_step(model: Model, clock: Clock, memory: Memory, phase: Phase, record: R
     pass_time(phase.length, next_stop(phase, clock), phase)
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
-    copy_forces(phase.end_force, memory.contacts.force)
+    show_forces(phase.end_force, phase, memory.contacts)
     end_bounces(model, phase, record)
     phase.finished = 0
     memory.tally.steps += 1
@@ -592,9 +618,11 @@ def meet_event(
         # The controller shall know before the modes are decided under its torques.
         for contact in range(model.nc):
             if phase.hit[contact] == 1 and phase.impulse[contact, 0] > 0.0:
-                contacts.force[contact, 0] = phase.impulse[contact, 0]
-                contacts.force[contact, 1] = phase.impulse[contact, 1]
+                force = impulse_of(contact, contacts, phase)
+                contacts.force[contact, 0], contacts.force[contact, 1] = force
         react(model, first, phase.begin[: model.nq], record, memory.loops)
+    for point in range(phase.watched - phase.first_second):
+        phase.meets[point] = 0
     phase.started = BEGUN if starting else WALKING
     phase.undecided = 1
     phase.forced = 1 if forced else 0
@@ -608,10 +636,15 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.assembly.solver.settings.amendments = 0
-    if memory.loops.unknown.shape[0] > 0:
+    if rows_of(memory.loops) > 0:
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED
         steady_loops(model, q, equations, memory.loops, v)
+    phase.watched = phase.first_second
+    for point in range(model.nc):
+        phase.seconds.gap[point] = np.inf
+    if ground.concave == 1:
+        phase.watched += model.nc
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]
@@ -633,6 +666,21 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 
 @kernel
+def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
+    """Let the brakes that have been put on take hold, by an impact of all that touches."""
+    model = scene.model
+    if phase.last_row < phase.time:
+        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    take_hold(memory.loops)
+    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    for contact in range(phase.closed.shape[0]):
+        phase.hit[contact] = 0
+    if not strike(model, scene.ground, memory, phase, record):
+        phase.bridging = 1
+    note_brakes(model, phase.time, 1.0, record, memory.loops)
+
+
+@kernel
 def decide(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
@@ -643,6 +691,8 @@ def decide(
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
+    if awaits_hold(memory.loops):
+        brake(scene, control, memory, phase, record)
     phase.at_event = phase.undecided
     open_modes = phase.at_event == 1 or jumped
     if phase.bridging == 0 and open_modes:
@@ -656,7 +706,7 @@ def decide(
     phase.jammed = 0
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     if phase.at_event == 1:
-        copy_forces(phase.force, memory.contacts.force)
+        show_forces(phase.force, phase, memory.contacts)
     return DONE
 
 
@@ -698,7 +748,7 @@ def move_over(
     pass_time(phase.length, end, phase)
     clock.time = phase.time
     phase.bridge_end = phase.time
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         if phase.accumulation[contact] <= phase.time:
             phase.accumulation[contact] = np.inf
     memory.tally.steps += 1

@@ -53,13 +53,13 @@ def form_groups(
     model: Model, tree: Workspace, contacts: Contacts, friction: Floats, phase: Phase
 ) -> None:
     """Find which closed contacts hold the same constraints, and which of them carry the forces."""
-    for contact in range(phase.closed.shape[0]):
+    for contact in range(phase.watched):
         phase.group[contact] = contact
         phase.carrier[contact] = 0
         phase.holder[contact] = 0
         if model.nc <= contact < phase.first_dry:
             phase.carrier[contact] = phase.closed[contact]
-        elif contact >= phase.first_dry:
+        elif phase.first_dry <= contact < phase.first_second:
             sticks = 1 if phase.slide[contact] == 0 else 0
             phase.holder[contact] = sticks
             if sticks == 1 and phase.stuck[contact] == 0:
@@ -67,13 +67,17 @@ def form_groups(
                 phase.anchor[contact] = phase.begin[joint]
             phase.stuck[contact] = sticks
         elif phase.closed[contact] == 1:
-            join_group(model, contacts.normal, contact, phase)
-    for leader in range(model.nc):
+            join_group(model, contacts, contact, phase)
+    for leader in range(phase.watched):
+        if model.nc <= leader < phase.first_second:
+            continue
         if phase.closed[leader] == 1 and phase.group[leader] == leader:
             find_carriers(model, contacts, leader, phase)
             if phase.slide[leader] == 0 and friction[leader] > 0.0:
                 phase.holder[leader] = 1
-    for contact in range(model.nc):
+    for contact in range(phase.watched):
+        if model.nc <= contact < phase.first_second:
+            continue
         sticks = phase.closed[contact] == 1 and phase.slide[contact] == 0
         if sticks and phase.stuck[contact] == 0:
             phase.anchor[contact] = tangential_place(model, tree, contacts, contact, phase)
@@ -81,34 +85,60 @@ def form_groups(
 
 
 @kernel
-def join_group(model: Model, normal: Floats, contact: int, phase: Phase) -> None:
+def normal_of(contact: int, contacts: Contacts, phase: Phase) -> tuple[float, float]:
+    """Normal of the face that a contact point is on."""
+    if contact >= phase.first_second:
+        normal = phase.seconds.normal[contact - phase.first_second]
+        return normal[0], normal[1]
+    return contacts.normal[contact, 0], contacts.normal[contact, 1]
+
+
+@kernel
+def link_of(contact: int, model: Model, phase: Phase) -> int:
+    """Link of a contact point."""
+    point = contact - phase.first_second if contact >= phase.first_second else contact
+    return int(model.contact_link[point])
+
+
+@kernel
+def join_group(model: Model, contacts: Contacts, contact: int, phase: Phase) -> None:
     """Let a closed point join the group of its link and direction, if there is one before it."""
+    x, z = normal_of(contact, contacts, phase)
+    link = link_of(contact, model, phase)
     for other in range(contact):
-        turn = normal[other, 0] * normal[contact, 1] - normal[other, 1] * normal[contact, 0]
-        if (
-            phase.closed[other] == 1
-            and phase.group[other] == other
-            and model.contact_link[other] == model.contact_link[contact]
-            and abs(turn) < PARALLEL
-        ):
+        if phase.closed[other] == 0 or phase.group[other] != other:
+            continue
+        if model.nc <= other < phase.first_second or link_of(other, model, phase) != link:
+            continue
+        its_x, its_z = normal_of(other, contacts, phase)
+        if abs(its_x * z - its_z * x) < PARALLEL and its_x * x + its_z * z > 0.0:
             phase.group[contact] = other
             phase.slide[contact] = phase.slide[other]
             return
 
 
 @kernel
+def place_along(contact: int, x: float, z: float, contacts: Contacts, phase: Phase) -> float:
+    """Where a contact point is along the face with a normal."""
+    if contact >= phase.first_second:
+        position = phase.seconds.position[contact - phase.first_second]
+        return float(position[0] * z - position[1] * x)
+    return float(contacts.position[contact, 0] * z - contacts.position[contact, 1] * x)
+
+
+@kernel
 def find_carriers(model: Model, contacts: Contacts, leader: int, phase: Phase) -> None:
     """Let the outermost points of a group carry its normal forces."""
-    position, normal = contacts.position, contacts.normal
+    x, z = normal_of(leader, contacts, phase)
     first = leader
     last = leader
-    low = position[leader, 0] * normal[leader, 1] - position[leader, 1] * normal[leader, 0]
+    low = place_along(leader, x, z, contacts, phase)
     high = low
-    for contact in range(leader + 1, model.nc):
+    for contact in range(leader + 1, phase.watched):
+        if model.nc <= contact < phase.first_second:
+            continue
         if phase.closed[contact] == 1 and phase.group[contact] == leader:
-            along = (
-                position[contact, 0] * normal[leader, 1] - position[contact, 1] * normal[leader, 0]
-            )
+            along = place_along(contact, x, z, contacts, phase)
             if along < low:
                 low = along
                 first = contact
@@ -128,11 +158,13 @@ def report_modes(
     Points that stand on the ground when the run begins do not touch down.
     """
     closed, was_closed = phase.closed, reported.closed
-    for contact in range(closed.shape[0]):
+    for contact in range(phase.watched):
         now = phase.slide[contact]
         before = reported.slipping[contact]
         landed = closed[contact] == 1 and was_closed[contact] == 0
-        if contact >= phase.first_dry:
+        if contact >= phase.first_second:
+            pass  # its point is on the ground with the first face
+        elif contact >= phase.first_dry:
             if now != before:
                 kind = JOINT_STICK if now == 0 else JOINT_SLIP
                 joint = phase.dry_joint[contact - phase.first_dry]

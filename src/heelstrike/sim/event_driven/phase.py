@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number
-from heelstrike.dynamics.loops import count_rows
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
+from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.faces import NO_FACE
+from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
 from heelstrike.sim.memory import contact_capacity
 
@@ -25,10 +27,15 @@ class Phase(Bundle):
     dry joint is always closed, on a contact of its own
     (:mod:`heelstrike.sim.contacts.dry_friction`).
 
+    After all these come the second faces of the contact points, one each: contacts of their own
+    on ground with concave corners, and none elsewhere.
+
     Attributes
     ----------
-    first_dry : int
-        Number of the first dry joint among the contacts.
+    first_dry, first_second : int
+        Number of the first dry joint, and of the first second face, among the contacts.
+    watched : int
+        How many contacts there are on this ground.
     weight : float
         Of the robot, or its mass where there is no gravity.
     stop_joint : (ns,) int
@@ -55,9 +62,13 @@ class Phase(Bundle):
         Points that reach the ground in this instant; those whose rebound is too short to follow.
     passing : (nc,) int
         Points of a swing leg below the ground that are let pass.
-    face : (points,) int
-        Face of the ground that each closed contact point is on, -1 for none
-        (:mod:`heelstrike.sim.event_driven.faces`).
+    face : (nc,) int
+        Face of the ground that each closed contact point is on, -1 for none; the second that it
+        is on, or could meet (:mod:`heelstrike.sim.event_driven.faces`).
+    meets : (nc,) int
+        Whether each point meets a second face in this instant, and is recorded in its frame.
+    seconds : Contacts
+        The contact points on their second faces; the gap is infinite where there is none.
     force : (nc, 2) float
         Contact forces of the last evaluation (N), normal and tangent, on the robot.
     end_force : (nc, 2) float
@@ -130,6 +141,8 @@ class Phase(Bundle):
     """
 
     first_dry: int = number(int)
+    first_second: int = number(int)
+    watched: int = cell(int)
     weight: float = number(float)
     stop_joint: Integers = array("ns", of=int)
     stop_side: Floats = array("ns")
@@ -147,7 +160,9 @@ class Phase(Bundle):
     hit: Integers = array("contacts", of=int)
     plastic: Integers = array("contacts", of=int)
     passing: Integers = array("contacts", of=int)
-    face: Integers = array("nc", of=int)
+    face: Integers = array("contacts", of=int)
+    meets: Integers = array("nc", of=int)
+    seconds: Contacts = part(Contacts)
     force: Floats = array("contacts", "components")
     end_force: Floats = array("contacts", "components")
     impulse: Floats = array("contacts", "components")
@@ -215,11 +230,13 @@ def allocate_phase(robot: Robot) -> Phase:
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
     dry = np.flatnonzero(model.dry_friction > 0.0)
-    contacts = contact_capacity(robot)
+    firsts = contact_capacity(robot)
+    contacts = firsts + robot.nc
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        forces=2 * contacts + count_rows(model), functions=2 * contacts + robot.nc,
-        stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=contacts - len(dry),
+        forces=2 * contacts + most_rows(model), functions=2 * contacts + robot.nc,
+        stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=firsts - len(dry),
+        first_second=firsts, watched=firsts,
         weight=mass * gravity if gravity > 0.0 else mass,
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
@@ -237,8 +254,11 @@ def allocate_phase(robot: Robot) -> Phase:
             ],
             dtype=np.int64,
         ),
-        closed=(np.arange(contacts) >= contacts - len(dry)).astype(np.int64),
+        closed=np.repeat([0, 1, 0], [firsts - len(dry), len(dry), robot.nc]),
         last_impact=np.full(contacts, -np.inf),
         accumulation=np.full(contacts, np.inf),
-        value=np.ones(2 * contacts + robot.nc), face=np.full(robot.nc, -1),
+        value=np.ones(2 * contacts + robot.nc), face=np.full(contacts, NO_FACE),
+        seconds=Contacts.allocate(
+            {**model.extents, "components": 2}, gap=np.full(robot.nc, np.inf)
+        ),
     )  # fmt: skip

@@ -6,9 +6,10 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
-from heelstrike.sim.contacts.loops import note_loops
+from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
 from heelstrike.sim.event_driven.phase import Phase
@@ -52,7 +53,7 @@ def write_row(
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
-    count, loops = phase.closed_count, memory.loops.unknown.shape[0]
+    count, loops = phase.closed_count, rows_of(memory.loops)
     if count + loops > 0:
         friction, guess = memory.surface.friction, memory.reaction.mode
         solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
@@ -63,13 +64,20 @@ def write_row(
     note_state(model, row, trial, record)
     slide = phase.slide[phase.first_dry :]
     dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
+    deepest = memory.tally.penetration
     for contact in range(model.nc):
         if phase.passing[contact] == 0:
-            memory.tally.penetration = max(memory.tally.penetration, -contacts.gap[contact])
+            deepest = max(deepest, -contacts.gap[contact], -phase.seconds.gap[contact])
+        phase.seconds.force[contact, 0] = 0.0
+        phase.seconds.force[contact, 1] = 0.0
+    memory.tally.penetration = deepest
     for place in range(count):
         contact = assembly.candidate[place]
         normal, tangent = impulse[2 * place], impulse[2 * place + 1]
-        if contact >= phase.first_dry:
+        if contact >= phase.first_second:
+            phase.seconds.force[contact - phase.first_second, 0] = normal
+            phase.seconds.force[contact - phase.first_second, 1] = tangent
+        elif contact >= phase.first_dry:
             friction_torque[phase.dry_joint[contact - phase.first_dry]] = tangent
         elif contact >= model.nc:
             stop = contact - model.nc
@@ -80,6 +88,8 @@ def write_row(
             _, record.slip_velocity[row, contact] = contact_velocity(
                 model, memory.equations.tree, contacts, contact
             )
+    for second in range(phase.first_second, phase.watched):
+        record_corner(row, second - phase.first_second, model, memory, phase, record)
     phase.last_row = time
     period = phase.output_period * phase.row_every
     if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:
@@ -99,8 +109,11 @@ def write_rows_within(
     touch = False
     if phase.has_fired == 1:
         last -= 1e-12
-        for contact in range(phase.closed.shape[0]):
+        for contact in range(phase.watched):
             touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+        for second in range(phase.first_second, phase.watched):
+            function = 2 * phase.watched + second - phase.first_second
+            touch = touch or (phase.closed[second] == 1 and phase.fired[function] == 1)
     state = phase.slopes[SLOPES - 1]
     while True:
         time = phase.next_row * period
@@ -111,6 +124,9 @@ def write_rows_within(
             touch = False
             time = phase.time + phase.length
             part = 1.0
+            for second in range(phase.first_second, phase.watched):
+                meets = phase.closed[second] == 0 and phase.fired[2 * second] == 1
+                phase.meets[second - phase.first_second] = 1 if meets else 0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
             return False
         if part < 1.0:

@@ -77,6 +77,7 @@ def labels(robot: Robot) -> dict[str, list[str]]:
         "contact": list(robot.contact_names),
         "loop": list(robot.loop_names),
         "coupling": list(robot.coupling_names),
+        "brake": list(robot.brake_names),
         "axis": ["x", "z"],
         "component": ["normal", "tangent"],
         "condition": ["complementarity", "cone", "non-penetration"],

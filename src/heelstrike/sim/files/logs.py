@@ -18,7 +18,7 @@ PREFIX = "log_"
 DIMENSIONS = {
     "nl": "coordinate", "nq": "coordinate", "nv": "coordinate", "nu": "actuator", "nc": "contact",
     "axes": "axis", "components": "component", "conditions": "condition",
-    "loops": "loop", "couplings": "coupling",
+    "loops": "loop", "couplings": "coupling", "brakes": "brake",
 }  # fmt: skip
 """What datasets call the extents of a row. In the plane links and coordinates share one."""
 

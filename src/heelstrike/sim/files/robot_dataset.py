@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 _DIMS: dict[str | int, str] = {
     "nl": "coordinate", "nj": "coordinate", "nq": "coordinate", "nv": "coordinate",
     "nc": "contact", "nu": "actuator", "axes": "xz", 3: "motion",
-    "loops": "loop", "couplings": "coupling", "latches": "latch", 2: "end", 5: "power",
+    "loops": "loop", "couplings": "coupling", "latches": "latch", "brakes": "brake",
+    2: "end", 5: "power",
 }  # fmt: skip
 """Dimensions of the file. In the plane links, joints and coordinates share one."""
 _SIZES = {"xz": 2, "motion": 3, "end": 2, "power": 5}
@@ -175,6 +176,8 @@ def _check(robot: Robot) -> None:
     }
     for name, number in NUMBERS.items():
         values = np.asarray(getattr(model, name))
+        if number.shape == ("nc",) and np.any((values < number.least) | (values > number.most)):
+            raise DamageError(f"{name} must lie between {number.least:g} and {number.most:g}")
         if number.points:
             high = model.extents[number.points]
             astray[name] = astray.get(name) or np.any((values < number.least) | (values >= high))

@@ -65,9 +65,11 @@ def locate_corners(model: Model, ground: GroundModel, tree: Workspace, corner: C
     for i in range(model.nc):
         point, normal, radius = contacts.position[i], contacts.normal[i], model.contact_radius[i]
         point_position(tree, model.contact_link[i], model.contact_position[i], point)
-        contacts.gap[i], corner.friction[i], corner.restitution[i] = second_contact(
+        contacts.gap[i], friction, restitution = second_contact(
             ground, point[0], point[1], radius, normal
         )
+        corner.friction[i] = model.friction_scale[i] * friction
+        corner.restitution[i] = model.restitution_scale[i] * restitution
         point[0] -= radius * normal[0]
         point[1] -= radius * normal[1]
         corner.near += contacts.gap[i] < np.inf

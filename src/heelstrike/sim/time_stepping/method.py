@@ -39,13 +39,13 @@ from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
-from heelstrike.dynamics.loops import find_rows
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
+from heelstrike.sim.contacts.brakes import note_brakes, take_hold
 from heelstrike.sim.contacts.dry_friction import select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -63,8 +63,10 @@ from heelstrike.sim.contacts.latches import hold, react
 from heelstrike.sim.contacts.loops import (
     append_loops,
     close_loops,
+    find_loops,
     free_loops,
     note_loop,
+    rows_of,
     speed_along,
     steady_loops,
 )
@@ -211,7 +213,13 @@ class TimeStepping(Method):
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a step may add to the record."""
-        events = 2 * (robot.nc + robot.nv) + len(robot.joint_names) + robot.model.latches + 1
+        events = (
+            2 * (robot.nc + robot.nv)
+            + len(robot.joint_names)
+            + robot.model.latches
+            + robot.model.brakes
+            + 1
+        )
         return 1, events
 
     def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
@@ -239,7 +247,7 @@ def is_linearised(scheme: int) -> bool:
 @dissolved_kernel
 def begin(model: Model, ground: GroundModel, memory: Memory, work: Stepping, record: Record) -> int:
     """Begin with closed loops."""
-    if memory.loops.unknown.shape[0] > 0:
+    if rows_of(memory.loops) > 0:
         equations, loops, q = memory.equations, memory.loops, memory.q
         if not close_loops(model, equations, loops, q):
             return DIVERGED
@@ -266,7 +274,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
-    find_rows(model, memory.q, memory.v, equations.tree, memory.loops.rows)
+    take_hold(memory.loops)
+    find_loops(model, memory.q, memory.v, equations.tree, memory.loops)
     if ground.concave == 1:
         locate_corners(model, ground, equations.tree, work.impact.corner)
 
@@ -638,7 +647,7 @@ def push_all(
     contacts, assembly = memory.contacts, memory.assembly
     equations, usual = memory.equations, memory.usual
     if straight:
-        joints = count - memory.loops.unknown.shape[0]
+        joints = count - rows_of(memory.loops)
         push_candidates(model, contacts, assembly, near, joints, equations, usual, v)
         for place in range(joints, count):
             for j in range(model.nv):
@@ -657,13 +666,13 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
-        joints = count - memory.loops.unknown.shape[0]
+        joints = count - rows_of(memory.loops)
         for place in range(joints, count):
             add_loop(model, near, joints, place, memory)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        rows_there = dry_joint.shape[0] + corners + memory.loops.unknown.shape[0]
+        rows_there = dry_joint.shape[0] + corners + rows_of(memory.loops)
         joints = count - rows_there
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, count, equations, assembly)
@@ -858,6 +867,7 @@ def decide(
     first = record.events
     note_events(model, clock.time, work.step, memory, record)
     react(model, first, memory.q, record, memory.loops)
+    note_brakes(model, clock.time, work.step, record, memory.loops)
     return DONE if solved else SOLVER_FAILED
 
 
@@ -889,7 +899,7 @@ def move(
         integrate(model, q, next_v, work.step, q)
     for i in range(model.nv):
         v[i] = next_v[i]
-    has_loops = memory.loops.unknown.shape[0] > 0
+    has_loops = rows_of(memory.loops) > 0
     if has_loops and not close_loops(model, memory.equations, memory.loops, q):
         return DIVERGED
     clock.time = clock.start + (clock.index + 1) * work.step

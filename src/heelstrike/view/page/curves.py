@@ -243,6 +243,7 @@ def _energy(run: Run, rows: Rows) -> list[Plot]:
             ("dampers", "dampers", DOTTED, 3),
             ("stops", "joint stops", 3, 4),
             ("dry_friction", "dry friction", DOTTED, 5),
+            ("brakes", "brakes", DASHED, 4),
             ("pushes", "pushes", 3, 0),
             ("residual", "residual", 0, None),
         )

@@ -7,7 +7,7 @@ import numpy as np
 from heelstrike.robot.assembly import LARGEST_NUMBER
 from heelstrike.robot.files.saving.mjcf import body_links
 from heelstrike.robot.files.saving.text import joints_with, unique
-from heelstrike.robot.model import PROPERTIES, Floats, Integers, label
+from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats, Integers, label
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
 
@@ -77,8 +77,14 @@ def warn_of_loss(
     discs = set(seen)  # which are spheres there
     if any((o.link, *map(tuple, o.corners), o.radius) not in discs for o in robot.outlines):
         said.append("outlines, for pictures")
+    for name in SCALES:
+        scaled = np.flatnonzero(getattr(model, name) != NUMBERS[name].default)
+        if scaled.size:
+            said.append(f"{label(name)} of {', '.join(robot.contact_names[i] for i in scaled)}")
     if model.latches:
         said.append(f"latches of {', '.join(robot.latch_names)}")
+    if model.brakes:
+        said.append(f"brakes of {', '.join(robot.brake_names)}")
     if model.loops:
         said.append(f"closed loops ({', '.join(robot.loop_names)})")
     if said:

@@ -8,7 +8,7 @@ import numpy as np
 
 from heelstrike.robot.assembly import link_origins
 from heelstrike.robot.files.joint_numbers import ATTRIBUTES, CUSTOM
-from heelstrike.robot.files.links import LATCH
+from heelstrike.robot.files.links import BRAKE, LATCH
 from heelstrike.robot.files.saving.text import (
     POINT_RADIUS,
     SMALLEST_INERTIA,
@@ -20,7 +20,7 @@ from heelstrike.robot.files.saving.text import (
     unique,
 )
 from heelstrike.robot.files.shapes import COUNT, PREFIX
-from heelstrike.robot.model import PROPERTIES, Floats
+from heelstrike.robot.model import NUMBERS, PROPERTIES, SCALES, Floats
 from heelstrike.robot.robot import Robot
 
 SAME_PLACE = 1e-6  # metres; nearer joints need no line between them
@@ -44,6 +44,13 @@ def mjcf(robot: Robot) -> Element:
         name = f"{LATCH}:{robot.joint_names[joint]}"
         name += f":{body_name[release]}" if release >= 0 else ""
         SubElement(holder, "numeric", name=name, data=str(side))
+    for name in robot.brake_names:
+        SubElement(holder, "numeric", name=f"{BRAKE}:{name}", data="1")
+    for name in SCALES:
+        for point_name, value in zip(_geom_names(robot), getattr(model, name), strict=True):
+            if value != NUMBERS[name].default:
+                told = f"{name}:{point_name}"
+                SubElement(holder, "numeric", name=told, data=number(value))
     SubElement(holder, "numeric", name=COUNT, data=str(len(robot.outlines)))
     for count, outline in enumerate(robot.outlines):
         name = f"{PREFIX}:{count}:{robot.joint_names[outline.link]}"
@@ -170,6 +177,11 @@ def _write_inertia(robot: Robot, link: int, body: Element) -> None:
     )
 
 
+def _geom_names(robot: Robot) -> list[str]:
+    """Names of the geoms that contact points become."""
+    return list(unique(robot.contact_names))
+
+
 def _write_shapes(robot: Robot, link: int, origin: Floats, body: Element) -> None:
     """Contact points as spheres, and bones that only show where the links are."""
     model = robot.model
@@ -178,10 +190,10 @@ def _write_shapes(robot: Robot, link: int, origin: Floats, body: Element) -> Non
         if np.hypot(*reach) > SAME_PLACE:
             bone = {"type": "capsule", "size": "0.02", "fromto": "0 0 0 " + point(reach)}
             SubElement(body, "geom", bone)
-    named = len(set(robot.contact_names)) == robot.nc
+    names = _geom_names(robot)
     for i in np.flatnonzero(model.contact_link == link):
-        geom = {"name": robot.contact_names[i]} if named else {}
-        geom |= {
+        geom = {
+            "name": names[i],
             "type": "sphere",
             "size": number(max(float(model.contact_radius[i]), POINT_RADIUS)),
             "pos": point(model.contact_position[i]),

@@ -1,0 +1,1 @@
+"""The linear-quadratic regulator of a walk that repeats, on point feet."""

@@ -1,0 +1,206 @@
+"""The walk over a phase that repeats: states, torques, and the equations of motion about it.
+
+All are found at the nodes of Chebyshev polynomials in the phase θ and interpolated, which for
+smooth motions is exact to rounding. Where the trunk is follows from the stance foot: a disturbance
+is (δp, δṗ), p all coordinates but the trunk's x and z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import Chebyshev
+from numpy.polynomial.chebyshev import chebder, chebpts1, chebval, chebvander
+from numpy.typing import ArrayLike
+
+from heelstrike import dynamics
+from heelstrike.contact import contact_inverse_dynamics
+from heelstrike.errors import ControllerError
+from heelstrike.gait.phased.phased_gait import PhasedGait
+from heelstrike.gait.phased.surface import Surface, Touchdown
+from heelstrike.robot.model import Floats
+
+NODES = 48
+
+INVARIANT = 1e-6
+"""Impacts may lead this far from the beginning of the gait (rad, and in slopes)."""
+
+SMALL = 1e-6
+"""Disturbance (rad, rad/s) of central differences: their errors are its square, and 1e-16 over it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A quantity over the phase, as Chebyshev series of its entries.
+
+    Attributes
+    ----------
+    first, last : float
+        Ends of the phase (rad).
+    coefficients : (NODES, ...) float
+    """
+
+    first: float
+    last: float
+    coefficients: Floats
+
+    @classmethod
+    def through(cls, first: float, last: float, values: Floats) -> Course:
+        """Interpolate values at the nodes."""
+        flat = values.reshape(NODES, -1)
+        matrix = np.linalg.solve(chebvander(chebpts1(NODES), NODES - 1), flat)
+        return cls(first, last, matrix.reshape(values.shape))
+
+    def __call__(self, theta: ArrayLike) -> Floats:
+        """Values at phases, (..., entries)."""
+        x = (2.0 * np.asarray(theta) - self.first - self.last) / (self.last - self.first)
+        values = chebval(x, self.coefficients)
+        moved: Floats = np.moveaxis(
+            values, range(self.coefficients.ndim - 1), range(x.ndim, values.ndim)
+        )
+        return moved
+
+    def slope(self) -> Course:
+        """Its derivative by θ."""
+        derivative = chebder(self.coefficients, axis=0) * 2.0 / (self.last - self.first)
+        return Course(self.first, self.last, derivative)
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """The walk that repeats, from just after one touchdown to just before the next.
+
+    Attributes
+    ----------
+    gait : PhasedGait
+    touchdown : Touchdown
+        Its end.
+    q, v, torque : Course of (nq,), (nv,) and (nu,)
+        The walk.
+    rate : Course of ()
+        θ̇ (rad/s).
+    A, B : Course of (2 p, 2 p) and (2 p, nu)
+        d/dt (δp, δṗ) = A (δp, δṗ) + B δτ while the stance foot stays in place.
+    """
+
+    gait: PhasedGait
+    touchdown: Touchdown
+    q: Course
+    v: Course
+    torque: Course
+    rate: Course
+    A: Course
+    B: Course
+
+    @property
+    def flow(self) -> Course:
+        """d/dt (p, ṗ) along the walk."""
+        values = np.array([self.slope_at(theta) for theta in nodes(self.q.first, self.q.last)])
+        return Course.through(self.q.first, self.q.last, values)
+
+    def slope_at(self, theta: float) -> Floats:
+        """d/dt (p, ṗ) at a phase."""
+        rate = float(self.rate(theta))
+        return rate * np.concatenate([self.q.slope()(theta)[2:], self.v.slope()(theta)[2:]])
+
+
+def nodes(first: float, last: float) -> Floats:
+    """Phases of the nodes."""
+    return np.asarray(0.5 * (first + last) + 0.5 * (last - first) * chebpts1(NODES))
+
+
+def orbit_of(gait: PhasedGait) -> Orbit:
+    """Find the walk that repeats over a gait on level ground, and its linear equations.
+
+    Raises
+    ------
+    ControllerError
+        If there is none, or the impact does not lead to the gait's beginning.
+    """
+    surface = Surface(gait)
+    end = surface.touchdown()
+    driven = gait.robot.model.actuator_joint
+    place = gait.joints(end.after) - end.position[driven]
+    speed = gait.joints(end.after, order=1) - end.velocity[driven] / end.rate
+    if max(np.abs(place).max(), np.abs(speed).max()) > INVARIANT:
+        raise ControllerError(
+            f"the impact of robot {gait.robot.name!r} at the end of this gait does not lead to its "
+            "beginning: hs.make_invariant(gait) changes it so that it does"
+        )
+    first, last = end.after, end.before
+    theta = nodes(first, last)
+    tangent = np.array([surface.tangent(each) for each in theta])
+    rates = _rates(surface, end, theta)
+    q = np.array([surface.position(each) for each in theta])
+    bend = Course.through(first, last, tangent).slope()(theta)
+    hurry = 0.5 * Course.through(first, last, rates**2).slope()(theta)  # θ̈
+    acceleration = bend * rates[:, None] ** 2 + tangent * hurry[:, None]
+    v = tangent * rates[:, None]
+    torque, A, B = [], [], []
+    for k in range(NODES):
+        moved = Instant(gait, q[k], v[k], acceleration[k])
+        torque.append(moved.torque)
+        A.append(moved.A)
+        B.append(moved.B)
+    courses = (q, v, np.array(torque), rates, np.array(A), np.array(B))
+    return Orbit(gait, end, *(Course.through(first, last, each) for each in courses))
+
+
+def _rates(surface: Surface, end: Touchdown, theta: Floats) -> Floats:
+    """θ̇ of the walk that repeats: gravity adds to ½σ² what the impact takes of it."""
+    domain = [end.after, end.before]
+    power = Chebyshev.interpolate(
+        np.vectorize(lambda each: surface.inertia(each) * surface.tipping(each)), NODES, domain
+    )
+    added = power.integ(lbnd=end.after)
+    left = end.momentum**2
+    after = left * float(added(end.before)) / (1.0 - left)
+    energy = after + added(theta)
+    if energy.min() <= 0.0:
+        raise ControllerError(
+            f"no walk of robot {surface.robot.name!r} over this gait repeats; see zero_dynamics"
+        )
+    return np.asarray(np.sqrt(2.0 * energy) / np.vectorize(surface.inertia)(theta))
+
+
+class Instant:
+    """The torques of the walk at an instant, and the linear equations about it.
+
+    Parameters
+    ----------
+    gait : PhasedGait
+    q, v, acceleration : (nq,), (nv,) and (nv,) float
+        State and acceleration of the walk, its stance foot at rest.
+
+    Attributes
+    ----------
+    torque : (nu,) float
+    A, B : float
+        As of :class:`Orbit`.
+    """
+
+    def __init__(self, gait: PhasedGait, q: Floats, v: Floats, acceleration: Floats) -> None:
+        robot, n = gait.robot, gait.robot.nv
+        contact = robot.feet[gait.stance_foot].contacts[0]
+        needed = contact_inverse_dynamics(robot, q, v, acceleration, contacts=[contact])
+        self.torque = needed.torque
+        linear = dynamics.linearize(robot, q, v, self.torque, contacts=[contact])
+
+        def rows(at: Floats) -> Floats:
+            jacobian: Floats = dynamics.contact_jacobian(robot, at)[contact][::-1, 2:]
+            return jacobian
+
+        # The trunk follows the foot: δ(x, z) = −J δp, and ẋ = −J(p) ṗ changes with p, too.
+        follows = np.vstack([-rows(q), np.eye(n - 2)])
+        turns = np.zeros((n, n - 2))
+        for k in range(n - 2):
+            step = SMALL * np.eye(n)[k + 2]
+            turns[:2, k] = -(rows(q + step) - rows(q - step)) @ v[2:] / (2.0 * SMALL)
+        by_position, by_velocity = linear.A[n + 2 :, :n], linear.A[n + 2 :, n:]
+        size = n - 2
+        self.A = np.zeros((2 * size, 2 * size))
+        self.A[:size, size:] = np.eye(size)
+        self.A[size:, :size] = by_position @ follows + by_velocity @ turns
+        self.A[size:, size:] = by_velocity @ follows
+        self.B = np.vstack([np.zeros((size, robot.nu)), linear.B[n + 2 :]])

@@ -1,0 +1,172 @@
+"""What becomes of disturbances across a walk, from step to step, and the best that motors can do.
+
+Disturbances are looked at where the phase is that of the walk: z = Π δx, with Π = I − f cᵀ/(cᵀf),
+f = ẋ along the walk and cᵀ the derivative of the phase. c is constant, so that z = E w with columns
+E that span what cᵀ takes to zero, and
+
+    dw/dt = Eᵀ Π (A E w + B δτ),
+
+the transverse linearisation (I. R. Manchester 2011, *Transverse dynamics and regions of stability
+for nonlinear hybrid limit cycles*, IFAC World Congress). At a touchdown the disturbed walk goes on
+to where its swing foot is on the ground, suffers the impact, and is looked at again where the phase
+is that of the beginning:
+
+    w⁺ = Eᵀ Π₀ DΔ (I − f ∇h/(∇h f)) E w⁻.
+
+The regulator minimises ∫ zᵀQz + δτᵀR δτ dt over all steps to come: a Riccati equation whose
+solution the jump takes from the beginning of a step to the end of the one before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.linalg import null_space
+
+from heelstrike import dynamics
+from heelstrike.control.gait_lqr.orbit import SMALL, Orbit
+from heelstrike.errors import ControllerError
+from heelstrike.robot.model import Floats
+
+STEPS = 256
+"""Steps of the classical Runge-Kutta method a period."""
+
+PERIODS = 400
+SETTLED = 1e-10
+"""Periods until gains are those of all further ones, to this part of the largest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Transverse:
+    """The linear equations across a walk, at twice as many phases as there are steps, and one more.
+
+    Attributes
+    ----------
+    theta : (2 STEPS + 1,) float
+        Phases, evenly spaced (rad).
+    basis : (2 p, 2 p - 1) float
+        E.
+    A, B : (2 STEPS + 1, ...) float
+        dw/dθ = A w + B δτ.
+    pace : (2 STEPS + 1,) float
+        dt/dθ.
+    jump : (2 p - 1, 2 p - 1) float
+        w⁺ = jump w⁻.
+    """
+
+    theta: Floats
+    basis: Floats
+    A: Floats
+    B: Floats
+    pace: Floats
+    jump: Floats
+
+    @classmethod
+    def of(cls, orbit: Orbit) -> Transverse:
+        """Find them."""
+        first, last = orbit.q.first, orbit.q.last
+        theta = np.linspace(first, last, 2 * STEPS + 1)
+        size = orbit.gait.robot.nv - 2
+        phase = np.concatenate([orbit.gait.phase[2:], np.zeros(size)])
+        basis = null_space(phase[None, :])
+        rate, flow = orbit.rate(theta), orbit.flow(theta)
+        across = np.eye(2 * size) - flow[:, :, None] * phase / rate[:, None, None]
+        pace = 1.0 / rate
+        slopes = basis.T @ across @ orbit.A(theta) @ basis * pace[:, None, None]
+        pushes = basis.T @ across @ orbit.B(theta) * pace[:, None, None]
+        jump = basis.T @ across[0] @ _impact_slope(orbit) @ _to_the_ground(orbit) @ basis
+        return cls(theta, basis, slopes, pushes, pace, jump)
+
+    def regulator(self, cost: Floats, effort: Floats) -> CubicSpline:
+        """Gains (nu, 2 p) of the least cost over the phase."""
+        cheap = np.linalg.inv(effort)
+        costs = self.pace[:, None, None] * (self.basis.T @ cost @ self.basis)
+        pushes = self.B @ cheap @ np.moveaxis(self.B, 1, 2) / self.pace[:, None, None]
+        width = 2.0 * (self.theta[1] - self.theta[0])
+
+        def slope(k: int, value: Floats) -> Floats:
+            drift = self.A[k].T @ value
+            return drift + drift.T - value @ pushes[k] @ value + costs[k]
+
+        values = np.zeros((STEPS + 1, *self.jump.shape))
+        before = np.inf
+        for _ in range(PERIODS):
+            values[STEPS] = self.jump.T @ values[0] @ self.jump
+            for step in range(STEPS - 1, -1, -1):
+                k, end = 2 * step, values[step + 1]
+                one = slope(k + 2, end)
+                two = slope(k + 1, end + 0.5 * width * one)
+                three = slope(k + 1, end + 0.5 * width * two)
+                four = slope(k, end + width * three)
+                values[step] = end + width / 6.0 * (one + 2.0 * (two + three) + four)
+            size = np.abs(values[0]).max()
+            if not np.isfinite(size):
+                break
+            if abs(size - before) <= SETTLED * size:
+                gains = cheap @ np.moveaxis(self.B[::2], 1, 2) @ values
+                gains = gains / self.pace[::2, None, None] @ self.basis.T
+                return CubicSpline(self.theta[::2], gains)
+            before = size
+        raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
+
+    def over_a_step(self, gains: Floats) -> Floats:
+        """What a step makes of w with gains (2 STEPS + 1, nu, 2 p − 1), impact included."""
+        closed = self.A - self.B @ gains
+        width = 2.0 * (self.theta[1] - self.theta[0])
+        moved = np.eye(len(self.jump))
+        for step in range(STEPS):
+            k = 2 * step
+            one = closed[k] @ moved
+            two = closed[k + 1] @ (moved + 0.5 * width * one)
+            three = closed[k + 1] @ (moved + 0.5 * width * two)
+            four = closed[k + 2] @ (moved + width * three)
+            moved = moved + width / 6.0 * (one + 2.0 * (two + three) + four)
+        return np.asarray(self.jump @ moved)
+
+
+def sorted_by_size(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Multipliers, the largest first."""
+    return multipliers[np.argsort(-np.abs(multipliers))].astype(complex)
+
+
+def _to_the_ground(orbit: Orbit) -> Floats:
+    """I − f ∇h/(∇h f): the disturbance where the swing foot meets the ground."""
+    gait, last = orbit.gait, orbit.q.last
+    q, size = orbit.q(last), gait.robot.nv - 2
+    swing = gait.robot.feet[1 - gait.stance_foot].contacts[0]
+    stance = gait.robot.feet[gait.stance_foot].contacts[0]
+    height = dynamics.contact_jacobian(gait.robot, q)[[swing, stance], 0, 2:]
+    falls = np.concatenate([height[0] - height[1], np.zeros(size)])
+    flow = orbit.slope_at(last)
+    return np.asarray(np.eye(2 * size) - np.outer(flow, falls) / (falls @ flow))
+
+
+def _impact_slope(orbit: Orbit) -> Floats:
+    """Derivative of the impact with legs exchanged, by central differences."""
+    q, v = orbit.q(orbit.q.last), orbit.v(orbit.q.last)
+    x = np.concatenate([q[2:], v[2:]])
+    columns = [
+        (_after(orbit, x + SMALL * each) - _after(orbit, x - SMALL * each)) / (2.0 * SMALL)
+        for each in np.eye(len(x))
+    ]
+    return np.array(columns).T
+
+
+def _after(orbit: Orbit, x: Floats) -> Floats:
+    """State (p, ṗ) just after a plastic impact of the swing foot, relabelled."""
+    gait, robot = orbit.gait, orbit.gait.robot
+    size = robot.nv - 2
+    q = np.concatenate([np.zeros(2), x[:size]])
+    jacobian = dynamics.contact_jacobian(robot, q)
+    stance = jacobian[robot.feet[gait.stance_foot].contacts[0]]
+    swing = jacobian[robot.feet[1 - gait.stance_foot].contacts[0]]
+    v = np.concatenate([np.zeros(2), x[size:]])
+    v[:2] = np.linalg.solve(stance[:, :2], -stance @ v)
+    mass = dynamics.mass_matrix(robot, q)
+    stopped = np.linalg.solve(mass, swing.T)
+    v = v - stopped @ np.linalg.solve(swing @ stopped, swing @ v)
+    assert robot.mirror is not None  # see PhasedGait
+    return np.concatenate([robot.mirror.position(q)[2:], robot.mirror.velocity(v)[2:]])

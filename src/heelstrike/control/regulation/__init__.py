@@ -1,0 +1,1 @@
+"""Regulation of the zero moment point by the clock of a gait."""

@@ -1,0 +1,221 @@
+"""Compliant ground in its concave corners: a point feels every face that it is in.
+
+Near a corner a point is on two faces, each with a gap, a bristle and a force of its own. Which they
+are does not change within a step, so that forces stay smooth where the nearer face becomes the
+other; the bristle of the face that a point leaves the corner on goes with it. The record has the
+resultant of both, in the frame of the row, where it leaves the disc.
+
+The second sides of the points are numbered on from the points.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from heelstrike.compiler.bundle import Bundle, array, cell, part
+from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
+from heelstrike.contact.ground import GroundModel
+from heelstrike.dynamics.frames import into_frame, out_of_frame
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.contacts.faces import (
+    NO_FACE,
+    center_of,
+    locate_on_face,
+    nearest_face,
+    second_face,
+    take_surface,
+)
+from heelstrike.sim.contacts.geometry import observe
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.memory import Memory
+
+# A point is in a corner when it is nearer to both faces than this (m), and no more when it is
+# further than that from either.
+ENTERS, LEAVES = 1e-3, 2e-3
+
+
+class Corners(Bundle):
+    """The points that are in concave corners.
+
+    Attributes
+    ----------
+    sides : int
+        How many sides of points there are on this ground: nc, or twice that if it has corners.
+    first, second : (nc,) int
+        The faces that each point in a corner is on, -1 for the others.
+    contacts : Contacts
+        The points on their second faces; the gap is infinite where there is none.
+    friction : (nc,) float
+        Coefficients there.
+    joins : (nc,) int
+        Whether both faces of a point pushed it since the last sample, or its frame has changed.
+    frame : (nc, 2) float
+        Normal of each point at the last sample, in whose frame forces are told.
+    center : (nc, 2) float
+        Centre of each disc then.
+    force : (nc, 2) float
+        Impulse of both faces since then, in world axes (N s).
+    moment : (nc,) float
+        Its moment about the centre of the disc (N m s).
+    """
+
+    sides: int = cell(int)
+    first: Integers = array("nc", of=int)
+    second: Integers = array("nc", of=int)
+    contacts: Contacts = part(Contacts)
+    friction: Floats = array("nc")
+    joins: Integers = array("nc", of=int)
+    frame: Floats = array("nc", "axes")
+    center: Floats = array("nc", "axes")
+    force: Floats = array("nc", "axes")
+    moment: Floats = array("nc")
+
+
+def allocate_corners(robot: Robot) -> Corners:
+    """Allocate it for a robot, of which no point is in a corner."""
+    extents = {**robot.model.extents, "components": 2}
+    none = np.full(robot.nc, NO_FACE)
+    return Corners.allocate(
+        extents, sides=robot.nc, first=none, second=none.copy(),
+        contacts=Contacts.allocate(extents, gap=np.full(robot.nc, np.inf)),
+    )  # fmt: skip
+
+
+@kernel
+def observe_sides(
+    model: Model, ground: GroundModel, q: Floats, v: Floats, memory: Memory, corners: Corners
+) -> None:
+    """Kinematics, velocities and contact points of a state, on both faces of corners."""
+    observe(model, ground, q, v, memory)
+    if corners.sides == model.nc:
+        return
+    tree, seconds = memory.equations.tree, corners.contacts
+    for point in range(model.nc):
+        seconds.gap[point] = np.inf
+        face, other = corners.first[point], corners.second[point]
+        if other == NO_FACE:
+            continue
+        locate_on_face(model, ground, tree, point, face, memory.contacts)
+        take_surface(model, ground, point, point, face, memory.surface)
+        locate_on_face(model, ground, tree, point, other, seconds)
+        friction = ground.friction[other // 2 - other % 2]
+        corners.friction[point] = model.friction_scale[point] * friction
+
+
+@kernel
+def is_near(point: int, reach: float, contacts: Contacts, corners: Corners) -> bool:
+    """Whether a point is nearer than this to both of its faces."""
+    return bool(max(contacts.gap[point], corners.contacts.gap[point]) < reach)
+
+
+@kernel
+def misses_corner(
+    model: Model, ground: GroundModel, depth: float, contacts: Contacts, corners: Corners
+) -> bool:
+    """Whether a step has taken a point deeper than this into a face that it was not known to meet.
+
+    Points fast enough go through the neighbourhood of a corner within a step.
+    """
+    for second in range(model.nc, corners.sides):
+        point = second - model.nc
+        if corners.second[point] == NO_FACE and contacts.gap[point] < ENTERS:
+            x, z = center_of(model, contacts, point)
+            radius = model.contact_radius[point]
+            face = nearest_face(ground, x, z, radius)
+            gap, _ = second_face(ground, face, NO_FACE, x, z, radius)
+            if gap < -depth:
+                return True
+    return False
+
+
+@kernel
+def choose_sides(
+    model: Model, ground: GroundModel, contacts: Contacts, corners: Corners, bend: Floats
+) -> None:
+    """Find which points enter and leave corners."""
+    for second in range(model.nc, corners.sides):
+        point = second - model.nc
+        radius = model.contact_radius[point]
+        x, z = center_of(model, contacts, point)
+        if corners.second[point] == NO_FACE:
+            if contacts.gap[point] >= ENTERS:
+                continue
+            face = nearest_face(ground, x, z, radius)
+            gap, other = second_face(ground, face, NO_FACE, x, z, radius)
+            if gap < ENTERS:
+                corners.first[point], corners.second[point] = face, other
+                bend[second] = 0.0
+        elif not is_near(point, LEAVES, contacts, corners):
+            if contacts.gap[point] > corners.contacts.gap[point]:
+                bend[point] = bend[second]
+            bend[second] = 0.0
+            corners.first[point], corners.second[point] = NO_FACE, NO_FACE
+
+
+@kernel
+def show_forces(model: Model, forces: Floats, corners: Corners, contacts: Contacts) -> None:
+    """Let controllers see the forces of the points now, of both faces where there are two."""
+    copy_words(forces, contacts.force)
+    for second in range(model.nc, corners.sides):
+        point = second - model.nc
+        if corners.second[point] != NO_FACE:
+            other = out_of_frame(
+                corners.contacts.normal[point], (forces[second, 0], forces[second, 1])
+            )
+            press, rub = into_frame(contacts.normal[point], other)
+            contacts.force[point, 0] += press
+            contacts.force[point, 1] += rub
+
+
+@kernel
+def begin_joining(model: Model, contacts: Contacts, corners: Corners) -> None:
+    """Keep the frames of the points at a sample, and forget what pushed them before."""
+    for second in range(model.nc, corners.sides):
+        point = second - model.nc
+        corners.joins[point] = 0
+        corners.moment[point] = 0.0
+        corners.center[point, 0], corners.center[point, 1] = center_of(model, contacts, point)
+        for i in range(2):
+            corners.frame[point, i] = contacts.normal[point, i]
+            corners.force[point, i] = 0.0
+
+
+@kernel
+def join(model: Model, step: float, forces: Floats, contacts: Contacts, corners: Corners) -> None:
+    """Add half a step's impulse of the forces of all sides to those of both faces."""
+    for second in range(model.nc, corners.sides):
+        point = second - model.nc
+        radius = model.contact_radius[point]
+        for side in range(2):
+            force = forces[second if side == 1 else point]
+            normal = corners.contacts.normal[point] if side == 1 else contacts.normal[point]
+            x, z = out_of_frame(normal, (force[0], force[1]))
+            corners.force[point, 0] += 0.5 * step * x
+            corners.force[point, 1] += 0.5 * step * z
+            corners.moment[point] += 0.5 * step * radius * force[1]
+        if forces[second, 0] > 0.0 or corners.second[point] != NO_FACE:
+            corners.joins[point] = 1
+
+
+@kernel
+def tell_resultants(model: Model, corners: Corners, impulse: Floats, place: Floats) -> None:
+    """Write the impulses of both faces in the frames of the sample, and where they act.
+
+    Where the resultant's line of action leaves the disc; that of forces that nearly cancel may miss
+    it.
+    """
+    for point in range(corners.sides - model.nc):
+        if corners.joins[point] == 0:
+            continue
+        x, z = corners.force[point, 0], corners.force[point, 1]
+        impulse[point, 0], impulse[point, 1] = into_frame(corners.frame[point], (x, z))
+        size = math.sqrt(x * x + z * z)
+        if size > 0.0:
+            radius, lever = model.contact_radius[point], corners.moment[point] / size
+            depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
+            place[point, 0] = corners.center[point, 0] + (lever * z - depth * x) / size
+            place[point, 1] = corners.center[point, 1] + (-lever * x - depth * z) / size

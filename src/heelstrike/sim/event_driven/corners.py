@@ -1,0 +1,105 @@
+"""What the two faces of a concave corner do to a point, told as one.
+
+A record, an event and a controller know one force a contact point, in the frame of one normal. In a
+corner that is the resultant of both faces, in the frame of the first; where a point meets a second
+face, it is the frame of that one: that is the face that hits it.
+"""
+
+from __future__ import annotations
+
+import math
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.dynamics.frames import into_frame, out_of_frame
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.geometry import contact_velocity
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.memory import Memory
+from heelstrike.sim.record.record import Record
+
+
+@kernel
+def is_cornered(point: int, phase: Phase) -> bool:
+    """Whether a second face acts on a point, or gives it its frame."""
+    if phase.watched == phase.first_second:
+        return False
+    second = phase.first_second + point
+    pushed = phase.impulse[second, 0] != 0.0 or phase.impulse[second, 1] != 0.0
+    return pushed or phase.meets[point] == 1
+
+
+@kernel
+def joined(point: int, forces: Floats, contacts: Contacts, phase: Phase) -> tuple[float, float]:
+    """Resultant (normal, tangent) of the forces, or impulses, of both faces of a point."""
+    second, other = phase.first_second + point, phase.seconds.normal[point]
+    own_x, own_z = out_of_frame(contacts.normal[point], (forces[point, 0], forces[point, 1]))
+    x, z = out_of_frame(other, (forces[second, 0], forces[second, 1]))
+    frame = other if phase.meets[point] == 1 else contacts.normal[point]
+    return into_frame(frame, (own_x + x, own_z + z))
+
+
+@kernel
+def impulse_of(point: int, contacts: Contacts, phase: Phase) -> tuple[float, float]:
+    """Impulse (normal, tangent) on a point in this instant, of both faces."""
+    if is_cornered(point, phase):
+        return joined(point, phase.impulse, contacts, phase)
+    return phase.impulse[point, 0], phase.impulse[point, 1]
+
+
+@kernel
+def is_struck(point: int, phase: Phase) -> bool:
+    """Whether an impulse acts on a point in this instant, of either face."""
+    if phase.impulse[point, 0] > 0.0:
+        return True
+    second = phase.first_second + point
+    return bool(phase.watched > phase.first_second and phase.impulse[second, 0] > 0.0)
+
+
+@kernel
+def show_forces(forces: Floats, phase: Phase, contacts: Contacts) -> None:
+    """Let controllers see the forces of the contact points; what stands after them is of joints."""
+    for contact in range(contacts.force.shape[0]):
+        contacts.force[contact, 0] = forces[contact, 0]
+        contacts.force[contact, 1] = forces[contact, 1]
+    for second in range(phase.first_second, phase.watched):
+        if forces[second, 0] != 0.0 or forces[second, 1] != 0.0:
+            point = second - phase.first_second
+            force = joined(point, forces, contacts, phase)
+            contacts.force[point, 0], contacts.force[point, 1] = force
+
+
+@kernel
+def record_corner(
+    row: int, point: int, model: Model, memory: Memory, phase: Phase, record: Record
+) -> None:
+    """Put the force of the second face of a point into a row, and the frame of one just met.
+
+    The force of the first face is there. About the centre of the disc only friction has a moment,
+    r λ_t of either face; the resultant acts where its line leaves the disc.
+    """
+    force, other = record.contact_force[row, point], phase.seconds.force[point]
+    seconds, meets = phase.seconds, phase.meets[point] == 1
+    if other[0] == 0.0 and other[1] == 0.0 and not meets:
+        return
+    radius, own = model.contact_radius[point], memory.contacts.normal[point]
+    own_x, own_z = out_of_frame(own, (force[0], force[1]))
+    x, z = out_of_frame(seconds.normal[point], (other[0], other[1]))
+    x, z = own_x + x, own_z + z
+    place, moment = record.contact_point[row, point], radius * (force[1] + other[1])
+    size = math.sqrt(x * x + z * z)
+    normal = seconds.normal[point] if meets else own
+    if meets:
+        place[0], place[1] = seconds.position[point, 0], seconds.position[point, 1]
+        record.gap[row, point] = seconds.gap[point]
+        for i in range(2):
+            record.contact_normal[row, point, i] = normal[i]
+        _, record.slip_velocity[row, point] = contact_velocity(
+            model, memory.equations.tree, seconds, point
+        )
+    elif size > 0.0:
+        lever = moment / size
+        depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
+        place[0] += radius * normal[0] + (lever * z - depth * x) / size
+        place[1] += radius * normal[1] + (-lever * x - depth * z) / size
+    force[0], force[1] = into_frame(normal, (x, z))

@@ -1,0 +1,177 @@
+"""Brakes, which hold a joint wherever it is, under every method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mechanisms import braked
+
+import heelstrike as hs
+from heelstrike.analysis import energy_balance
+from heelstrike.errors import RobotError, SimulationError
+from heelstrike.robot import Robot, RobotBuilder
+from heelstrike.sim.closed_sets import EventKind, RunStatus
+
+MASS, LENGTH, INERTIA = 2.0, 0.8, 0.05
+ABOUT_PIVOT = INERTIA + MASS * LENGTH**2
+
+METHODS = {
+    "time stepping": hs.TimeStepping(step=1e-3),
+    "linearised gap": hs.TimeStepping(step=1e-3, scheme=hs.Scheme.GAP_LINEARISED),
+    "Moreau-Jean": hs.TimeStepping(step=1e-3, scheme=hs.Scheme.MOREAU_JEAN),
+    "event-driven": hs.EventDriven(rtol=1e-10, atol=1e-12),
+    "compliant": hs.Compliant(rtol=1e-8, atol=1e-10),
+}
+
+
+def pendulum() -> Robot:
+    return braked(MASS, LENGTH, INERTIA)
+
+
+def swinging(method: Any) -> hs.Simulation:
+    robot = pendulum()
+    state = robot.state({"swing": 1.2})
+    return hs.Simulation(robot, state=state, method=method, stop_when_fallen=False)
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_pendulum_braked_in_mid_swing_stays_where_it_is(method: Any) -> None:
+    """It is held with m g l sin θ, and has lost what it moved with, ½ I ω²."""
+    simulation = swinging(method)
+    simulation.advance(0.3)
+    angle, speed = float(simulation.state.q[0]), float(simulation.state.v[0])
+    assert abs(speed) > 1.0
+    simulation.braked = ["swing"]
+    assert simulation.braked == ("swing",)
+    simulation.advance(0.6)
+    run = simulation.record
+    after = run.time > 0.305
+    assert run.status is RunStatus.COMPLETED
+    np.testing.assert_allclose(run.position[after, 0], angle, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run.velocity[after, 0], 0.0, atol=1e-12)
+    weight = MASS * 9.81 * LENGTH * np.sin(angle)
+    np.testing.assert_allclose(run.brake_torque[after, 0], weight, rtol=1e-9)
+    assert not np.any(run.brake_torque[run.time < 0.299])
+    balance = energy_balance(run)
+    lost = 0.5 * ABOUT_PIVOT * speed**2
+    # The row in which it takes hold is 1 ms long, and the brake bears the weight over it, too.
+    more = 1e-9 if isinstance(method, hs.EventDriven) else abs(weight * speed) * 1e-3
+    assert balance.brakes[-1] == pytest.approx(-lost, abs=more)
+    (taken,) = (e for e in run.events if e.kind is EventKind.JOINT_BRAKE)
+    assert taken.time == pytest.approx(0.3, abs=1e-9)
+    assert taken.impulse[0] == pytest.approx(-ABOUT_PIVOT * speed, rel=2e-2)
+    if isinstance(method, hs.EventDriven):
+        assert taken.impulse[0] == pytest.approx(-ABOUT_PIVOT * speed, rel=1e-9)
+        assert np.abs(balance.residual).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_brake_lets_go_on_command(method: Any) -> None:
+    """From rest where it was held, as a pendulum that begins there."""
+    simulation = swinging(method)
+    simulation.advance(0.3)
+    simulation.braked = ["swing"]
+    simulation.advance(0.5)
+    held = float(simulation.state.q[0])
+    simulation.braked = []
+    simulation.advance(0.7)
+    robot = pendulum()
+    alone = hs.simulate(robot, state=robot.state({"swing": held}), duration=0.2, method=method)
+    np.testing.assert_allclose(simulation.state.q, alone.final_state.q, rtol=0, atol=1e-8)
+    assert not np.any(simulation.record.brake_torque[-1])
+
+
+@pytest.mark.parametrize("method", [hs.TimeStepping(), hs.EventDriven(), hs.Compliant()])
+def test_a_braked_simulation_is_taken_up_again(method: Any, tmp_path: Path) -> None:
+    simulation = swinging(method)
+    simulation.advance(0.3)
+    simulation.braked = ["swing"]
+    put_on = simulation.snapshot().save(tmp_path / "put_on.npz")
+    simulation.advance(0.4)
+    holding = simulation.snapshot()
+    for snapshot in (hs.load_snapshot(put_on), holding):
+        other = swinging(method)
+        other.restore(snapshot)
+        assert other.braked == ("swing",)
+        other.advance(0.5)
+        simulation.restore(snapshot)
+        simulation.advance(0.5)
+        assert np.array_equal(other.state.q, simulation.state.q)
+        assert other.state.v[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_run_may_begin_with_a_brake_on(tmp_path: Path) -> None:
+    robot = pendulum()
+    run = hs.simulate(robot, state=robot.state({"swing": 0.4}), duration=0.01, braked=["swing"])
+    assert np.all(run.position == 0.4)
+    again = hs.load_run(run.save(tmp_path / "braked.nc"))
+    np.testing.assert_array_equal(again.brake_torque, run.brake_torque)
+    assert again.robot.brake_names == ("swing",)
+
+
+def standing_leg() -> Robot:
+    """A trunk on a leg with a knee, on a point foot that is held by friction."""
+    build = RobotBuilder("leg")
+    trunk = build.floating_base("trunk", (0.0, 1.0), mass=5.0, inertia=0.2)
+    thigh = build.hinge("hip", trunk, mass=1.0, inertia=0.02, center_of_mass=(0.0, -0.25))
+    shank = build.hinge("knee", thigh, at=(0.0, -0.5), mass=1.0, inertia=0.02)
+    build.contact(shank, (0.0, -0.5))
+    build.brake("knee")
+    build.brake("hip")
+    return build.build()
+
+
+def test_a_brake_takes_hold_with_the_ground_under_the_foot() -> None:
+    """One impact of brake and ground: the foot stays, and time stepping converges to it."""
+    robot = standing_leg()
+    state = robot.state({"knee": 0.6, "hip": -0.3}, {"knee": 3.0})
+    found = {}
+    for name, method in {
+        "event-driven": hs.EventDriven(rtol=1e-10, atol=1e-12),
+        "coarse": hs.TimeStepping(step=1e-3),
+        "fine": hs.TimeStepping(step=1e-5),
+    }.items():
+        ground = hs.Ground(friction=5.0)
+        start = robot.placed(state, ground)
+        jacobian = hs.contact_kinematics(robot, start.q, start.v, ground).jacobian[0]
+        at_rest = -np.linalg.solve(jacobian[:, :2], jacobian[:, 2:] @ start.v[2:])  # the foot
+        begin = hs.State(start.q, [*at_rest, *start.v[2:]])
+        simulation = hs.Simulation(robot, state=begin, method=method, ground=ground)
+        simulation.advance(0.02)
+        simulation.braked = ["knee", "hip"]
+        simulation.advance(0.04)
+        found[name] = simulation.state.v.copy()
+        assert np.abs(simulation.state.v[3:]).max() < 1e-10
+    away = {name: np.abs(found[name] - found["event-driven"]).max() for name in ("coarse", "fine")}
+    assert away["fine"] < 0.05 * away["coarse"] < 0.05
+
+
+def test_brakes_are_named_where_there_are_none(tmp_path: Path) -> None:
+    robot = standing_leg()
+    with pytest.raises(
+        SimulationError, match="'root_pitch' of robot 'leg' has no brake; knee, hip"
+    ):
+        hs.Simulation(robot, state=robot.reference_state(), braked=["root_pitch"])
+    build = RobotBuilder("one")
+    build.hinge("arm", None, mass=1.0, inertia=0.1)
+    build.brake("arm")
+    with pytest.raises(RobotError, match="joint 'arm' has a brake already"):
+        build.brake("arm")
+    with pytest.raises(RobotError, match="no joint 'leg' to brake"):
+        build.brake("leg")
+
+
+def test_a_brake_goes_through_files(tmp_path: Path) -> None:
+    robot = standing_leg()
+    back = hs.load_robot(robot.save(tmp_path / "leg.xml"))
+    assert back.brake_names == robot.brake_names == ("knee", "hip")
+    assert "brake: knee" in hs.inspect_robot(robot).text()
+    with pytest.warns(hs.RobotWarning, match="brakes of knee, hip"):
+        robot.save(tmp_path / "leg.urdf")
+    text = (tmp_path / "leg.xml").read_text().replace("brake:knee", "brake:neck")
+    (tmp_path / "leg.xml").write_text(text)
+    with pytest.raises(RobotError, match="brake 'neck' in <custom>"):
+        hs.load_robot(tmp_path / "leg.xml")
