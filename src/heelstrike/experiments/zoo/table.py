@@ -78,7 +78,7 @@ def on_terminal(results: Results) -> RenderableType:
             title=Text(_title(animal), "bold"), title_justify="left", title_style="",
             box=SIMPLE_HEAD, show_edge=False, padding=0,
         )  # fmt: skip
-        table.add_column("", no_wrap=True)
+        table.add_column("", overflow="fold")
         for each in shown_columns:
             name, _, sign = each.heading.partition(" ")
             table.add_column(f"{name}\n{sign}\n{each.unit}", justify="right", no_wrap=True)
