@@ -1,4 +1,4 @@
-"""Virtual constraints on point feet with footstep feedback: the gait is chosen anew all the time.
+"""Virtual constraints on point feet with footstep feedback: every step may be another one.
 
 What virtual constraints leave free has an energy σ²/2, σ the angular momentum about the stance
 foot. On the walk that repeats it is a function of the phase, and how far it is from there stays
@@ -418,7 +418,7 @@ class SteppingConstraints(Law):
         *,
         kp: ArrayLike = 400.0,
         kd: ArrayLike = 40.0,
-        response: float = 1.0,
+        response: float = 0.5,
         trust: float = 0.5,
         friction: float = 0.6,
     ) -> None:
