@@ -176,10 +176,28 @@ def leaves(
 
 
 @kernel
-def choose_sides(
-    model: Model, ground: GroundModel, contacts: Contacts, corners: Corners, bend: Floats
+def exchange_sides(
+    point: int, second: int, contacts: Contacts, corners: Corners, bend: Floats, forces: Floats
 ) -> None:
-    """Find which points enter and leave corners."""
+    """Let the first side of a point be its second, with its bristle and its force."""
+    seconds = corners.contacts
+    first, other = corners.first[point], corners.second[point]
+    corners.first[point], corners.second[point] = other, first
+    contacts.gap[point], seconds.gap[point] = seconds.gap[point], contacts.gap[point]
+    bend[point], bend[second] = bend[second], bend[point]
+    for i in range(2):
+        forces[point, i], forces[second, i] = forces[second, i], forces[point, i]
+
+
+@kernel
+def choose_sides(
+    model: Model, ground: GroundModel, contacts: Contacts, corners: Corners, bend: Floats,
+    forces: Floats,
+) -> None:  # fmt: skip
+    """Find which points enter and leave corners, and which of their faces is the nearer, the first.
+
+    The bends of the bristles are those now, the forces those at the beginning of the step.
+    """
     for second in range(model.nc, corners.sides):
         point = second - model.nc
         radius = model.contact_radius[point]
@@ -194,18 +212,16 @@ def choose_sides(
                 corners.first[point], corners.second[point] = face, other
                 bend[second] = 0.0
             continue
+        if corners.contacts.gap[point] < contacts.gap[point]:
+            exchange_sides(point, second, contacts, corners, bend, forces)
         gap, third = third_face(ground, point, x, z, radius, corners)
-        farther = max(contacts.gap[point], corners.contacts.gap[point])
+        farther = corners.contacts.gap[point]
         nearer = gap < farther + (AS_NEAR if farther >= 0.0 else 0.0)
         if nearer and room_to(ground, third, x, z, radius) < ENTERS:
-            if contacts.gap[point] == farther:
-                corners.first[point] = corners.second[point]
-                bend[point] = bend[second]
+            # Of three faces the nearer ones are felt.
             corners.second[point] = third
             bend[second] = 0.0
         elif leaves(ground, point, x, z, radius, contacts, corners):
-            if contacts.gap[point] > corners.contacts.gap[point]:
-                bend[point] = bend[second]
             bend[second] = 0.0
             corners.first[point], corners.second[point] = NO_FACE, NO_FACE
 

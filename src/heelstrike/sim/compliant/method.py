@@ -315,7 +315,8 @@ def sample(
         if met < 1.0 and not shortest:
             h = max(taken * met, SHORTEST)
             continue
-        choose_sides(model, ground, memory.contacts, corners, work.now.friction.bend)
+        bend, forces = work.now.friction.bend, work.base_force
+        choose_sides(model, ground, memory.contacts, corners, bend, forces)
         # At the sample itself the controller is called by the frame.
         how = TRIED if final else ACCEPTED
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
@@ -471,7 +472,10 @@ def prepare(
     corners = work.corners
     corners.sides = (1 + ground.concave) * model.nc
     observe_sides(model, ground, memory.q, memory.v, memory, corners)
-    choose_sides(model, ground, memory.contacts, corners, work.now.friction.bend)
+    if corners.sides > model.nc:
+        bend, forces = work.now.friction.bend, work.base_force
+        choose_sides(model, ground, memory.contacts, corners, bend, forces)
+        observe_sides(model, ground, memory.q, memory.v, memory, corners)
 
 
 @kernel
