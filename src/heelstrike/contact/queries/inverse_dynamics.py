@@ -17,6 +17,7 @@ from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import inverse_dynamics, loop_jacobian, passive_force
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError
+from heelstrike.robot.model import Integers
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.robot import Robot
 
@@ -135,24 +136,11 @@ def contact_inverse_dynamics(
     a = joint_vector(robot, "acceleration", acceleration)
     force = inverse_dynamics(robot, q, v, a) - passive_force(robot, q, v)
     driven = robot.model.actuator_joint
-    loops = loop_jacobian(robot, q)
     rows = kinematics.jacobian[carrying].reshape(2 * len(carrying), robot.nv)
-    friction = kinematics.friction[carrying]
-    if loops.size:
-        allowed = scipy.linalg.null_space(loops)
-        undriven = allowed @ scipy.linalg.null_space(allowed[driven])
-        forces, _ = distribute((rows @ undriven).T, undriven.T @ force, friction, choice)
-        rest = force - rows.T @ forces.ravel()
-        torque = np.linalg.lstsq(allowed[driven].T, allowed.T @ rest, rcond=None)[0]
-        rest[driven] -= torque
-        loop_force = np.linalg.lstsq(loops.T, rest, rcond=None)[0]
-        rest -= loops.T @ loop_force
-    else:
-        idle = np.setdiff1d(np.arange(robot.nv), driven)
-        forces, _ = distribute(rows[:, idle].T, force[idle], friction, choice)
-        rest = force - rows.T @ forces.ravel()
-        torque, loop_force = rest[driven], np.zeros(0)
-        rest[driven] = 0.0
+    split = _without_loops if not robot.model.loops + robot.model.couplings else _with_loops
+    forces, torque, loop_force, rest = split(
+        loop_jacobian(robot, q), driven, rows, kinematics.friction[carrying], choice, force
+    )
 
     contact_force = np.zeros((robot.nc, 2))
     contact_force[carrying] = forces
@@ -185,6 +173,34 @@ def contact_inverse_dynamics(
         feasible=not complaints,
         message="; ".join(complaints),
     )
+
+
+def _without_loops(
+    loops: Floats, driven: Integers, rows: Floats, friction: Floats, choice: ForceDistribution,
+    force: Floats,
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
+    """Forces of the ground, torques, none of loops, and what is missing of a generalised force."""
+    idle = np.setdiff1d(np.arange(force.size), driven)
+    forces, _ = distribute(rows[:, idle].T, force[idle], friction, choice)
+    rest = force - rows.T @ forces.ravel()
+    torque = rest[driven]
+    rest[driven] = 0.0
+    return forces, torque, np.zeros(len(loops)), rest
+
+
+def _with_loops(
+    loops: Floats, driven: Integers, rows: Floats, friction: Floats, choice: ForceDistribution,
+    force: Floats,
+) -> tuple[Floats, Floats, Floats, Floats]:  # fmt: skip
+    """Like :func:`_without_loops`, in the ways that the loops leave open."""
+    allowed = scipy.linalg.null_space(loops)
+    idle = allowed @ scipy.linalg.null_space(allowed[driven])
+    forces, _ = distribute((rows @ idle).T, idle.T @ force, friction, choice)
+    rest = force - rows.T @ forces.ravel()
+    torque = np.linalg.lstsq(allowed[driven].T, allowed.T @ rest, rcond=None)[0]
+    rest[driven] -= torque
+    loop_force: Floats = np.linalg.lstsq(loops.T, rest, rcond=None)[0].astype(np.float64)
+    return forces, torque, loop_force, rest - loops.T @ loop_force
 
 
 def _friction_use(force: Floats, friction: Floats, tiny: float) -> Floats:

@@ -270,13 +270,9 @@ def cone_residual(work: CompliantWorkspace) -> float:
 @kernel
 def sample(
     controller: Any, control: Control, model: Model, ground: GroundModel, start: float,
-    memory: Memory, work: CompliantWorkspace, record: Record,
+    memory: Memory, work: CompliantWorkspace,
 ) -> int:  # fmt: skip
     """Integrate from one sample to the next; return DONE or what was in the way."""
-    begin_sample(model, memory, work)
-    if take_hold(memory.loops):
-        brake(model, start, memory, work, record)
-        evaluate(controller, control, model, ground, HELD, start, memory, work)
     span, corners = work.step, work.corners
     elapsed = 0.0
     h = work.proposed
@@ -514,7 +510,11 @@ def move(
 ) -> int:  # fmt: skip
     """Move on to the next sample, and note what happened on the way."""
     model = scene.model
-    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work, record)
+    begin_sample(model, memory, work)
+    if take_hold(memory.loops):
+        brake(model, clock.time, memory, work, record)
+        evaluate(scene.controller, control, model, scene.ground, HELD, clock.time, memory, work)
+    code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
     if code != DONE:
         return code
     step = work.step
