@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import walking
 
 import heelstrike as hs
 from heelstrike import dynamics
@@ -142,3 +143,9 @@ def test_a_gait_that_does_not_repeat_is_refused() -> None:
     changed[3] += 0.01
     with pytest.raises(ControllerError, match=r"hs\.make_invariant"):
         hs.GaitLQR(replace(gait(), coefficients=changed))
+
+
+def test_a_gait_in_time_is_refused() -> None:
+    in_time: Any = walking.gait()
+    with pytest.raises(ControllerError, match=r"PhasedGait\.from_gait"):
+        hs.GaitLQR(in_time)

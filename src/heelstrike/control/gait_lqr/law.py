@@ -213,6 +213,11 @@ class GaitLQR(Law):
         velocity_weight: ArrayLike = 1e3,
         torque_weight: ArrayLike = 1.0,
     ) -> None:
+        if not isinstance(gait, PhasedGait):
+            raise ControllerError(
+                "a regulator about a walk needs a gait over a phase: "
+                "hs.PhasedGait.from_gait(robot, gait)"
+            )
         robot = gait.robot
         cost = np.concatenate(
             [

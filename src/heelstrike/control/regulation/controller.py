@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -67,6 +69,7 @@ class ZeroMomentPointRegulation(Law):
     (True, True)
     """
 
+    # More arguments than eight: what may be chosen of the law is a user's to say.
     def __init__(
         self,
         robot: Robot,
@@ -85,32 +88,9 @@ class ZeroMomentPointRegulation(Law):
         period: float = PERIOD,
     ) -> None:
         _check(robot, gait)
-        shortest = min(_length(robot, foot) for foot in robot.feet)
-        if not 0.0 <= margin < 0.5 * shortest:
-            raise ControllerError(
-                f"margin must be from 0 to less than half the sole of robot {robot.name!r}, "
-                f"{0.5 * shortest:.4g} m, got {margin!r}"
-            )
-        if not slowest <= 1.0 <= fastest:
-            raise ControllerError(
-                f"the clock's rate is 1 as it begins; slowest and fastest must lie about it, got "
-                f"{slowest!r} and {fastest!r}"
-            )
-        chosen = {
-            "friction": gait.friction if friction is None else friction,
-            "returning": returning,
-            "hurry": hurry,
-        }
-        for name, value in chosen.items():
-            if not 0.0 < value < np.inf:
-                raise ControllerError(f"{name} must be a positive number, got {value!r}")
-        if not 0.0 <= least_force < 1.0:
-            raise ControllerError(
-                f"least_force must be a part of the weight from 0 to less than 1, got "
-                f"{least_force!r}"
-            )
-        if bandwidth is not None and not bandwidth > 0.0:
-            raise ControllerError(f"bandwidth must be a positive frequency in Hz, got {bandwidth}")
+        friction = gait.friction if friction is None else friction
+        chosen = {"friction": friction, "returning": returning, "hurry": hurry}
+        _check_numbers(robot, margin, least_force, (slowest, fastest), chosen, bandwidth)
         sides = [gait.pieces, gait.mirrored_pieces()]
         if gait.stance_foot:
             sides.reverse()
@@ -158,6 +138,33 @@ def _check(robot: Robot, gait: Gait) -> None:
                 f"regulation of the zero moment point needs feet on ankles that turn; foot "
                 f"{foot.name!r} of robot {robot.name!r} has none"
             )
+
+
+def _check_numbers(
+    robot: Robot, margin: float, least_force: float, rates: tuple[float, float],
+    positive: Mapping[str, float], bandwidth: float | None,
+) -> None:  # fmt: skip
+    """Refuse numbers that make no law."""
+    half = 0.5 * min(_length(robot, foot) for foot in robot.feet)
+    if not 0.0 <= margin < half:
+        raise ControllerError(
+            f"margin must be from 0 to less than half the sole of robot {robot.name!r}, "
+            f"{half:.4g} m, got {margin!r}"
+        )
+    if not rates[0] <= 1.0 <= rates[1]:
+        raise ControllerError(
+            f"the clock's rate is 1 as it begins; slowest and fastest must lie about it, got "
+            f"{rates[0]!r} and {rates[1]!r}"
+        )
+    for name, value in positive.items():
+        if not 0.0 < value < np.inf:
+            raise ControllerError(f"{name} must be a positive number, got {value!r}")
+    if not 0.0 <= least_force < 1.0:
+        raise ControllerError(
+            f"least_force must be a part of the weight from 0 to less than 1, got {least_force!r}"
+        )
+    if bandwidth is not None and not bandwidth > 0.0:
+        raise ControllerError(f"bandwidth must be a positive frequency in Hz, got {bandwidth}")
 
 
 def _length(robot: Robot, foot: Foot) -> float:
