@@ -5,7 +5,7 @@ A controller is an :class:`Entry` of `CONTROLLERS`, a line; a disturbance one of
 """
 
 from heelstrike.experiments.zoo.campaign import Progress, zoo
-from heelstrike.experiments.zoo.controllers import CONTROLLERS, Entry, standing, walking
+from heelstrike.experiments.zoo.controllers import CONTROLLERS, Entry, on_points, standing, walking
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Disturbance, Effort
 from heelstrike.experiments.zoo.results import Animal, Cell, Results, Settings
 
@@ -21,6 +21,7 @@ __all__ = [
     "Progress",
     "Results",
     "Settings",
+    "on_points",
     "standing",
     "walking",
     "zoo",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,19 @@ from heelstrike.contact.ground import Ground
 from heelstrike.control import (
     ComputedTorque,
     FootstepFeedback,
+    GaitLQR,
     JointPD,
+    StandingLQR,
+    SteppingConstraints,
     VirtualConstraints,
     WholeBody,
+    ZeroMomentPointRegulation,
 )
 from heelstrike.control.joint_feedback import JointFeedback
-from heelstrike.dynamics import mass_matrix
-from heelstrike.errors import HeelstrikeError
+from heelstrike.dynamics import leg_joints, mass_matrix
+from heelstrike.errors import GaitError, HeelstrikeError
 from heelstrike.experiments.walk import StepSize, design, typical_step
-from heelstrike.gait import Gait, PhasedGait
+from heelstrike.gait import Gait, PhasedGait, StepFamily, optimize_gait
 from heelstrike.gait.sole import sole
 from heelstrike.robot import Robot
 from heelstrike.sim.controller.law import Law
@@ -39,8 +44,11 @@ SAMPLE = 1e-3
 BRAVO7_WEIGHT, BRAVO7_STEP = 75.0, 0.30
 """Mass (kg) and step length (m, which goes with the height) of the robot whose gains are scaled."""
 
-POINT_FEET_STEP = StepSize(2.8, 0.95, 1.4)
+POINT_FEET_STEP = StepSize(2.4, 0.86, 2.4)
 """Steps on point feet, in those that suit flat feet: a slow step lets the weight tip the robot."""
+
+BENT, OTHER_WAY = (0.2, 2.6), (-2.6, -0.2)
+"""Angles of knees on point feet, in rad: straight legs have nothing to give."""
 
 MOST_DAMPING = 0.5
 """Largest damping of a joint in parts of what it moves, over `SAMPLE`: more of it, held over a
@@ -118,6 +126,38 @@ def walking(
     return Entry(name, trial, needs)
 
 
+def on_points(
+    name: str, law: Callable[[PhasedGait], Law], needs: Callable[[Robot], str] = point_feet
+) -> Entry:
+    """Enter a controller that walks on points by the phase of a gait.
+
+    Parameters
+    ----------
+    name : str
+        What it is called.
+    law : callable
+        Takes the gait over its phase, which has its robot, and returns the controller.
+    needs : callable
+        Takes a robot, returns what it lacks, in a word; by default it must have two point feet.
+
+    Returns
+    -------
+    Entry
+        An entry of the zoo.
+    """
+
+    def trial(robot: Robot, gait: Gait | None) -> Trial:
+        assert gait is not None
+        phased = PhasedGait.from_gait(robot, gait)
+        zero = zero_dynamics(phased)
+        return Trial(
+            robot=robot, controller=law(phased), state=zero.initial_state,
+            step_length=zero.step_length, step_duration=zero.period,
+        )  # fmt: skip
+
+    return Entry(name, trial, needs)
+
+
 def standing(
     name: str,
     law: Callable[[Robot, NDArray[np.float64]], Law],
@@ -164,29 +204,23 @@ def _joint_springs(robot: Robot, q: NDArray[np.float64]) -> Law:
     )
 
 
-def _virtual_constraints(robot: Robot, gait: Gait | None) -> Trial:
-    assert gait is not None
-    phased = PhasedGait.from_gait(robot, gait)
-    zero = zero_dynamics(phased)
-    return Trial(
-        robot=robot, controller=VirtualConstraints(phased, kp=100.0, kd=40.0),
-        state=zero.initial_state, step_length=zero.step_length, step_duration=zero.period,
-    )  # fmt: skip
-
-
 CONTROLLERS: tuple[Entry, ...] = (
     walking("ComputedTorque", ComputedTorque, needs=two_feet),
     walking("JointPD", _joint_pd),
+    walking("ZeroMomentPointRegulation", ZeroMomentPointRegulation),
     walking("WholeBody", WholeBody),
     walking("FootstepFeedback", FootstepFeedback),
-    Entry("VirtualConstraints", _virtual_constraints, needs=point_feet),
+    on_points("VirtualConstraints", partial(VirtualConstraints, kp=100.0, kd=40.0)),
+    on_points("SteppingConstraints", lambda gait: SteppingConstraints(StepFamily.around(gait))),
+    on_points("GaitLQR", GaitLQR),
     standing("JointFeedback", _joint_springs),
+    standing("StandingLQR", StandingLQR),
 )
 """Controllers, in the order of the table; a new one is a line here."""
 
 
 def gait_for(robot: Robot) -> Gait:
-    """Design the gait that every controller of a robot follows.
+    """Design the gait that every controller of a robot follows; on point feet with bent knees.
 
     Raises
     ------
@@ -194,13 +228,33 @@ def gait_for(robot: Robot) -> Gait:
         If there is none.
     """
     size = typical_step(robot)
-    if point_feet(robot) == "":
-        size = StepSize(
-            length=round(POINT_FEET_STEP.length * size.length, 2),
-            duration=round(POINT_FEET_STEP.duration * size.duration, 2),
-            clearance=round(POINT_FEET_STEP.clearance * size.clearance, 3),
-        )
-    return design(robot, size)
+    if point_feet(robot):
+        return design(robot, size)
+    size = StepSize(
+        length=round(POINT_FEET_STEP.length * size.length, 2),
+        duration=round(POINT_FEET_STEP.duration * size.duration, 2),
+        clearance=round(POINT_FEET_STEP.clearance * size.clearance, 3),
+    )
+    gait = design(robot, size)
+    try:
+        return optimize_gait(
+            robot, step_length=size.length, step_duration=size.duration, clearance=size.clearance,
+            friction=gait.friction, joint_ranges=_bent_knees(robot, gait),
+        )  # fmt: skip
+    except GaitError:  # a zero of the knees that is not straight, say
+        return gait
+
+
+def _bent_knees(robot: Robot, gait: Gait) -> dict[str, tuple[float, float]]:
+    """Ranges in which the knees stay bent as they are in a gait, in rad; zero is straight."""
+    course = gait.in_step(np.linspace(0.0, gait.step_duration, 20))
+    either = 0.5 * (course + gait.mirrored(course)).mean(axis=0)
+    actuators = robot.model.actuator_joint.tolist()
+    knees = [leg[1] for leg in leg_joints(robot) if len(leg) > 1]
+    return {
+        robot.joint_names[knee]: BENT if either[actuators.index(knee)] > 0.0 else OTHER_WAY
+        for knee in knees
+    }
 
 
 def sampled(trial: Trial, method: Method) -> Trial:

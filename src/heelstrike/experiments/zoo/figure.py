@@ -16,7 +16,7 @@ from heelstrike.experiments.zoo.table import columns, empty
 from heelstrike.view.style import FOOT_COLORS, GREY, INK, PALE, new_figure, styled
 
 COLORS = (*FOOT_COLORS, INK)
-MARKERS = "os^DvPX*<>"
+MARKERS = "os^DvPh*<>"
 WIDTH, ROW, AROUND = 9.0, 0.11, 0.75
 """Inches: of the figure; of a row; round each panel."""
 

@@ -78,7 +78,7 @@ def on_terminal(results: Results) -> RenderableType:
             title=Text(_title(animal), "bold"), title_justify="left", title_style="",
             box=SIMPLE_HEAD, show_edge=False, padding=0,
         )  # fmt: skip
-        table.add_column("", no_wrap=True)
+        table.add_column("", overflow="fold")
         for each in shown_columns:
             name, _, sign = each.heading.partition(" ")
             table.add_column(f"{name}\n{sign}\n{each.unit}", justify="right", no_wrap=True)
@@ -139,7 +139,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "# Zoo of controllers",
         "",
         "How large a disturbance each controller withstands on each robot: one gait a robot, one "
-        "set of gains a controller, which go with weight and height and are tuned for no robot. "
+        "set of gains a controller, found on one robot; on others they go with weight and height. "
         "This page, its figure and its numbers are made by",
         "",
         "```sh",
@@ -156,7 +156,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         lines += [f"## {animal.robot}", "", _gait(animal), ""]
         filled = {controller: row for controller, row in rows.items() if not empty(row)}
         if filled:
-            heads = [f"{each.heading} {each.unit}".strip() for each in there]
+            heads = [f"{each.heading}<br>{each.unit}" for each in there]
             lines += [_line("controller", *heads), _line("---", *["--:"] * len(there))]
             for controller, row in filled.items():
                 lines.append(_line(controller, *(shown(row.get(d.name), d) for d in there)))
@@ -179,7 +179,7 @@ def _measure(results: Results, share: float) -> list[str]:
     settings = results.settings
     return [
         "A size counts if the walk recovers from it, strictly "
-        "([`recovery`](reference/analysis.md#heelstrike.analysis.recovery)), and from every "
+        "(`heelstrike.analysis.recovery`), and from every "
         f"smaller one tried: {settings.strides} strides upwards to the first failure, which is "
         f"halved {settings.halvings} times. ≥ says that nothing tried was too much, < that the "
         "smallest size tried was. Pushes begin at "
