@@ -297,7 +297,8 @@ def commands(walker: Walker, seeds: range) -> None:
             reached.append(speed / (share * usual))
         simulation.parameters.speed = 0.0
         if simulation.status == hs.RunStatus.COMPLETED:
-            simulation.advance(simulation.time + rng.uniform(6.0, 8.0))
+            # An alarm fades, and the body rises, in six seconds.
+            simulation.advance(simulation.time + rng.uniform(8.0, 10.0))
         state = simulation.state
         still = np.abs(state.v).max() < 0.05 and state.q[1] > 0.9 * height
         if simulation.status != hs.RunStatus.COMPLETED or not still:

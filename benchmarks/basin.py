@@ -1,7 +1,8 @@
 """What rabbit stands under virtual constraints: pushes by phase, slopes, steps, rough ground.
 
-A gait of 0.6 m at 1.1 m/s, gains 100/s² and 40/s for all of it, no feedback of where the feet land.
-``python benchmarks/basin.py`` prints the table of docs/virtual-constraints.md.
+A gait of 0.6 m at 1.1 m/s, gains 100/s² and 40/s for all of it, no feedback of where the feet land;
+or, with ``--footsteps``, 0.5 m at 1 m/s with bent knees, the defaults of ``SteppingConstraints``.
+``python benchmarks/basin.py`` prints the tables of docs/virtual-constraints.md.
 """
 
 from __future__ import annotations
@@ -15,7 +16,32 @@ import heelstrike as hs
 LENGTH, SPEED, CLEARANCE = 0.6, 1.1, 0.03
 KP, KD = 100.0, 40.0
 PHASES = 20
-SEEDS = range(10)
+SEEDS = range(1000, 1020)
+
+BENT_LENGTH, BENT_SPEED, BENT_CLEARANCE = 0.5, 1.0, 0.05
+"""Of the gait whose feet land elsewhere, m and m/s."""
+BENT = {"right_knee": (0.2, 2.6), "right_hip": (-0.8, 1.5)}
+"""Its ranges of the joints: knees that stay bent, a trunk that does not lean far (rad)."""
+
+
+def footstep_trial(robot: hs.Robot, method: hs.TimeStepping | hs.EventDriven) -> hs.Trial:
+    """Return the walk with footstep feedback."""
+    gait = hs.optimize_gait(
+        robot, step_length=BENT_LENGTH, step_duration=BENT_LENGTH / BENT_SPEED, friction=0.5,
+        clearance=BENT_CLEARANCE, joint_ranges=BENT,
+    )  # fmt: skip
+    family = hs.StepFamily.around(hs.PhasedGait.from_gait(robot, gait))
+    law, zero = hs.SteppingConstraints(family), hs.zero_dynamics(family.gait)
+    cycle = hs.find_limit_cycle(robot, zero.initial_state, law, memory=("slope",))
+    print(f"contraction {zero.contraction:.4f}; multipliers with feedback {cycle.multipliers[:4]}")
+    return hs.Trial(
+        robot=robot,
+        controller=law,
+        state=zero.initial_state,
+        step_length=zero.step_length,
+        step_duration=zero.period,
+        method=method,
+    )
 
 
 def trial(robot: hs.Robot, method: hs.TimeStepping | hs.EventDriven) -> hs.Trial:
@@ -41,9 +67,11 @@ def main() -> None:
     options.add_argument("--robot", default="rabbit")
     options.add_argument("--phases", type=int, default=PHASES)
     options.add_argument("--event-driven", action="store_true", help="else 1 ms of time stepping")
+    options.add_argument("--footsteps", action="store_true", help="with footstep feedback")
     given = options.parse_args()
     method = hs.EventDriven(output_period=0.01) if given.event_driven else hs.TimeStepping()
-    walk = trial(hs.load_robot(given.robot), method)
+    begin = footstep_trial if given.footsteps else trial
+    walk = begin(hs.load_robot(given.robot), method)
     print(f"{given.robot}, {type(method).__name__}")
     for name, direction in (("forwards", (1.0, 0.0)), ("backwards", (-1.0, 0.0))):
         found = [

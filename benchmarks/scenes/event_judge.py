@@ -119,6 +119,9 @@ class _Events:
         self.smooth = ~np.isin(np.arange(len(time)), self.last[list(self.bridges)])
         """Rows of smooth phases: those at the beginning of bridges have no contact forces."""
         self.settled &= self.smooth
+        ahead = np.append(np.diff(self.instant), 1.0)
+        self.ahead = np.repeat(ahead, self.last - self.first + 1)
+        """Time from a row to the next instant."""
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
@@ -181,7 +184,7 @@ class _Events:
         plain = ~rows.measured.at_corner & (rows.measured.tied.sum(axis=-1) == 1)
         plain = plain & ~rows.cornered
         on = (np.abs(rows.gap) < CLOSED) & still[..., 0] & plain & self.settled[:, None]
-        into = np.where(on, -rate[..., 0] / unit[..., 0], 0.0)
+        into = np.where(on & self.seen(-rate[..., 0]), -rate[..., 0] / unit[..., 0], 0.0)
         found.look("contact: acceleration into it", into, LAW, rows.time, rows.contacts)
         pressed = rows.force[..., 0] * weight[..., 0] / self.force_size[:, None]
         both = np.minimum(np.abs(rate[..., 0]) / unit[..., 0], pressed)
@@ -192,6 +195,14 @@ class _Events:
         loose = np.minimum(np.abs(rate[..., 1]) / unit[..., 1], slack)
         loose = np.where(on & still[..., 1] & (pressed > LAW), loose, 0.0)
         found.look("sticking point slides off", loose, LAW, rows.time, rows.contacts)
+
+    def seen(self, into: Array) -> Array:
+        """Whether an acceleration into a limit lasts long enough to lead anywhere.
+
+        At the height of a bounce too small to see, a point as near to the ground as if it were held
+        on it falls freely.
+        """
+        return 0.5 * into * self.ahead[:, None] ** 2 > CLOSED
 
     def joints(self, found: Findings) -> None:
         rows, model, run = self.rows, self.rows.model, self.rows.run
@@ -210,7 +221,7 @@ class _Events:
             found.look(f"{name} stop: force while it moves", moving, LAW, time, names)
             on = (np.abs(gap) < CLOSED) & (np.abs(rows.v) < RESTING) & self.settled[:, None]
             into = -side * self.acceleration / (weight * size)
-            into = np.where(on, into, 0.0)
+            into = np.where(on & self.seen(-side * self.acceleration), into, 0.0)
             found.look(f"{name} stop: acceleration into it", into, LAW, time, names)
         dry, most = run.friction_torque, model.dry_friction
         over = (np.abs(dry) - most) * weight / size

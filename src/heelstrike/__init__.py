@@ -33,6 +33,8 @@ if _plain_code.is_asked_for():  # before anything else is imported
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle as LimitCycle
     from heelstrike.analysis.limit_cycle import find_limit_cycle as find_limit_cycle
+    from heelstrike.analysis.stability.floquet import Floquet as Floquet
+    from heelstrike.analysis.stability.floquet import floquet_multipliers as floquet_multipliers
     from heelstrike.analysis.stability.largest import Largest as Largest
     from heelstrike.analysis.stability.largest import largest_ground_step as largest_ground_step
     from heelstrike.analysis.stability.largest import largest_push as largest_push
@@ -40,6 +42,9 @@ if TYPE_CHECKING:
     from heelstrike.analysis.stability.largest import largest_slope as largest_slope
     from heelstrike.analysis.stability.monodromy import Monodromy as Monodromy
     from heelstrike.analysis.stability.monodromy import monodromy as monodromy
+    from heelstrike.analysis.stability.sensitivity import (
+        gait_sensitivity_norm as gait_sensitivity_norm,
+    )
     from heelstrike.analysis.stability.trial import Trial as Trial
     from heelstrike.analysis.stability.zero_dynamics import ZeroDynamics as ZeroDynamics
     from heelstrike.analysis.stability.zero_dynamics import zero_dynamics as zero_dynamics
@@ -89,6 +94,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import ViewError as ViewError
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
+    from heelstrike.experiments.spring_mass import SpringMass as SpringMass
     from heelstrike.gait import Gait as Gait
     from heelstrike.gait import PhasedGait as PhasedGait
     from heelstrike.gait import StepFamily as StepFamily
@@ -140,6 +146,7 @@ _HOME = {
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
+    "Floquet": "heelstrike.analysis.stability.floquet",
     "FootSensors": "heelstrike.control",
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
@@ -171,6 +178,7 @@ _HOME = {
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
+    "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
     "State": "heelstrike.robot",
     "StepFamily": "heelstrike.gait",
@@ -192,6 +200,8 @@ _HOME = {
     "contact_kinematics": "heelstrike.contact",
     "controller": "heelstrike.control",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
+    "floquet_multipliers": "heelstrike.analysis.stability.floquet",
+    "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",
     "human": "heelstrike.robot.human",
     "inspect_robot": "heelstrike.robot",
     "largest_ground_step": "heelstrike.analysis.stability.largest",

@@ -47,3 +47,34 @@ def test_a_step_that_is_not_completed() -> None:
     run = SpringMass(stiffness=20_000.0, angle=np.deg2rad(68.0), energy=1784.8)
     with pytest.raises(hs.LimitCycleError, match="falls, or flies on"):
         run.running(0.5)
+
+
+def test_the_course_of_a_run() -> None:
+    """Three steps from apex to apex; energy is kept, and the mass is where steps take it."""
+    model = SpringMass(stiffness=20_000.0, angle=np.deg2rad(68.0), energy=1784.8)
+    cycle = model.running(0.94)
+    time, motion = model.course(cycle, steps=3)
+    assert len(time) == len(motion)
+    assert np.all(np.diff(time) > 0.0)
+    assert time[-1] == pytest.approx(3.0 * cycle.period, abs=1e-9)
+    np.testing.assert_allclose(motion[-1, :2], [3.0 * cycle.length, cycle.state[0]], atol=1e-8)
+    flies = motion[:, 1] > model.touchdown_height
+    energy = 0.5 * 80.0 * np.sum(motion[:, 2:] ** 2, axis=1) + 80.0 * 9.81 * motion[:, 1]
+    np.testing.assert_allclose(energy[flies], 1784.8, rtol=1e-10)
+
+
+def test_the_course_of_a_walk() -> None:
+    model = SpringMass(stiffness=14_000.0, angle=np.deg2rad(69.0), energy=816.0)
+    cycle = model.walking((0.9708, 0.0))
+    time, motion = model.course(cycle, steps=2)
+    assert time[-1] == pytest.approx(2.0 * cycle.period, abs=1e-9)
+    np.testing.assert_allclose(motion[-1, :2], [2.0 * cycle.length, cycle.state[0]], atol=1e-8)
+
+
+def test_numbers_that_make_no_model() -> None:
+    with pytest.raises(hs.SimulationError, match="stiffness of a spring-mass model"):
+        SpringMass(stiffness=-1.0, angle=1.2, energy=800.0)
+    with pytest.raises(hs.SimulationError, match="below π/2 rad, got 69"):
+        SpringMass(stiffness=14_000.0, angle=69.0, energy=816.0)
+    with pytest.raises(hs.LimitCycleError, match="816 J are not enough"):
+        SpringMass(stiffness=14_000.0, angle=1.2, energy=816.0).running(2.0)

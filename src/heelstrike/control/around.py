@@ -315,6 +315,8 @@ def {name}({", ".join(ARGUMENTS)}):
     place = getattr(python, "__code__", None)
     exec(compile(text, place.co_filename if place else __file__, "exec"), scope)
     made = scope[name]
+    if place is not None:  # Numba looks for source text there: it must be that of a function
+        made.__code__ = made.__code__.replace(co_firstlineno=place.co_firstlineno)
     made.__qualname__ = f"{shell.name}({python.__qualname__})"
     made.__annotations__ = {"parameters": parameters, "memory": memory, "log": log}
     return Composed(shell, function, made, {})

@@ -21,6 +21,7 @@ from scipy.signal import cont2discrete
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.contact import ContactInverseDynamics, contact_inverse_dynamics, contact_kinematics
+from heelstrike.control.weights import weights_of
 from heelstrike.dynamics import linearize
 from heelstrike.errors import ControllerError
 from heelstrike.robot.loops import refuse_loops
@@ -207,11 +208,9 @@ class StandingLQR(Law):
     ) -> None:
         q = robot.reference_state().q if posture is None else np.asarray(posture, np.float64)
         linear = linear_standing(robot, q)
-        by_position = _weights("position_weight", position_weight, robot.nv)
-        by_velocity = _weights("velocity_weight", velocity_weight, robot.nv)
-        by_torque = _weights("torque_weight", torque_weight, robot.nu)
-        if np.any(by_torque == 0.0):
-            raise ControllerError(f"torque_weight must be positive, got {torque_weight!r}")
+        by_position = weights_of("position_weight", position_weight, robot.nv)
+        by_velocity = weights_of("velocity_weight", velocity_weight, robot.nv)
+        by_torque = weights_of("torque_weight", torque_weight, robot.nu, positive=True)
         basis = linear.basis
         k = basis.shape[1]
         cost = np.zeros((2 * k, 2 * k))
@@ -257,13 +256,3 @@ def _regulator(
         ) from None
     order = np.argsort(poles.real)[::-1]
     return gain, poles[order].astype(complex)
-
-
-def _weights(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:
-    weights = np.asarray(value, dtype=np.float64)
-    fits = weights.ndim <= 1 and weights.size in (1, size)
-    if not fits or not np.all(np.isfinite(weights)) or np.any(weights < 0.0):
-        raise ControllerError(
-            f"{name} must be one number that is not negative, or {size} of them, got {value!r}"
-        )
-    return np.broadcast_to(weights, (size,)).copy()

@@ -1,4 +1,4 @@
-"""Virtual constraints on point feet with footstep feedback: the gait is chosen anew all the time.
+"""Virtual constraints on point feet with footstep feedback: every step may be another one.
 
 What virtual constraints leave free has an energy σ²/2, σ the angular momentum about the stance
 foot. On the walk that repeats it is a function of the phase, and how far it is from there stays
@@ -402,6 +402,9 @@ class SteppingConstraints(Law):
     trust : float
         Part of the difference between the slope of the last step and the one believed that is
         believed, from 0 to 1.
+    friction : float
+        Friction that the law counts on. Where the constraints ask for more of the stance foot, or
+        for less than a tenth of the weight, joints are accelerated by as much less.
 
     Raises
     ------
@@ -415,7 +418,7 @@ class SteppingConstraints(Law):
         *,
         kp: ArrayLike = 400.0,
         kd: ArrayLike = 40.0,
-        response: float = 1.0,
+        response: float = 0.5,
         trust: float = 0.5,
         friction: float = 0.6,
     ) -> None:
@@ -426,6 +429,8 @@ class SteppingConstraints(Law):
                 "response must not be negative and trust lies from 0 to 1; got "
                 f"response={response!r}, trust={trust!r}"
             )
+        if not 0.0 < friction < np.inf:
+            raise ControllerError(f"friction must be positive, got {friction!r}")
         phase, constant = gait.on_both_feet()
         middle = np.stack([family.middle, family.middle])
         middle[:, 0, 0] -= constant

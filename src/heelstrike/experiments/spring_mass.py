@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
-from heelstrike.errors import LimitCycleError
+from heelstrike.errors import LimitCycleError, SimulationError
 
 Floats = NDArray[np.float64]
+Phases = list[tuple[Floats, Floats]]
 
 RTOL, ATOL = 1e-13, 1e-14
 LONGEST = 3.0  # s; a phase that lasts longer leads to no step
@@ -64,6 +65,23 @@ class SpringMass:
         In J; nothing is lost.
     mass, leg, gravity : float
         In kg, m and m/s².
+
+    Raises
+    ------
+    SimulationError
+        If a number is not positive, or the angle not below 90°.
+
+    Notes
+    -----
+    A massless leg has no place among the links of a robot, whose dynamics need mass; it is a force
+    between the mass and its foothold, and this a model of its own.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> run = hs.SpringMass(stiffness=20_000.0, angle=1.1868, energy=1784.8).running(0.94)
+    >>> bool(abs(run.multipliers[0]) < 0.2)
+    True
     """
 
     stiffness: float
@@ -72,6 +90,18 @@ class SpringMass:
     mass: float = 80.0
     leg: float = 1.0
     gravity: float = 9.81
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            if not (np.isfinite(value) and value > 0.0):
+                raise SimulationError(
+                    f"{name} of a spring-mass model must be positive, got {value!r}"
+                )
+        if self.angle >= 0.5 * np.pi:
+            raise SimulationError(
+                f"the angle of attack must lie below π/2 rad, got {self.angle:.6g}: it is counted "
+                "from the ground, in rad"
+            )
 
     @property
     def touchdown_height(self) -> float:
@@ -116,6 +146,35 @@ class SpringMass:
         """
         return self._cycle(self._running_step, [guess])
 
+    def course(self, cycle: Cycle, *, steps: int = 1) -> tuple[Floats, Floats]:
+        """Go through steps of a gait that repeats.
+
+        Parameters
+        ----------
+        cycle : Cycle
+            What :meth:`walking` or :meth:`running` returned.
+        steps : int
+            How many steps.
+
+        Returns
+        -------
+        time : (n,) float
+            Instants as dense as the motion asks for, in s.
+        motion : (n, 4) float
+            Place x, z of the mass (m), from 0 on, and velocity (m/s).
+        """
+        step = self._walking_step if len(cycle.state) == 2 else self._running_step
+        times, way, state = [np.zeros(1)], 0.0, np.asarray(cycle.state)
+        motions: list[Floats] = []
+        for _ in range(steps):
+            phases: list[tuple[Floats, Floats]] = []
+            state, _, length, _ = step(state, phases)
+            for time, motion in phases:
+                times.append(times[-1][-1] + time[1:])
+                motions.append(motion[1 if motions else 0 :] + np.array([way, 0.0, 0.0, 0.0]))
+            way += length
+        return np.concatenate(times), np.concatenate(motions)
+
     def _cycle(
         self, step: Callable[[Floats], tuple[Floats, float, float, float]], guess: Sequence[float]
     ) -> Cycle:
@@ -138,32 +197,42 @@ class SpringMass:
             state=state, multipliers=multipliers, period=period, length=length, contact=contact
         )
 
-    def _walking_step(self, state: Floats) -> tuple[Floats, float, float, float]:
+    def _walking_step(
+        self, state: Floats, phases: Phases | None = None
+    ) -> tuple[Floats, float, float, float]:
         """From above one foot to above the next."""
         height, direction = state
         pressed = 0.5 * self.stiffness * (self.leg - height) ** 2
-        speed = np.sqrt(
-            2.0 * (self.energy - self.mass * self.gravity * height - pressed) / self.mass
-        )
+        speed = self._speed(self.energy - self.mass * self.gravity * height - pressed)
         start = np.array([0.0, height, speed * np.cos(direction), speed * np.sin(direction)])
         rear = 0.0
-        landing, first = self._until(start, (rear,), self._lands)
+        landing, first = self._until(start, (rear,), self._lands, phases)
         front = landing[0] + self.leg * np.cos(self.angle)
-        leaving, both = self._until(landing, (rear, front), self._leaves(rear))
-        end, last = self._until(leaving, (front,), self._above(front))
+        leaving, both = self._until(landing, (rear, front), self._leaves(rear), phases)
+        end, last = self._until(leaving, (front,), self._above(front), phases)
         image = np.array([end[1], np.arctan2(end[3], end[2])])
         return image, first + both + last, front, both
 
-    def _running_step(self, state: Floats) -> tuple[Floats, float, float, float]:
+    def _running_step(
+        self, state: Floats, phases: Phases | None = None
+    ) -> tuple[Floats, float, float, float]:
         """From apex to apex."""
         (height,) = state
         energy = self.energy - self.mass * self.gravity * height
-        start = np.array([0.0, height, np.sqrt(2.0 * energy / self.mass), 0.0])
-        landing, first = self._until(start, (), self._lands)
+        start = np.array([0.0, height, self._speed(energy), 0.0])
+        landing, first = self._until(start, (), self._lands, phases)
         foot = landing[0] + self.leg * np.cos(self.angle)
-        leaving, contact = self._until(landing, (foot,), self._leaves(foot))
-        end, last = self._until(leaving, (), self._apex)
+        leaving, contact = self._until(landing, (foot,), self._leaves(foot), phases)
+        end, last = self._until(leaving, (), self._apex, phases)
         return end[1:2], first + contact + last, float(end[0]), contact
+
+    def _speed(self, kinetic: float) -> float:
+        """Speed of the mass by its kinetic energy."""
+        if not kinetic > 0.0:
+            raise LimitCycleError(
+                f"{self.energy:.6g} J are not enough for this height: the mass would not move"
+            )
+        return float(np.sqrt(2.0 * kinetic / self.mass))
 
     def _rate(self, feet: Sequence[float]) -> Callable[[float, Floats], Floats]:
         def rate(_: float, x: Floats) -> Floats:
@@ -177,8 +246,9 @@ class SpringMass:
         return rate
 
     def _until(
-        self, start: Floats, feet: Sequence[float], event: Callable[[float, Floats], float]
-    ) -> tuple[Floats, float]:
+        self, start: Floats, feet: Sequence[float], event: Callable[[float, Floats], float],
+        phases: Phases | None = None,
+    ) -> tuple[Floats, float]:  # fmt: skip
         """State at an event, a value that falls through zero, and when it was."""
 
         def falling(t: float, x: Floats) -> float:
@@ -192,7 +262,11 @@ class SpringMass:
         if not len(run.t_events[0]):
             raise LimitCycleError("the spring-mass model falls, or flies on: no step is completed")
         # Newton's method on the length of the last phase: events of dense output are less exact.
-        return self._refined(start, feet, event, float(run.t_events[0][0]))
+        end, time = self._refined(start, feet, event, float(run.t_events[0][0]))
+        if phases is not None:
+            within = run.t < time
+            phases.append((np.append(run.t[within], time), np.vstack((run.y.T[within], end))))
+        return end, time
 
     def _refined(
         self, start: Floats, feet: Sequence[float], event: Callable[[float, Floats], float],

@@ -558,13 +558,16 @@ class Robot:
     def c_code(self, name: str | None = None) -> str:
         """Return its equations of motion as a page of C99, for other programs.
 
-        Four functions of plain arrays of doubles, without branches; the robot's numbers stand in
+        Functions of plain arrays of doubles, without branches; the robot's numbers stand in
         tables at the head. Nothing is included but ``math.h``.
 
         - ``NAME_kinematics(q, angle, origin)``: poses of the links, (nv,) and (nv, 2);
         - ``NAME_mass_matrix(q, matrix)``: the mass matrix A, (nv, nv);
         - ``NAME_bias_force(q, v, bias)``: centrifugal, Coriolis and gravitational forces H, (nv,);
-        - ``NAME_solve(q, v, force, acceleration)``: A⁻¹ (force − H), (nv,).
+        - ``NAME_solve(q, v, force, acceleration)``: A⁻¹ (force − H), (nv,);
+        - ``NAME_loops(q, v, open_by, jacobian, bias)``, of a robot with closed loops or coupled
+          joints: φ, J and J̇ v of their equations, (m,), (m, nv) and (m,). Their forces λ act as
+          Jᵀ λ, a part of `force`, and keep J a + J̇ v = 0.
 
         Parameters
         ----------
@@ -575,11 +578,6 @@ class Robot:
         -------
         str
             The page, to be written to a file.
-
-        Raises
-        ------
-        RobotError
-            If the robot has closed loops or coupled joints, of which the page would know nothing.
 
         Examples
         --------

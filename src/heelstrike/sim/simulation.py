@@ -305,6 +305,12 @@ class Simulation:
         self._control_with(controller)
 
     @property
+    def control_period(self) -> float:
+        """Seconds between two calls of the controller; zero of one that acts continuously."""
+        step, clock = self.method.step_length, self._clock
+        return clock.control_period if step is None else clock.control_every * step
+
+    @property
     def parameters(self) -> Bundle:
         """Numbers of a law; what is written into them, or all when others are set, acts at once."""
         return self._numbers.parameters
@@ -622,8 +628,7 @@ class Simulation:
             self._control.in_python = 1
             if setting.control_period is None and self.method.python_period is not None:
                 clock.control_period = self.method.python_period
-        step, every = self.method.step_length, clock.control_every
-        self._numbers.control.robot.period = clock.control_period if step is None else every * step
+        self._numbers.control.robot.period = self.control_period
         # It is due at once, and then at the whole periods, as if it had been called all the time.
         period = clock.control_period
         clock.calls = int(clock.time / period + 1e-9) if period > 0.0 else 0

@@ -57,6 +57,28 @@ class Snapshot:
         """
         return State(self.arrays["memory.q"], self.arrays["memory.v"])
 
+    def moved(self, state: State) -> Snapshot:
+        """Return the same instant with the robot in a slightly other state.
+
+        What the methods decided of the contacts stays as it is: points that stand must stand, where
+        they do, in the other state too.
+
+        Parameters
+        ----------
+        state : State
+            Position and velocity.
+
+        Returns
+        -------
+        Snapshot
+            A snapshot; this one stays what it is.
+        """
+        q, v = np.array(state.q, dtype=np.float64), np.array(state.v, dtype=np.float64)
+        arrays = self.arrays | {"memory.q": q, "memory.v": v}
+        if "work.begin" in arrays:  # where an event-driven step begins
+            arrays["work.begin"] = np.concatenate((q, v))
+        return Snapshot(arrays, self.identity)
+
     def part(self, name: str) -> dict[str, NDArray[Any]]:
         """Return the arrays whose names begin so, without that beginning.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mechanisms import parallel_ankles
 from robot_cases import NAMED, RobotCase
 from scipy.optimize import linprog, minimize
 
@@ -12,7 +13,7 @@ from heelstrike import dynamics
 from heelstrike.contact.queries.force_distribution import ForceDistribution, distribute
 from heelstrike.contact.queries.inverse_dynamics import _friction_use
 from heelstrike.errors import ContactProblemError, RobotError
-from heelstrike.robot import Robot
+from heelstrike.robot import Robot, RobotBuilder
 
 # Both sides solve linear systems of at most thirteen unknowns; accelerations are of order ten.
 TOLERANCE = 1e-10
@@ -318,3 +319,48 @@ def test_use_of_the_cone_by_hand() -> None:
     force = np.array([[10.0, 3.0], [0.0, 0.0], [1.0, 1e-13], [-2.0, 0.0], [0.0, 1.0], [10.0, -6.0]])
     use = _friction_use(force, np.full(6, 0.5), 1e-9)
     np.testing.assert_allclose(use, [0.6, 0.0, 0.0, np.inf, np.inf, 1.2])
+
+
+def on_parallel_ankles() -> tuple[Robot, hs.State]:
+    robot = parallel_ankles()
+    bent = {f"{side}_{joint}": x for side in ("right", "left") for joint, x in BENT.items()}
+    state = robot.closed(robot.state(bent), keep=[*robot.joint_names[:3], *bent])
+    state = robot.placed(state, hs.Ground())
+    return robot, state
+
+
+BENT = {"hip": -0.3, "knee": 0.6, "motor": -0.3}
+
+
+def test_through_loops_torques_and_forces_do_what_was_asked() -> None:
+    """Forward dynamics with these torques gives the acceleration, and the same forces of loops."""
+    robot, state = on_parallel_ankles()
+    still = np.zeros(robot.nv)
+    found = hs.contact_inverse_dynamics(robot, state.q, still, still, contacts=range(robot.nc))
+    assert found.feasible, found.message
+    assert found.contact_force[:, 0].sum() == pytest.approx(robot.weight, rel=1e-9)
+    back = hs.contact_forward_dynamics(robot, state.q, still, found.torque)
+    np.testing.assert_allclose(back.acceleration, 0.0, atol=1e-8)
+    np.testing.assert_allclose(found.loop_force, back.loop_force, rtol=1e-6, atol=1e-6)
+
+
+def test_through_loops_what_they_forbid_is_missing() -> None:
+    robot, state = on_parallel_ankles()
+    torn = np.zeros(robot.nv)
+    torn[robot.joint_index("right_rod")] = 5.0
+    still = np.zeros(robot.nv)
+    # A rod cannot accelerate alone, but a force that does it would be borne by the loop.
+    found = hs.contact_inverse_dynamics(robot, state.q, still, torn, contacts=range(robot.nc))
+    np.testing.assert_allclose(found.missing_force, 0.0, atol=1e-6)
+    assert np.abs(found.loop_force).max() > 0.0
+
+
+def test_two_motors_on_one_shaft_share_its_torque() -> None:
+    build = RobotBuilder("pair")
+    build.hinge("front", None, mass=1.0, inertia=0.1, center_of_mass=(0, -0.5), torque=9)
+    build.hinge("rear", None, at=(1, 0), mass=1.0, inertia=0.1, torque=9)
+    build.couple("rear", "front")
+    pair = build.build()
+    q = np.array([0.4, 0.4])
+    found = hs.contact_inverse_dynamics(pair, q, np.zeros(2), np.zeros(2))
+    np.testing.assert_allclose(found.torque, 0.25 * 9.81 * np.sin(0.4) * np.ones(2), rtol=1e-9)

@@ -12,12 +12,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mechanisms import geared, parallel_ankles
 from robot_cases import NAMED, RobotCase
 
 from heelstrike import load_robot
 from heelstrike.compiler.recordings.c_text import c_text
 from heelstrike.compiler.recordings.recording import Program, Recording
-from heelstrike.dynamics import kernels
+from heelstrike.dynamics import (
+    kernels,
+    loop_bias_acceleration,
+    loop_displacement,
+    loop_jacobian,
+)
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot import Robot
 
@@ -112,6 +118,25 @@ def test_names_cannot_break_the_page(tmp_path: Path) -> None:
     library = compiled(page, tmp_path)
     assert not hasattr(library, "main")
     assert page.count("void _1") == 4
+
+
+@needs_compiler
+@pytest.mark.parametrize("make", [parallel_ankles, geared])
+def test_equations_of_loops_are_a_function(make: Callable[[], Robot], tmp_path: Path) -> None:
+    robot = make()
+    library = compiled(robot.c_code("robot"), tmp_path)
+    rng = np.random.default_rng(4)
+    q, v = rng.uniform(-1.0, 1.0, robot.nv), rng.uniform(-3.0, 3.0, robot.nv)
+    expected = [loop_displacement(robot, q), loop_jacobian(robot, q)]
+    expected.append(loop_bias_acceleration(robot, q, v))
+    found = [np.full(each.shape, np.nan) for each in expected]
+    called(library.robot_loops, q, v, *found)
+    for mine, its in zip(found, expected, strict=True):
+        np.testing.assert_allclose(mine, its, rtol=0, atol=1e-13 * max(1.0, np.abs(its).max()))
+    force = rng.uniform(-5.0, 5.0, robot.nv)
+    for name, value in by_kernels(robot, q, v, force).items():
+        its = by_c(robot, library, q, v, force)[name]
+        np.testing.assert_allclose(its, value, rtol=1e-9, atol=1e-9 * np.abs(value).max())
 
 
 def test_a_kernel_that_reads_what_nobody_wrote_is_refused() -> None:

@@ -12,6 +12,7 @@ import pytest
 import heelstrike as hs
 from heelstrike.analysis import energy_balance, friction_use
 from heelstrike.errors import RobotError
+from heelstrike.gait.request import Request
 from heelstrike.robot import Robot, RobotBuilder, RobotWarning
 from heelstrike.robot.model import SCALES
 
@@ -164,3 +165,30 @@ def test_left_and_right_are_compared_by_them() -> None:
         build.contact(leg, (0.0, -0.9), friction_scale=scale)
     with pytest.warns(RobotWarning, match="friction scale of right_hip and left_hip"):
         assert build.build().mirror is None
+
+
+def test_linearised_contact_and_gaits_know_the_scale() -> None:
+    """Half of a rough ground is a ground half as rough."""
+    half, whole = sledge(rear=0.5, front=0.5), sledge()
+    sliding = hs.ActiveContacts(sliding=((0, 1), (1, 1)))
+    state = whole.state({}, {"root_x": 1.0})
+    none = np.zeros(0)
+    found = hs.linearize_contact(
+        half, state.q, state.v, none, sliding, ground=hs.Ground(friction=0.8)
+    )
+    expected = hs.linearize_contact(
+        whole, state.q, state.v, none, sliding, ground=hs.Ground(friction=0.4)
+    )
+    np.testing.assert_allclose(found.rate, expected.rate, rtol=1e-12)
+    assert found.rate[3] == pytest.approx(-0.4 * 9.81, rel=1e-9)
+    robot = hs.load_robot("bravo7")
+    scale = np.where(np.arange(robot.nc) % 2 == 0, 0.5, 0.8)
+    worn = replace(robot, model=robot.model.replaced(friction_scale=scale))
+    asked = {
+        "step_length": 0.3, "step_duration": 0.7, "speed": None, "clearance": 0.03,
+        "clearance_profile": None, "zmp_margin": None, "force_margin": None,
+        "joint_speed_limit": np.inf, "joint_ranges": None, "impact": True, "intervals": None,
+        "starts": 1,
+    }  # fmt: skip
+    assert Request(robot=worn, friction=0.6, **asked).cone == 0.3
+    assert Request(robot=robot, friction=0.6, **asked).cone == 0.6

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import SAME_INSTANT, Chart, PoincareMap, Section
+from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
 from heelstrike.analysis.stability.variation import Variation
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
@@ -90,6 +91,26 @@ class Saltation:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
+class StepHeight:
+    """What the height of the next foothold does to a step.
+
+    Attributes
+    ----------
+    state : (nq + nv,) float
+        Errors (δq, δv) at the next touchdown for a metre of height, seen from the new foothold. The
+        foot behind is not level with it then: they are none of those that `tangent` spans.
+    duration_state : (nq + nv,) float
+        Change of the step's duration by errors at its beginning (s/m, s/rad, s²/m, s²/rad).
+    duration : float
+        Change of its duration by the height (s/m).
+    """
+
+    state: Floats
+    duration_state: Floats
+    duration: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Monodromy:
     """The linearisation of a step that repeats.
 
@@ -105,6 +126,9 @@ class Monodromy:
         Exchange of the legs and the way back along the ground.
     tangent : (nq + nv, m) float
         Orthonormal basis of the errors that the feet on the ground allow.
+    arrival : tuple of (nq + nv,) float or None
+        Of the touchdown that ends the step: derivative of the gap, rate of the state before, its
+        image under the impact, and the ground's normal; None if several points come down at once.
     """
 
     period: float
@@ -112,6 +136,7 @@ class Monodromy:
     saltations: tuple[Saltation, ...]
     relabelling: Floats
     tangent: Floats
+    arrival: tuple[Floats, Floats, Floats, Floats] | None = None
 
     @cached_property
     def matrix(self) -> Floats:
@@ -131,6 +156,45 @@ class Monodromy:
         """Floquet multipliers of a step, (m,), largest first."""
         found = np.linalg.eigvals(self.reduced).astype(np.complex128)
         return found[np.argsort(-np.abs(found), kind="stable")]
+
+    @property
+    def step_height(self) -> StepHeight:
+        """What the height of the next foothold does, on which the walk then goes on.
+
+        Raises
+        ------
+        SimulationError
+            If several contact points end the step at once.
+        """
+        if self.arrival is None:
+            raise SimulationError(
+                "several contact points come down at once at the end of this step: what a higher "
+                "foothold does to it has no derivative"
+            )
+        gradient, rate, struck, normal = self.arrival
+        until = self.flows[-1]
+        for flow, event in zip(self.flows[-2::-1], self.saltations[-2::-1], strict=True):
+            until = until @ event.matrix @ flow
+        crossing = float(gradient @ rate)
+        return StepHeight(
+            state=self.relabelling @ (struck / crossing - normal),
+            duration_state=-(gradient @ until) / crossing,
+            duration=1.0 / crossing,
+        )
+
+    @property
+    def gait_sensitivity_norm(self) -> float:
+        """Of the step's duration to heights of footholds, in s/m (Hobbelen and Wisse 2007).
+
+        Raises
+        ------
+        SimulationError
+            If several contact points end the step at once.
+        """
+        height = self.step_height
+        return gait_sensitivity_norm(
+            self.matrix, height.state, height.duration_state, height.duration
+        )
 
     def __repr__(self) -> str:
         largest = np.abs(self.multipliers).max(initial=0.0)
@@ -221,12 +285,16 @@ def monodromy(
         after = phases[place + 1] if place + 1 < len(phases) else None
         instant = _Instant(run, tuple(instants[place]), phases[place], after)
         saltations.append(instant.saltation())
+    normal = np.zeros(robot.nq + robot.nv)
+    normal[:2] = ground.model().normal[0]
+    arrival = instant.arrival()
     return Monodromy(
         period=period,
         flows=tuple(flows),
         saltations=tuple(saltations),
         relabelling=_relabelling(section, step, run, period, landed.contact),
         tangent=Chart(section, begin).tangent,
+        arrival=None if arrival is None else (*arrival, normal),
     )
 
 
@@ -235,6 +303,11 @@ def _refuse(robot: Robot, run: Run, period: float) -> None:
     if np.any(robot.model.dry_friction > 0.0):
         raise SimulationError(
             f"dry friction in the joints of {robot.name!r} cannot be linearised here; "
+            "hs.find_limit_cycle takes differences instead"
+        )
+    if np.any(run.brake_torque):
+        raise SimulationError(
+            f"brakes of {robot.name!r} are on, which is not linearised here; "
             "hs.find_limit_cycle takes differences instead"
         )
     if run.saturations:
@@ -314,6 +387,26 @@ class _Instant:
             matrix = np.eye(self.run.robot.nq + self.run.robot.nv)
         return Saltation(time=self.time, kinds=kinds, matrix=matrix, spread=spread)
 
+    def arrival(self) -> tuple[Floats, Floats, Floats] | None:
+        """Derivative of the gap of the one point that comes down, rate before, its image after."""
+        struck = [event for event in self.events if event.impulse[0] != 0.0]
+        q, v = self._state(self.rows[0])
+        rate = self._rate(self.rows[0], v, self.before)
+        fresh = [event for event in struck if self._gap_gradient(event, q) @ rate < -APPROACHES]
+        if len(fresh) != 1 or fresh[0].kind.of_joint:
+            return None
+        ground = self.run.ground
+        active = _struck(struck, self._friction())
+        impact = linearize_impact(self.run.robot, q, v, active, ground=ground)
+        return self._gap_gradient(fresh[0], q), rate, impact.reset @ rate
+
+    def _friction(self) -> Floats:
+        """Friction coefficients of the contact points on ground that is the same everywhere."""
+        friction: Floats = (
+            float(self.run.ground.model().friction[0]) * self.run.robot.model.friction_scale
+        )
+        return friction
+
     def _state(self, row: int) -> tuple[Floats, Floats]:
         return self.run.position[row], self.run.velocity[row]
 
@@ -370,7 +463,7 @@ class _Instant:
             gradient = self._gap_gradient(event, q)
             if count > 1 and gradient @ rate >= 0.0:
                 return None
-            active = _struck([*order[:count], *others], float(ground.model().friction[0]))
+            active = _struck([*order[:count], *others], self._friction())
             impact = linearize_impact(robot, q, v, active, ground=ground)
             v = impact.velocity
             if count < len(order):
@@ -405,11 +498,12 @@ class _Instant:
         return np.concatenate((at.jacobian[event.contact, 0], np.zeros(robot.nv)))
 
 
-def _struck(events: Sequence[Event], friction: float) -> ActiveContacts:
-    """What receives impulses in an impact, as its events tell."""
+def _struck(events: Sequence[Event], friction: Floats) -> ActiveContacts:
+    """What receives impulses in an impact, as its events tell; `friction` is that of all points."""
     points = [event for event in events if not event.kind.of_joint]
     on_the_cone = [
-        abs(event.impulse[1]) >= friction * event.impulse[0] * (1.0 - 1e-9) for event in points
+        abs(event.impulse[1]) >= friction[event.contact] * event.impulse[0] * (1.0 - 1e-9)
+        for event in points
     ]
     return ActiveContacts(
         resting=tuple(

@@ -105,6 +105,10 @@ class _Function:
         ]
         lines = [f"void {self.prefix}_{self.recording.program.name}(\n    "]
         lines[0] += ",\n    ".join(parameters) + ")\n{"
+        used = changed | {entry.array for entry in self._entries()}
+        for name in self.recording.arrays:
+            if name not in used and not self._is_hidden(name):
+                lines.append(f"    (void){name.replace('.', '_')};")  # of an argument that is idle
         # All is read before anything is written: parameters may be the same array.
         for value, name in self.names.items():
             lines.append(f"    const double {name} = {self._expression(value)};")

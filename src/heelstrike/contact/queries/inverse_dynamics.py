@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import ArrayLike
 
 from heelstrike.contact.ground import Ground
@@ -13,10 +14,9 @@ from heelstrike.contact.queries.force_distribution import ForceDistribution, dis
 from heelstrike.contact.queries.forward_dynamics import TOUCHING
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
-from heelstrike.dynamics import inverse_dynamics, passive_force
+from heelstrike.dynamics import inverse_dynamics, loop_jacobian, passive_force
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
 from heelstrike.errors import ContactProblemError
-from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.robot import Robot
 
@@ -35,9 +35,11 @@ class ContactInverseDynamics:
     contact_force : (nc, 2) float
         Force (normal, tangent) of the ground on the robot at each contact point, in N; zero at
         points that do not carry.
+    loop_force : (2 loops + couplings,) float
+        Forces of closed loops (x, z, in N) and couplings (N m, N for a slide) along their rows.
     missing_force : (nv,) float
-        Generalised force that neither motors nor ground can supply, in N and N m: zero if the
-        acceleration is possible.
+        Generalised force that neither motors, ground nor loops can supply, in N and N m: zero if
+        the acceleration is possible.
     friction_use : (nc,) float
         |tangential| / (μ · normal) of every point: above 1 it would slip, infinite where it pulls
         or has a tangential force alone; 0 at points without force.
@@ -57,6 +59,7 @@ class ContactInverseDynamics:
 
     torque: Floats
     contact_force: Floats
+    loop_force: Floats
     missing_force: Floats
     friction_use: Floats
     pulling: np.ndarray[tuple[int], np.dtype[np.bool_]]
@@ -83,6 +86,10 @@ def contact_inverse_dynamics(
     feet or along a flat sole, `distribution` says which to take; the torques follow. Dampers and
     springs are the passive forces; joint stops and dry friction do not act.
 
+    Closed loops and couplings bear what they must: their forces are eliminated, being at right
+    angles to all that they let happen. Where motors share a torque through them, or loops a force,
+    theirs are those of least norm. That the acceleration keeps them is the caller's affair, too.
+
     Parameters
     ----------
     robot : Robot
@@ -106,8 +113,7 @@ def contact_inverse_dynamics(
     Raises
     ------
     RobotError
-        If a vector has the wrong length, there is no such contact point, or the robot has closed
-        loops, whose forces share with the motors in a way that this does not decide.
+        If a vector has the wrong length, or there is no such contact point.
     ContactProblemError
         If the distribution is not known.
 
@@ -123,20 +129,30 @@ def contact_inverse_dynamics(
     (True, True)
     """
     choice = _choice(distribution)
-    refuse_loops(robot, "contact_inverse_dynamics", latches=False)
     kinematics = contact_kinematics(robot, q, v, ground)
     touching = np.flatnonzero(kinematics.gap < TOUCHING)
     carrying = list(contact_indices(robot, touching if contacts is None else contacts))
     a = joint_vector(robot, "acceleration", acceleration)
     force = inverse_dynamics(robot, q, v, a) - passive_force(robot, q, v)
     driven = robot.model.actuator_joint
-    undriven = np.setdiff1d(np.arange(robot.nv), driven)
+    loops = loop_jacobian(robot, q)
     rows = kinematics.jacobian[carrying].reshape(2 * len(carrying), robot.nv)
     friction = kinematics.friction[carrying]
-    forces, _ = distribute(rows[:, undriven].T, force[undriven], friction, choice)
-    rest = force - rows.T @ forces.ravel()
-    torque = rest[driven]
-    rest[driven] = 0.0
+    if loops.size:
+        allowed = scipy.linalg.null_space(loops)
+        undriven = allowed @ scipy.linalg.null_space(allowed[driven])
+        forces, _ = distribute((rows @ undriven).T, undriven.T @ force, friction, choice)
+        rest = force - rows.T @ forces.ravel()
+        torque = np.linalg.lstsq(allowed[driven].T, allowed.T @ rest, rcond=None)[0]
+        rest[driven] -= torque
+        loop_force = np.linalg.lstsq(loops.T, rest, rcond=None)[0]
+        rest -= loops.T @ loop_force
+    else:
+        idle = np.setdiff1d(np.arange(robot.nv), driven)
+        forces, _ = distribute(rows[:, idle].T, force[idle], friction, choice)
+        rest = force - rows.T @ forces.ravel()
+        torque, loop_force = rest[driven], np.zeros(0)
+        rest[driven] = 0.0
 
     contact_force = np.zeros((robot.nc, 2))
     contact_force[carrying] = forces
@@ -160,6 +176,7 @@ def contact_inverse_dynamics(
     return ContactInverseDynamics(
         torque=torque,
         contact_force=contact_force,
+        loop_force=loop_force,
         missing_force=rest,
         friction_use=use,
         pulling=pulling,

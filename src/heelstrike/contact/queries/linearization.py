@@ -368,9 +368,10 @@ def _rows(
         at.run(write_point_rows, model, at.work, link, center - radius * up, up, 0, two)
         rows.append(two[0])
         bias.append(up[0] * x + up[1] * z)
-        bounces.append(restitution)
+        bounces.append(restitution * float(model.restitution_scale[i]))
         if i in directions:
-            pushes.append(two[0] - directions[i] * friction * two[1])
+            rubbing = friction * float(model.friction_scale[i])
+            pushes.append(two[0] - directions[i] * rubbing * two[1])
         else:
             rows.append(two[1])
             bias.append(up[1] * x - up[0] * z - radius * turn)

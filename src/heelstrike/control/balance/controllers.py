@@ -22,6 +22,17 @@ from heelstrike.sim.controller.law import Law
 HEIGHT = 0.9538
 """Standing height of bravo7 (m), with which the numbers below were found."""
 
+WEIGHTS = {
+    "pressure": 1e6,
+    "height": 1.0,
+    "swing": 1.0,
+    "pitch": 0.15,
+    "angle": 0.05,
+    "posture": 1e-3,
+    "torque": 1e-7,
+}
+"""How much the tasks count, of every robot."""
+
 LINKS = 3
 """Links of a leg: thigh, shank and foot."""
 
@@ -50,15 +61,6 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "foothold_weight": 1.0,
         "time_weight": 0.3 * size,
         "capture_weight": 30.0,
-    }
-    weights = {
-        "pressure": 1e6,
-        "height": 1.0,
-        "swing": 1.0,
-        "pitch": 0.15,
-        "angle": 0.05,
-        "posture": 1e-3,
-        "torque": 1e-7,
     }
     rest = {
         "speed": gait.step_length / duration,
@@ -92,7 +94,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "smoothing": 0.01 * pace,
         "hold": 0.75 * half,
     }
-    return planning, weights, rest
+    return planning, dict(WEIGHTS), rest
 
 
 class WholeBody(Law):

@@ -9,12 +9,13 @@ mirror, and its torques are.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.gait_lqr.orbit import NODES, Course, nodes, orbit_of
-from heelstrike.control.gait_lqr.transverse import Transverse, sorted_by_size
+from heelstrike.control.gait_lqr.transverse import FINE, Transverse, multipliers_of
+from heelstrike.control.weights import weights_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats, Integers
@@ -215,21 +216,20 @@ class GaitLQR(Law):
         robot = gait.robot
         cost = np.concatenate(
             [
-                _weights("position_weight", position_weight, robot.nv)[2:],
-                _weights("velocity_weight", velocity_weight, robot.nv)[2:],
+                weights_of("position_weight", position_weight, robot.nv)[2:],
+                weights_of("velocity_weight", velocity_weight, robot.nv)[2:],
             ]
         )
-        effort = _weights("torque_weight", torque_weight, robot.nu)
-        if np.any(effort == 0.0):
-            raise ControllerError(f"torque_weight must be positive, got {torque_weight!r}")
+        effort = weights_of("torque_weight", torque_weight, robot.nu, positive=True)
         orbit = orbit_of(gait)
         transverse = Transverse.of(orbit)
         found = transverse.regulator(np.diag(cost), np.diag(effort))
         first, last = orbit.q.first, orbit.q.last
         gains = Course.through(first, last, found(nodes(first, last)))
         # What the series make of the gains is what is predicted.
-        step = transverse.over_a_step(gains(transverse.theta) @ transverse.basis)
-        self.multipliers = sorted_by_size(np.linalg.eigvals(step))
+        fine = Transverse.of(orbit, FINE)
+        step = fine.over_a_step(gains(fine.theta) @ fine.basis)
+        self.multipliers = multipliers_of(step)
         if not np.all(np.abs(self.multipliers) < 1.0):
             raise ControllerError("no regulator makes this walk repeat; try other weights")
         self.gait = gait
@@ -261,13 +261,3 @@ class GaitLQR(Law):
 
 def _terms_last(coefficients: Floats) -> Floats:
     return np.ascontiguousarray(np.moveaxis(coefficients, 0, -1))
-
-
-def _weights(name: str, value: ArrayLike, size: int) -> NDArray[np.float64]:
-    weights = np.asarray(value, dtype=np.float64)
-    fits = weights.ndim <= 1 and weights.size in (1, size)
-    if not fits or not np.all(np.isfinite(weights)) or np.any(weights < 0.0):
-        raise ControllerError(
-            f"{name} must be one number that is not negative, or {size} of them, got {value!r}"
-        )
-    return np.broadcast_to(weights, (size,)).copy()

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Chebyshev
-from numpy.polynomial.chebyshev import chebder, chebpts1, chebval, chebvander
+from numpy.polynomial.chebyshev import chebder, chebpts1, chebvander
 from numpy.typing import ArrayLike
 
 from heelstrike import dynamics
@@ -27,7 +27,7 @@ INVARIANT = 1e-6
 """Impacts may lead this far from the beginning of the gait (rad, and in slopes)."""
 
 SMALL = 1e-6
-"""Disturbance (rad, rad/s) of central differences: their errors are its square, and 1e-16 over it."""
+"""Disturbance (rad, rad/s) of central differences, which cost its square and 1e-16 over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +49,21 @@ class Course:
     def through(cls, first: float, last: float, values: Floats) -> Course:
         """Interpolate values at the nodes."""
         flat = values.reshape(NODES, -1)
-        matrix = np.linalg.solve(chebvander(chebpts1(NODES), NODES - 1), flat)
-        return cls(first, last, matrix.reshape(values.shape))
+        terms = chebvander(chebpts1(NODES), NODES - 1)
+        series = np.asarray(np.linalg.solve(terms, flat), dtype=np.float64)
+        return cls(first, last, series.reshape(values.shape))
 
     def __call__(self, theta: ArrayLike) -> Floats:
         """Values at phases, (..., entries)."""
         x = (2.0 * np.asarray(theta) - self.first - self.last) / (self.last - self.first)
-        values = chebval(x, self.coefficients)
-        moved: Floats = np.moveaxis(
-            values, range(self.coefficients.ndim - 1), range(x.ndim, values.ndim)
-        )
+        terms = chebvander(x, NODES - 1).reshape(*x.shape, NODES)
+        moved: Floats = np.tensordot(terms, self.coefficients, axes=1)
         return moved
 
     def slope(self) -> Course:
         """Its derivative by θ."""
-        derivative = chebder(self.coefficients, axis=0) * 2.0 / (self.last - self.first)
+        derivative = np.zeros_like(self.coefficients)
+        derivative[:-1] = chebder(self.coefficients, axis=0) * 2.0 / (self.last - self.first)
         return Course(self.first, self.last, derivative)
 
 

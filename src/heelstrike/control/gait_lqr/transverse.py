@@ -31,8 +31,8 @@ from heelstrike.control.gait_lqr.orbit import SMALL, Orbit
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 
-STEPS = 256
-"""Steps of the classical Runge-Kutta method a period."""
+STEPS, FINE = 256, 2048
+"""Steps of the classical Runge-Kutta method a period: for gains, and for what comes of them."""
 
 PERIODS = 400
 SETTLED = 1e-10
@@ -41,17 +41,17 @@ SETTLED = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Transverse:
-    """The linear equations across a walk, at twice as many phases as there are steps, and one more.
+    """The linear equations across a walk, at the ends and the middles of even steps.
 
     Attributes
     ----------
-    theta : (2 STEPS + 1,) float
+    theta : (2 steps + 1,) float
         Phases, evenly spaced (rad).
     basis : (2 p, 2 p - 1) float
         E.
-    A, B : (2 STEPS + 1, ...) float
+    A, B : (2 steps + 1, ...) float
         dw/dθ = A w + B δτ.
-    pace : (2 STEPS + 1,) float
+    pace : (2 steps + 1,) float
         dt/dθ.
     jump : (2 p - 1, 2 p - 1) float
         w⁺ = jump w⁻.
@@ -65,10 +65,10 @@ class Transverse:
     jump: Floats
 
     @classmethod
-    def of(cls, orbit: Orbit) -> Transverse:
-        """Find them."""
+    def of(cls, orbit: Orbit, steps: int = STEPS) -> Transverse:
+        """Find them at so many steps."""
         first, last = orbit.q.first, orbit.q.last
-        theta = np.linspace(first, last, 2 * STEPS + 1)
+        theta = np.linspace(first, last, 2 * steps + 1)
         size = orbit.gait.robot.nv - 2
         phase = np.concatenate([orbit.gait.phase[2:], np.zeros(size)])
         basis = null_space(phase[None, :])
@@ -91,11 +91,12 @@ class Transverse:
             drift = self.A[k].T @ value
             return drift + drift.T - value @ pushes[k] @ value + costs[k]
 
-        values = np.zeros((STEPS + 1, *self.jump.shape))
+        steps = len(self.theta) // 2
+        values = np.zeros((steps + 1, *self.jump.shape))
         before = np.inf
         for _ in range(PERIODS):
-            values[STEPS] = self.jump.T @ values[0] @ self.jump
-            for step in range(STEPS - 1, -1, -1):
+            values[steps] = self.jump.T @ values[0] @ self.jump
+            for step in range(steps - 1, -1, -1):
                 k, end = 2 * step, values[step + 1]
                 one = slope(k + 2, end)
                 two = slope(k + 1, end + 0.5 * width * one)
@@ -113,11 +114,11 @@ class Transverse:
         raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
 
     def over_a_step(self, gains: Floats) -> Floats:
-        """What a step makes of w with gains (2 STEPS + 1, nu, 2 p − 1), impact included."""
+        """What a step makes of w with gains (…, nu, 2 p − 1), impact included."""
         closed = self.A - self.B @ gains
         width = 2.0 * (self.theta[1] - self.theta[0])
         moved = np.eye(len(self.jump))
-        for step in range(STEPS):
+        for step in range(len(self.theta) // 2):
             k = 2 * step
             one = closed[k] @ moved
             two = closed[k + 1] @ (moved + 0.5 * width * one)
@@ -127,9 +128,10 @@ class Transverse:
         return np.asarray(self.jump @ moved)
 
 
-def sorted_by_size(multipliers: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Multipliers, the largest first."""
-    return multipliers[np.argsort(-np.abs(multipliers))].astype(complex)
+def multipliers_of(step: Floats) -> NDArray[np.complex128]:
+    """Eigenvalues of what a step makes of disturbances, the largest first."""
+    found = np.linalg.eigvals(step).astype(np.complex128)
+    return found[np.argsort(-np.abs(found))]
 
 
 def _to_the_ground(orbit: Orbit) -> Floats:

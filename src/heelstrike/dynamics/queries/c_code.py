@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import textwrap
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,8 +19,8 @@ from heelstrike.dynamics.kernels import (
     link_velocities,
     mass_matrix,
 )
+from heelstrike.dynamics.loops import LoopRows, count_rows, find_rows
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import RobotError
 from heelstrike.robot.model import Floats, Model
 
 _HEAD = """Equations of motion of {name}, A(q) a + H(q, v) = force, written by heelstrike.
@@ -64,25 +65,43 @@ def _solve(
     forward_dynamics(model, force, tree, square, factor, acceleration)
 
 
+def _loops(
+    model: Model, q: Floats, v: Floats, tree: Workspace, rows: LoopRows, open_by: Floats,
+    jacobian: Floats, bias: Floats,
+) -> None:  # fmt: skip
+    """Closed loops and coupled joints: by how much they are open, J, and b of J a + b = 0."""
+    forward_kinematics(model, q, tree)
+    link_velocities(model, v, tree)
+    find_rows(model, q, v, tree, rows)
+    for row in range(rows.bias.shape[0]):
+        open_by[row] = rows.displacement[row]
+        bias[row] = rows.bias[row]
+        for j in range(model.nv):
+            jacobian[row, j] = rows.jacobian[row, j]
+
+
 def c_code(model: Model, name: str, joints: tuple[str, ...]) -> str:
     """Return a page of C; see :meth:`heelstrike.Robot.c_code`."""
-    if model.loops + model.couplings > 0:
-        raise RobotError(
-            f"the equations of motion as C know robots whose joints move by themselves only, and "
-            f"robot {name!r} has closed loops or coupled joints"
-        )
+    count = count_rows(model)
     tree = Workspace.allocate(model.extents)
     square, vector = np.zeros((model.nv, model.nv)), np.zeros(model.nv)
     arrays: dict[str, Any] = {
-        "model": model, "tree": tree,
+        "model": model, "tree": tree, "rows": LoopRows.allocate(loop_rows=count, nv=model.nv),
+        "open_by": np.zeros(count), "jacobian": np.zeros((count, model.nv)),
         "angle": np.zeros(model.nl), "origin": np.zeros((model.nl, model.axes)),
         **dict.fromkeys(("q", "v", "force", "bias", "acceleration"), vector),
         **dict.fromkeys(("matrix", "square", "factor"), square),
     }  # fmt: skip
-    scratch = (*(f"tree.{member}" for member in tree.members()), "square", "factor")
+    parts = {"tree": tree, "rows": arrays["rows"]}
+    members = (f"{part}.{member}" for part in parts for member in parts[part].members())
+    scratch = (*members, "square", "factor")
+    kernels: list[Callable[..., None]] = [_kinematics, _mass_matrix, _bias_force, _solve]
+    kernels += [_loops] if count else []
     recordings = []
-    for kernel in (_kinematics, _mass_matrix, _bias_force, _solve):
+    for kernel in kernels:
         given = {name: arrays[name] for name in inspect.signature(kernel).parameters}
+        if kernel is _loops:
+            given["bias"] = np.zeros(count)
         program = Program(kernel, given, scratch, kernel.__name__[1:])
         recordings.append(Recording(program, {"tree.zero": vector}))
     return c_text(

@@ -73,7 +73,9 @@ class Postures:
         hips[..., 0] -= shift
         hips[..., 1] += raised[:, None]
         ahead, above = np.moveaxis(hips - feet, -1, 0)
-        sunk = max(0.0, float(np.max(above - np.sqrt(self._length**2 - ahead**2))))
+        # Beyond their length no height helps; inverse kinematics says what is missing.
+        reach = np.sqrt(np.maximum(self._length**2 - ahead**2, 0.0))
+        sunk = max(0.0, float(np.max(above - reach)))
         q = self._q.copy()
         q[:, 0] -= shift
         q[:, 1] += raised - sunk

@@ -26,6 +26,7 @@ from heelstrike.sim.contacts.faces import (
     center_of,
     locate_on_face,
     nearest_face,
+    room_to,
     second_face,
     take_surface,
 )
@@ -36,6 +37,8 @@ from heelstrike.sim.memory import Memory
 # A point is in a corner when it is nearer to both faces than this (m), and no more when it is
 # further than that from either.
 ENTERS, LEAVES = 1e-3, 2e-3
+# A third face takes the place of one that does not push and is hardly nearer than this (m).
+AS_NEAR = 1e-6
 
 
 class Corners(Bundle):
@@ -107,9 +110,27 @@ def observe_sides(
 
 
 @kernel
-def is_near(point: int, reach: float, contacts: Contacts, corners: Corners) -> bool:
-    """Whether a point is nearer than this to both of its faces."""
-    return bool(max(contacts.gap[point], corners.contacts.gap[point]) < reach)
+def third_face(
+    ground: GroundModel, point: int, x: float, z: float, radius: float, corners: Corners
+) -> tuple[float, int]:
+    """Gap between a disc in a corner and a third face, and which it is."""
+    first, second = corners.first[point], corners.second[point]
+    gap, face = second_face(ground, first, second, x, z, radius)
+    other_gap, other = second_face(ground, second, first, x, z, radius)
+    if other_gap < gap:
+        return other_gap, other
+    return gap, face
+
+
+@kernel
+def is_beyond(
+    ground: GroundModel, face: int, gap: float, x: float, z: float, radius: float
+) -> bool:
+    """Whether a point is beyond the ends of a face, the gap to whose line is given.
+
+    One that has sunk into the bottom of a corner is beyond both.
+    """
+    return room_to(ground, face, x, z, radius) > abs(gap) + AS_NEAR
 
 
 @kernel
@@ -122,14 +143,36 @@ def misses_corner(
     """
     for second in range(model.nc, corners.sides):
         point = second - model.nc
-        if corners.second[point] == NO_FACE and contacts.gap[point] < ENTERS:
-            x, z = center_of(model, contacts, point)
-            radius = model.contact_radius[point]
+        if contacts.gap[point] >= ENTERS:
+            continue
+        x, z = center_of(model, contacts, point)
+        radius = model.contact_radius[point]
+        sunk = False
+        if corners.second[point] == NO_FACE:
             face = nearest_face(ground, x, z, radius)
-            gap, _ = second_face(ground, face, NO_FACE, x, z, radius)
-            if gap < -depth:
-                return True
+            gap, other = second_face(ground, face, NO_FACE, x, z, radius)
+            sunk = is_beyond(ground, face, contacts.gap[point], x, z, radius)
+        elif max(contacts.gap[point], corners.contacts.gap[point]) >= 0.0:
+            gap, other = third_face(ground, point, x, z, radius, corners)
+        else:
+            continue
+        if gap < -depth and (sunk or room_to(ground, other, x, z, radius) < ENTERS):
+            return True
     return False
+
+
+@kernel
+def leaves(
+    ground: GroundModel, point: int, x: float, z: float, radius: float, contacts: Contacts,
+    corners: Corners,
+) -> bool:  # fmt: skip
+    """Whether a point is well away from one of its faces, and over the other."""
+    first, second = corners.first[point], corners.second[point]
+    far = room_to(ground, first, x, z, radius) >= LEAVES
+    if far and not is_beyond(ground, second, corners.contacts.gap[point], x, z, radius):
+        return True
+    far = room_to(ground, second, x, z, radius) >= LEAVES
+    return far and not is_beyond(ground, first, contacts.gap[point], x, z, radius)
 
 
 @kernel
@@ -146,10 +189,21 @@ def choose_sides(
                 continue
             face = nearest_face(ground, x, z, radius)
             gap, other = second_face(ground, face, NO_FACE, x, z, radius)
-            if gap < ENTERS:
+            sunk = is_beyond(ground, face, contacts.gap[point], x, z, radius)
+            if gap < ENTERS and (sunk or room_to(ground, other, x, z, radius) < ENTERS):
                 corners.first[point], corners.second[point] = face, other
                 bend[second] = 0.0
-        elif not is_near(point, LEAVES, contacts, corners):
+            continue
+        gap, third = third_face(ground, point, x, z, radius, corners)
+        farther = max(contacts.gap[point], corners.contacts.gap[point])
+        nearer = gap < farther + (AS_NEAR if farther >= 0.0 else 0.0)
+        if nearer and room_to(ground, third, x, z, radius) < ENTERS:
+            if contacts.gap[point] == farther:
+                corners.first[point] = corners.second[point]
+                bend[point] = bend[second]
+            corners.second[point] = third
+            bend[second] = 0.0
+        elif leaves(ground, point, x, z, radius, contacts, corners):
             if contacts.gap[point] > corners.contacts.gap[point]:
                 bend[point] = bend[second]
             bend[second] = 0.0

@@ -53,6 +53,15 @@ def distance_to(ground: GroundModel, segment: int, x: float, z: float) -> float:
 
 
 @kernel
+def room_to(ground: GroundModel, face: int, x: float, z: float, radius: float) -> float:
+    """Distance between a disc and a face itself, not the line of it."""
+    if face % 2 == 0:
+        return distance_to(ground, face // 2, x, z) - radius
+    corner = ground.vertices[face // 2]
+    return math.sqrt((x - corner[0]) ** 2 + (z - corner[1]) ** 2) - radius
+
+
+@kernel
 def nearest_face(ground: GroundModel, x: float, z: float, radius: float) -> int:
     """Face of the ground that a disc at a place is nearest to."""
     segments = ground.friction.shape[0]

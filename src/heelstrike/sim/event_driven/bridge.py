@@ -32,9 +32,9 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
 from heelstrike.sim.event_driven.corners import is_cornered, is_struck, joined
-from heelstrike.sim.event_driven.dynamics import evaluate, free_acceleration
+from heelstrike.sim.event_driven.dynamics import evaluate
 from heelstrike.sim.event_driven.faces import locate, stand_on_face
 from heelstrike.sim.event_driven.gaps import (
     free_gap_acceleration,

@@ -1,29 +1,63 @@
-"""The contact problem of an instant: which contacts take part, and what is asked of them."""
+"""The contact problem of an instant: the motion without contact, and what is asked of contacts."""
 
 from __future__ import annotations
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, INTERVAL
-from heelstrike.robot.model import Floats, Integers
+from heelstrike.dynamics.kernels import passive_force
+from heelstrike.robot.model import Floats, Integers, Model
+from heelstrike.sim.contacts.dry_friction import dry_force
+from heelstrike.sim.contacts.geometry import solve_mass_matrix
 from heelstrike.sim.contacts.latches import hold
 from heelstrike.sim.contacts.loops import rows_of
 from heelstrike.sim.event_driven.phase import Phase
-from heelstrike.sim.memory import Assembly, Loops
+from heelstrike.sim.memory import Assembly, Equations, Loops
+from heelstrike.sim.push import Pushes, add_pushes
+
+
+@dissolved_kernel
+def known_force(
+    model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
+) -> None:
+    """Generalised force without contact, B Γ + passive + pushes − H, into ``equations.rate``.
+
+    The equations of the state have been evaluated. Dry friction of the joints that move is one of
+    the passive forces.
+    """
+    force, rate = equations.force, equations.rate
+    passive_force(model, state[: model.nq], state[model.nq :], force)
+    add_pushes(model, equations.tree, pushes, force)
+    for i in range(model.nu):
+        force[model.actuator_joint[i]] += torque[i]
+    dry_force(phase.dry_joint, phase.slide[phase.first_dry :], model.dry_friction, force)
+    for i in range(model.nv):
+        rate[i] = force[i] - equations.bias[i]
+
+
+@dissolved_kernel
+def free_acceleration(
+    model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
+) -> None:
+    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``equations.rate``.
+
+    The equations of the state have been evaluated.
+    """
+    known_force(model, state, torque, phase, pushes, equations)
+    solve_mass_matrix(model, equations, equations.rate)
 
 
 @kernel
-def solve_candidates(
+def pose_problem(
     count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
     assembly: Assembly,
-) -> int:  # fmt: skip
-    """Solve the contact problem of the candidates at the level of accelerations or velocities.
+) -> None:  # fmt: skip
+    """Pose the contact problem of the candidates at the level of accelerations or velocities.
 
     These are `count` contacts and, after them, the rows of the loops, whose sets are there. Matrix
     and free term are there, too. Of accelerations, points that slide are prescribed to go on
-    doing so: their friction is known. Forces or impulses and modes go to ``assembly.answer``.
-    Returns the solver's status.
+    doing so: their friction is known. Sets, friction and modes to begin with are written.
     """
     problem, mode = assembly.problem, assembly.answer.mode
     for place in range(count):
@@ -43,7 +77,20 @@ def solve_candidates(
     problem.count = count + rows_of(loops)
     for place in range(count, problem.count):
         mode[place] = STICK
-    return int(solve_contact_kernel(phase.order, problem, assembly.solver, assembly.answer))
+
+
+@kernel
+def solve_candidates(
+    count: int, loops: Loops, accelerations: bool, friction: Floats, guess: Integers, phase: Phase,
+    assembly: Assembly,
+) -> int:  # fmt: skip
+    """Pose the contact problem of the candidates and solve it; return the solver's status.
+
+    Forces or impulses and modes go to ``assembly.answer``.
+    """
+    pose_problem(count, loops, accelerations, friction, guess, phase, assembly)
+    problem, work = assembly.problem, assembly.solver
+    return int(solve_contact_kernel(phase.order, problem, work, assembly.answer))
 
 
 @kernel

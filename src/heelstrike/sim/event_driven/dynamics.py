@@ -12,17 +12,15 @@ import math
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.dense import solve_to_rank
-from heelstrike.dynamics.kernels import forward_kinematics, link_velocities, passive_force
+from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
-from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
     assemble_delassus,
     contact_velocity,
     evaluate_equations,
     row_product,
-    solve_mass_matrix,
     weigh,
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, rows_of
@@ -30,13 +28,18 @@ from heelstrike.sim.controller.asking import consult
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.motors import try_torque
-from heelstrike.sim.event_driven.candidates import share_redundant
+from heelstrike.sim.event_driven.candidates import free_acceleration, share_redundant
 from heelstrike.sim.event_driven.faces import has_corners, locate, watch_corners
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_now, gap_rows
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.saddle_point import (
+    is_delicate,
+    solve_saddle_point,
+    state_accelerations,
+    write_equations,
+)
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
-from heelstrike.sim.push import Pushes, add_pushes
 
 # How far a projection may move a state, as a multiple of the error that a step may make: the end of
 # a step, beyond which the motion has not kept its constraints, and a place on its dense output.
@@ -232,26 +235,6 @@ def trust_latches(held: Integers, phase: Phase) -> None:
             phase.value[2 * stop] = 1.0
 
 
-@dissolved_kernel
-def free_acceleration(
-    model: Model, state: Floats, torque: Floats, phase: Phase, pushes: Pushes, equations: Equations
-) -> None:
-    """Acceleration without contact, A⁻¹ (B Γ + passive + pushes − H), into ``equations.rate``.
-
-    The equations of the state have been evaluated. Dry friction of the joints that move is one of
-    the passive forces.
-    """
-    force, rate = equations.force, equations.rate
-    passive_force(model, state[: model.nq], state[model.nq :], force)
-    add_pushes(model, equations.tree, pushes, force)
-    for i in range(model.nu):
-        force[model.actuator_joint[i]] += torque[i]
-    dry_force(phase.dry_joint, phase.slide[phase.first_dry :], model.dry_friction, force)
-    for i in range(model.nv):
-        rate[i] = force[i] - equations.bias[i]
-    solve_mass_matrix(model, equations, rate)
-
-
 @kernel
 def gather_closed(
     model: Model, contacts: Contacts, phase: Phase, loops: Loops, equations: Equations,
@@ -275,8 +258,51 @@ def gather_closed(
     return count
 
 
+@kernel
+def hold_by_saddle_point(
+    size: int, count: int, model: Model, state: Floats, memory: Memory, phase: Phase
+) -> None:
+    """Contact forces that keep the modes, and the acceleration, from the full equations.
+
+    What is no unknown has been written to the forces. Accelerations of the candidates' rows go to
+    ``answer.velocity``.
+    """
+    nv, saddle, assembly, equations = model.nv, phase.saddle, memory.assembly, memory.equations
+    impulse, velocity, rate = assembly.answer.impulse, assembly.answer.velocity, equations.rate
+    state_accelerations(count, model, state, memory, phase)
+    write_equations(size, model, assembly, equations, phase)
+    for i in range(nv):
+        saddle.system[i, nv + size] = saddle.force[i]
+    for k in range(size):
+        saddle.system[nv + k, nv + size] = -saddle.bias[phase.row[k]]
+    rank = solve_saddle_point(nv + size, saddle)
+    phase.deficient = 1 if rank < nv + size else 0
+    saddle.needed = 1
+    for i in range(nv):
+        rate[i] = saddle.unknown[i]
+    for k in range(size):
+        row, force = phase.row[k], saddle.unknown[nv + k]
+        impulse[row] += force
+        if phase.lean[k] != 0.0:
+            impulse[row + 1] += phase.lean[k] * force
+    for row in range(2 * (count + rows_of(memory.loops))):
+        velocity[row] = saddle.bias[row] + row_product(assembly.jacobian, row, rate)
+
+
+@kernel
+def watch_slips(count: int, assembly: Assembly, phase: Phase) -> None:
+    """Rates of the sliding speeds, after :func:`hold_by_saddle_point`."""
+    for place in range(count):
+        contact = assembly.candidate[place]
+        if phase.slide[contact] != 0 and phase.group[contact] == contact:
+            acceleration = assembly.answer.velocity[2 * place + 1]
+            phase.rate[2 * contact + 1] = phase.slide[contact] * acceleration
+
+
 @dissolved_kernel
-def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory: Memory) -> None:
+def hold_closed(
+    model: Model, count: int, state: Floats, friction: Floats, phase: Phase, memory: Memory
+) -> None:
     """Contact forces that keep the modes of the candidates, and the acceleration under them."""
     assembly, impulse = memory.assembly, memory.assembly.answer.impulse
     for place in range(count):
@@ -298,6 +324,9 @@ def hold_closed(model: Model, count: int, friction: Floats, phase: Phase, memory
     for i in range(size):
         phase.system[i, size] = -assembly.problem.free[phase.row[i]]
     rank = solve_constraints(size, 1.0, assembly.problem.delassus, phase)
+    if is_delicate(size, rank, phase.system):
+        hold_by_saddle_point(size, count, model, state, memory, phase)
+        return
     phase.deficient = 1 if rank < size else 0
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
@@ -349,10 +378,13 @@ def evaluate(
     find_loops(model, q, v, equations.tree, memory.loops)
     count = gather_closed(model, memory.contacts, phase, memory.loops, equations, assembly)
     phase.closed_count = count
+    phase.saddle.needed = 0
     if count + loops > 0:
-        hold_closed(model, count, friction, phase, memory)
+        hold_closed(model, count, state, friction, phase, memory)
     share_forces(count, assembly, friction, phase)
     watch_forces(count, loops, assembly, friction, phase)
+    if phase.saddle.needed == 1:
+        watch_slips(count, assembly, phase)
     trust_latches(memory.loops.held, phase)
     if count > 0 and phase.deficient == 1:
         share_redundant(count, memory.loops, friction, memory.reaction.mode, phase, assembly)
@@ -380,6 +412,27 @@ def displacement(
     if phase.stuck[contact] == 1:
         return -phase.anchor[contact] + tangential_place(model, tree, contacts, contact, phase)
     return 0.0
+
+
+@kernel
+def move_by_saddle_point(
+    size: int, model: Model, memory: Memory, phase: Phase, along: Floats
+) -> None:
+    """Change positions, or velocities, by as little as the masses allow for the rows to come right.
+
+    What each row is wrong by is in ``saddle.bias``.
+    """
+    saddle = phase.saddle
+    for k in range(size):
+        phase.lean[k] = 0.0
+    write_equations(size, model, memory.assembly, memory.equations, phase)
+    for i in range(model.nv):
+        saddle.system[i, model.nv + size] = 0.0
+    for k in range(size):
+        saddle.system[model.nv + k, model.nv + size] = -saddle.bias[k]
+    solve_saddle_point(model.nv + size, saddle)
+    for i in range(model.nv):
+        along[i] += saddle.unknown[i]
 
 
 @kernel
@@ -413,12 +466,17 @@ def project(
         if not positions:
             for i in range(size):
                 system[i, size] = -row_product(assembly.jacobian, row[i], v)
-        solve_constraints(size, 0.0, assembly.problem.delassus, phase)
-        for i in range(2 * total):
-            assembly.answer.impulse[i] = 0.0
         for i in range(size):
-            assembly.answer.impulse[row[i]] = phase.unknown[i]
-        add_impulse(model, assembly, total, equations, q if positions else v)
+            phase.saddle.bias[i] = -system[i, size]
+        rank = solve_constraints(size, 0.0, assembly.problem.delassus, phase)
+        if is_delicate(size, rank, system):
+            move_by_saddle_point(size, model, memory, phase, q if positions else v)
+        else:
+            for i in range(2 * total):
+                assembly.answer.impulse[i] = 0.0
+            for i in range(size):
+                assembly.answer.impulse[row[i]] = phase.unknown[i]
+            add_impulse(model, assembly, total, equations, q if positions else v)
         if not positions:
             return worst
     return math.inf

@@ -22,11 +22,11 @@ from heelstrike.sim.contacts.faces import (
     NO_FACE,
     along_segment,
     center_of,
-    distance_to,
     is_beside,
     is_concave,
     locate_on_face,
     nearest_face,
+    room_to,
     second_face,
     take_surface,
 )
@@ -270,8 +270,7 @@ def is_at_second(
     """Whether a point is within reach of its second face itself, and not only of the line of it."""
     face = phase.face[phase.first_second + point]
     x, z = center_of(model, contacts, point)
-    far = distance_to(ground, face // 2, x, z) - model.contact_radius[point] > reach
-    return face % 2 == 1 or not far
+    return room_to(ground, face, x, z, model.contact_radius[point]) <= reach
 
 
 @kernel

@@ -17,12 +17,17 @@ from heelstrike.sim.contacts.geometry import (
 )
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.event_driven.candidates import solve_candidates
+from heelstrike.sim.event_driven.candidates import free_acceleration
 from heelstrike.sim.event_driven.corners import impulse_of, is_cornered, is_struck, joined
-from heelstrike.sim.event_driven.dynamics import free_acceleration, gather_closed
+from heelstrike.sim.event_driven.dynamics import gather_closed
 from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.saddle_point import (
+    add_impulses,
+    solve_accelerations,
+    solve_velocities,
+)
 from heelstrike.sim.memory import Memory, Reported
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import JOINT_STOP, TOUCHDOWN, log_event, note_residual
@@ -91,8 +96,7 @@ def collide(
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
     assemble_delassus(model, total, equations, assembly)
-    friction, guess = memory.surface.friction, memory.reaction.mode
-    status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
+    status = solve_velocities(count, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
@@ -101,7 +105,7 @@ def collide(
         made += work
         through += abs(work)
     note_loops(model, total, impulse, memory.loops)
-    add_impulse(model, assembly, total, equations, v)
+    add_impulses(model, assembly, phase, equations, v)
     for place in range(count):
         contact = assembly.candidate[place]
         normal = row_product(jacobian, 2 * place, v)
@@ -120,6 +124,20 @@ def collide(
 
 
 @kernel
+def adopt_accelerations(
+    count: int, model: Model, state: Floats, memory: Memory, phase: Phase
+) -> None:
+    """Let the forces of the closed contacts act on the accelerations, which are free ones."""
+    assembly, equations, rate = memory.assembly, memory.equations, memory.equations.rate
+    solve_accelerations(count, model, state, memory, phase)
+    if phase.saddle.used == 0:
+        add_impulse(model, assembly, assembly.problem.count, equations, rate)
+        return
+    for i in range(model.nv):
+        rate[i] = phase.saddle.unknown[i]
+
+
+@kernel
 def short_bounces(
     model: Model, ground: GroundModel, state: Floats, memory: Memory, phase: Phase
 ) -> bool:
@@ -130,7 +148,6 @@ def short_bounces(
     """
     time, was_closed = phase.time, memory.reported.closed
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
-    friction = memory.surface.friction
     evaluate_equations(model, state[: model.nq], state[model.nq :], equations)
     locate(model, ground, equations.tree, phase, contacts, memory.surface)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
@@ -143,8 +160,7 @@ def short_bounces(
     total = count + loops
     free_loops(total, memory.loops, equations.rate, 1.0, assembly)
     if total > 0:
-        solve_candidates(count, memory.loops, True, friction, memory.reaction.mode, phase, assembly)
-        add_impulse(model, assembly, total, equations, equations.rate)
+        adopt_accelerations(count, model, state, memory, phase)
     found = False
     for contact in range(phase.watched):
         touched = phase.hit[contact] == 1 or was_closed[contact] == 1

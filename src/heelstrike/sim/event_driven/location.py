@@ -48,6 +48,10 @@ FORCE_NOISE = 1e-10
 NEAR_ENOUGH = 0.1
 # How often a step is looked through for its first event.
 ATTEMPTS = 3
+# Where a point that has just left the ground is looked for: at this part of the way to the first
+# sample, and so on, until that is less than this (s).
+EARLIER = 0.25
+SOONEST = 1e-8
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
@@ -171,6 +175,14 @@ def find_root(
 
 
 @kernel
+def just_left(function: int, phase: Phase) -> bool:
+    """Whether it is the gap of an open contact that is still on the ground."""
+    contact = function // 2
+    is_gap = contact < phase.watched and function % 2 == 0
+    return bool(is_gap and phase.closed[contact] == 0 and phase.before[function] <= TOGETHER)
+
+
+@kernel
 def crossing(
     scene: Scene, function: int, low: float, high: float, length: float, control: Control,
     memory: Memory, phase: Phase,
@@ -208,6 +220,30 @@ def crossing(
 
 
 @kernel
+def early_crossing(
+    scene: Scene, function: int, high: float, length: float, control: Control, memory: Memory,
+    phase: Phase,
+) -> float:  # fmt: skip
+    """Fraction of the step at which a point that has just left the ground is back there at once.
+
+    It may have come back, and risen again, long before the first sample. Nothing happens so soon
+    but on a scale of its own: it is looked for at ever smaller parts of the way there.
+    """
+    value, rate = phase.sample[function], phase.sample_rate[function]
+    root = NO_EVENT
+    part = high
+    while root == NO_EVENT and part * length > SOONEST:
+        part *= EARLIER
+        evaluate_within(scene, part, length, False, control, memory, phase)
+        phase.sample[function] = phase.value[function]
+        phase.sample_rate[function] = phase.rate[function]
+        root = crossing(scene, function, 0.0, part, length, control, memory, phase)
+    phase.sample[function] = value
+    phase.sample_rate[function] = rate
+    return root
+
+
+@kernel
 def first_event(
     scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
 ) -> float:
@@ -233,6 +269,8 @@ def first_event(
         for i in range(functions):
             phase.fired[i] = 0
             root = crossing(scene, i, low, high, length, control, memory, phase)
+            if root == NO_EVENT and k == 1 and just_left(i, phase):
+                root = early_crossing(scene, i, high, length, control, memory, phase)
             if root < first - together:
                 for j in range(i):
                     phase.fired[j] = 0
@@ -357,6 +395,7 @@ def integrate(scene: Scene, stop: float, control: Control, memory: Memory, phase
                 break
             look_back(scene, control, memory, phase)
             part = first_event(scene, length, control, memory, phase)
+            phase.has_fired = 0 if part == NO_EVENT else 1
         if phase.has_fired == 0:
             fits = settle(scene, memory, phase)
         if good and fits:

@@ -34,7 +34,6 @@ from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
-from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
 from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import (
@@ -47,10 +46,11 @@ from heelstrike.sim.event_driven.faces import (
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
 from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, heading, strike
-from heelstrike.sim.event_driven.location import TOGETHER, integrate, shortest_step
+from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
+from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
 from heelstrike.sim.method import Method, solver_order
@@ -75,6 +75,8 @@ JUMP = 1e-7
 INSTANT = 1e-10
 # Mark of a point that touches the ground without force or speed, until it is known what happens.
 UNPRESSED = 2
+# Mark of one that is so near that nobody could tell, as at the top of a bounce too low to see.
+LYING = 3
 # So many in a row are switched by what fired.
 INSISTENT = 8
 # Events that may follow each other at once, and at once behind a bridge; how many more as time goes
@@ -396,7 +398,6 @@ def decide_modes(
     """
     model = scene.model
     forced, jammed = phase.forced == 1, phase.jammed == 1
-    friction, guess = memory.surface.friction, memory.reaction.mode
     ahead = FIRST_LOOK if forced else 0.0
     for _ in range(LOOKS):
         extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
@@ -413,9 +414,7 @@ def decide_modes(
                 continue
         count = phase.closed_count
         if not jammed and count > 0:
-            status = solve_candidates(
-                count, memory.loops, True, friction, guess, phase, memory.assembly
-            )
+            status = solve_accelerations(count, model, phase.trial, memory, phase)
             jammed = status != SOLVED
             if jammed and ahead > 0.0:
                 ahead = 0.0
@@ -480,9 +479,9 @@ def find_what_happened(
 ) -> tuple[bool, bool]:  # fmt: skip
     """Tell what ended the step: whether an impact, or contact forces at their limits.
 
-    Points that touch the ground without speed are closed, sliding ones that stop are at rest; an
-    impact goes through those that touch without force. At the start of a run every point near the
-    ground touches it.
+    Points that touch the ground without speed are closed, whatever ended the step, and sliding ones
+    that stop are at rest; an impact goes through those that touch without force. At the start of a
+    run every point near the ground touches it.
     """
     impact = False
     forced = False
@@ -535,8 +534,13 @@ def find_what_happened(
                 phase.accumulation[contact] = phase.time
         elif gap <= TOGETHER and normal <= rest:
             phase.hit[contact] = UNPRESSED
+            if abs(gap) <= GAP_NOISE and contact < phase.first_second:
+                phase.hit[contact] = LYING
+                phase.slide[contact] = heading(tangent)
     for contact in range(phase.watched):
-        if phase.hit[contact] == UNPRESSED:
+        if phase.hit[contact] == LYING and not impact:
+            phase.closed[contact] = 1
+        if phase.hit[contact] >= UNPRESSED:
             phase.hit[contact] = 1 if impact else 0
     return impact, forced and not impact
 

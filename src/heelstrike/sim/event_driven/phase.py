@@ -17,6 +17,44 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
+class SaddlePoint(Bundle):
+    """Equations of motion and of the contacts together.
+
+    They are solved in :mod:`heelstrike.sim.event_driven.saddle_point`.
+
+    Attributes
+    ----------
+    system : (unknowns, unknowns + 1) float
+    unknown, scale : (unknowns,) float
+    order : (unknowns,) int
+        The equations, the right-hand side last; their solution, the unit of each unknown, and their
+        order. The coordinates come first, then forces.
+    force : (nv,) float
+    bias : (2 capacity,) float
+        Known force, and acceleration of the rows of the candidates without any of the coordinates.
+    mode : (capacity,) int
+    impulse, velocity : (2 capacity,) float
+    residual : (3,) float
+        An answer of the contact solvers that is kept while a better one is looked for.
+    needed, used : int
+        Whether the last evaluation took these equations; whether the answer of the contact problem
+        is of them.
+    """
+
+    system: Floats = array("unknowns", "unknowns + 1")
+    unknown: Floats = array("unknowns")
+    scale: Floats = array("unknowns")
+    order: Integers = array("unknowns", of=int)
+    force: Floats = array("nv")
+    bias: Floats = array("2 capacity")
+    mode: Integers = array("capacity", of=int)
+    impulse: Floats = array("2 capacity")
+    velocity: Floats = array("2 capacity")
+    residual: Floats = array(3)
+    needed: int = cell(int)
+    used: int = cell(int)
+
+
 class Phase(Bundle):
     """A smooth phase of the motion, in which every contact point keeps its mode.
 
@@ -84,6 +122,8 @@ class Phase(Bundle):
     column : (forces,) int
         Equations of the forces of contacts and loops: row of the Jacobian, tangential per normal
         force, unit of each, the equations themselves, their solution, and its order.
+    saddle : SaddlePoint
+        What they are solved with where these equations leave too few digits.
     value, rate, end_value, end_rate : (2 nc + points,) float
     before, before_rate, sample, sample_rate : (2 nc + points,) float
         Event functions, two a contact point, and their rates: at the last evaluation, at the end of
@@ -174,6 +214,7 @@ class Phase(Bundle):
     system: Floats = array("forces", "forces + 1")
     unknown: Floats = array("forces")
     column: Integers = array("forces", of=int)
+    saddle: SaddlePoint = part(SaddlePoint)
     value: Floats = array("functions")
     rate: Floats = array("functions")
     end_value: Floats = array("functions")
@@ -230,11 +271,15 @@ def allocate_phase(robot: Robot) -> Phase:
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
     dry = np.flatnonzero(model.dry_friction > 0.0)
-    firsts = contact_capacity(robot)
+    firsts, loops = contact_capacity(robot), most_rows(model)
     contacts = firsts + robot.nc
+    forces = 2 * contacts + loops
+    saddle = SaddlePoint.allocate(
+        unknowns=model.nv + forces, nv=model.nv, capacity=contacts + loops
+    )
     return Phase.allocate(
         model.extents, ns=len(lower) + len(upper), nd=len(dry), contacts=contacts, components=2,
-        forces=2 * contacts + most_rows(model), functions=2 * contacts + robot.nc,
+        forces=forces, saddle=saddle, functions=2 * contacts + robot.nc,
         stages=SLOPES, dense_rows=DENSE_ROWS, first_dry=firsts - len(dry),
         first_second=firsts, watched=firsts,
         weight=mass * gravity if gravity > 0.0 else mass,

@@ -8,11 +8,11 @@ from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.controller.control import Control
-from heelstrike.sim.event_driven.candidates import solve_candidates
 from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
 from heelstrike.sim.event_driven.phase import Phase
+from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
@@ -55,8 +55,7 @@ def write_row(
         residual[k] = 0.0
     count, loops = phase.closed_count, rows_of(memory.loops)
     if count + loops > 0:
-        friction, guess = memory.surface.friction, memory.reaction.mode
-        solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
+        solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
         note_loops(model, count + loops, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
@@ -102,7 +101,7 @@ def write_rows_within(
 ) -> bool:
     """Append the rows due within the finished step; return whether there was room for all.
 
-    An event at its end has rows of its own, one before it if velocities may jump.
+    An event at its end has rows of its own, one before it if velocities or normals may jump.
     """
     period = phase.output_period * phase.row_every
     last = phase.time + phase.length
@@ -111,9 +110,8 @@ def write_rows_within(
         last -= 1e-12
         for contact in range(phase.watched):
             touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
-        for second in range(phase.first_second, phase.watched):
-            function = 2 * phase.watched + second - phase.first_second
-            touch = touch or (phase.closed[second] == 1 and phase.fired[function] == 1)
+        for corner in range(2 * phase.watched, 2 * phase.watched + scene.model.nc):
+            touch = touch or phase.fired[corner] == 1
     state = phase.slopes[SLOPES - 1]
     while True:
         time = phase.next_row * period

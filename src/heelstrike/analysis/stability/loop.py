@@ -1,0 +1,185 @@
+"""A closed loop as it is simulated, followed from step to step and kept in the middle of some."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.poincare_map import is_wheel
+from heelstrike.contact.ground import Ground
+from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.method import Method
+from heelstrike.sim.run import Event
+from heelstrike.sim.simulation import CAN_GO_ON, Simulation
+from heelstrike.sim.snapshot import Snapshot
+from heelstrike.sim.whole_run import whole
+
+Floats = NDArray[np.float64]
+
+LATE = 2.0
+"""Disturbances (m, rad) are this many times the seconds between two calls, as a touchdown falls
+somewhere between them and is felt at the end."""
+
+SMOOTH, ROUGH = 1e-5, 0.05
+"""Least and largest disturbance that is chosen so."""
+
+REBOUND = 0.3
+"""Touchdowns that follow a step sooner than this part of the longest are of the same step."""
+
+FEW_ROWS = 10**9
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A walk, kept in the middle of every so many steps.
+
+    Attributes
+    ----------
+    begins : tuple of Snapshot
+        One more than there are returns.
+    steps : int
+        Steps from one to the next.
+    duration, length : float
+        Of a return, in s and m.
+    """
+
+    begins: tuple[Snapshot, ...]
+    steps: int
+    duration: float
+    length: float
+
+
+class ClosedLoop:
+    """What is simulated.
+
+    Parameters
+    ----------
+    robot : Robot
+    controller : object with ``torque(t, state, contacts)``, or None
+    state : State or Snapshot
+    method, ground, control_period
+        As of :class:`~heelstrike.Simulation`.
+
+    Raises
+    ------
+    SimulationError
+        If it has no steps that repeat.
+    """
+
+    def __init__(
+        self, robot: Robot, controller: Controller | None, state: State | Snapshot, *,
+        method: Method | None, ground: Ground | None, control_period: float | None,
+    ) -> None:  # fmt: skip
+        self.robot, self.controller, self.ground = robot, controller, ground or Ground()
+        self._setup: dict[str, Any] = {
+            "state": state, "method": method, "ground": ground, "control_period": control_period,
+        }  # fmt: skip
+        if len(self.ground.model().friction) > 1:
+            raise SimulationError("steps repeat on level or sloping ground only")
+        if not np.array_equal(robot.model.axis[:2], [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]):
+            raise SimulationError(
+                f"steps repeat of a robot that is free to move along the ground; the first two "
+                f"coordinates of {robot.name!r} are not its position x, z"
+            )
+        self.simulation = self.fresh()
+        self.grid = self.simulation.control_period
+
+    def fresh(self) -> Simulation:
+        """Return a simulation at the beginning of the walk."""
+        return Simulation(self.robot, self.controller, record_every=FEW_ROWS, **self._setup)
+
+    @property
+    def usual_disturbance(self) -> float:
+        """How large disturbances are if nobody says."""
+        fixed = self.simulation.method.step_length is not None
+        return SMOOTH if fixed else float(np.clip(LATE * self.grid, SMOOTH, ROUGH))
+
+    @property
+    def along(self) -> Floats:
+        """Unit vector (x, z) along the ground."""
+        left, right = self.ground.model().vertices[:2]
+        direction: Floats = (right - left) / np.hypot(*(right - left))
+        return direction
+
+    def advanced(self, simulation: Simulation, until: float, doing: str) -> None:
+        """Simulate until a time, or say why that did not go."""
+        simulation.advance(until)
+        if simulation.status not in CAN_GO_ON:
+            raise LimitCycleError(f"{doing}: {simulation.message}")
+        if simulation.status is not CAN_GO_ON[0]:
+            raise KeyboardInterrupt(simulation.message)
+
+    def follow(self, settling: int, returns: int, longest: float) -> Walk:
+        """Let it walk, and keep it in the middle of the steps from which returns begin."""
+        feet = len({self.foot(i) for i in range(self.robot.nc)})
+        wanted = settling + (returns + 1) * feet + 2
+        landings = self._landings(wanted, longest)
+        first = settling
+        chosen = [first + k * feet for k in range(returns + 1)]
+        if len({landings[place][1] for place in chosen}) > 1:
+            raise LimitCycleError(
+                f"the feet of {self.robot.name!r} do not come down in turn, so that no step repeats"
+            )
+        simulation, begins = self.fresh(), []
+        for place in chosen:
+            middle = 0.5 * (landings[place][0] + landings[place + 1][0])
+            if self.grid > 0.0:
+                middle = round(middle / self.grid) * self.grid
+            self.advanced(simulation, middle, "the undisturbed walk does not go on")
+            begins.append(simulation.snapshot())
+        way = (begins[-1].state.q[:2] - begins[0].state.q[:2]) @ self.along
+        return Walk(
+            begins=tuple(begins),
+            steps=feet,
+            duration=(begins[-1].time - begins[0].time) / returns,
+            length=abs(float(way)) / returns,
+        )
+
+    def foot(self, contact: int) -> int:
+        """What comes down as one: the points of a foot, or every spoke by itself."""
+        if is_wheel(self.robot):
+            return contact
+        for place, foot in enumerate(self.robot.feet):
+            if contact in foot.contacts:
+                return place
+        return len(self.robot.feet) + contact
+
+    def _landings(self, wanted: int, longest: float) -> list[tuple[float, int]]:
+        """When which foot first touched the ground, of the first so many steps."""
+        simulation = self.fresh()
+        begin = simulation.time
+        while True:
+            before = len(self._steps(whole(simulation.record).events, begin))
+            doing = f"the undisturbed walk ends after {before} steps, {wanted} are needed"
+            self.advanced(simulation, simulation.time + longest, doing)
+            steps = self._steps(whole(simulation.record).events, begin)
+            if len(steps) >= wanted:
+                return steps
+            if len(steps) == before:
+                raise LimitCycleError(
+                    f"robot {self.robot.name!r} takes no step from t = "
+                    f"{simulation.time - longest:.6g} s on, in {longest:.6g} s (longest_step)"
+                )
+
+    def _steps(self, events: Sequence[Event], begin: float) -> list[tuple[float, int]]:
+        """When which foot touched the ground first, however often it bounced or rocked then."""
+        landings = [
+            (event.time, self.foot(event.contact))
+            for event in events
+            if event.kind is EventKind.TOUCHDOWN and event.time > begin
+        ]
+        times = [begin, *(time for time, _ in landings)]
+        apart = REBOUND * max(np.diff(times), default=0.0)
+        steps: list[tuple[float, int]] = []
+        for time, foot in landings:
+            if time - (steps[-1][0] if steps else begin) > apart:
+                steps.append((time, foot))
+        return steps

@@ -1,0 +1,320 @@
+"""What goes on from an instant of a closed loop, as coordinates: of the robot, of its memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from heelstrike.analysis.poincare_map import RANK_TOLERANCE, derivative
+from heelstrike.analysis.stability.loop import ClosedLoop
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics import loop_displacement, loop_jacobian
+from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.robot.state import State
+from heelstrike.sim.compliant.method import Compliant
+from heelstrike.sim.controller.law import law_of
+from heelstrike.sim.simulation import Simulation
+from heelstrike.sim.snapshot import Snapshot
+
+Floats = NDArray[np.float64]
+
+TOUCHING, AT_REST = 1e-6, 1e-6
+"""Gap (m) and speed (m/s) of a contact point that stands."""
+
+STANDS = 1e-4
+"""A foot that is lifted by less than this (m) stands."""
+
+TURNED = 10.0
+"""m/s²: over a fixed step a standing point's Jacobian turns, and by so much of it its speed with
+it."""
+
+CHANGE = 1e-5
+"""Disturbance by which the equations of standing feet are differentiated."""
+
+SHORT = 1e-3
+"""Seconds after which a number of the memory shows whether it matters, without samples."""
+
+STEADY = 1e-3
+"""A number that varies by less has one as its unit."""
+
+LOOKS = 16
+"""Instants of a return at which is seen how much a number varies."""
+
+
+class Section:
+    """Coordinates of the errors in the middle of a step.
+
+    Parameters
+    ----------
+    loop : ClosedLoop
+    begin : Snapshot
+        The first middle of a step.
+    duration : float
+        Of a return, in s.
+    memory : sequence of str, optional
+        Numbers of the controller's memory; by default all that matter.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the coordinates: those of the robot, then numbers of the memory.
+    of_robot : int
+        How many are the robot's.
+    directions : (nq + nv, m) float
+        These, m of them.
+    flow : (n,) float
+        The way of the walk itself, in the robot's coordinates.
+    """
+
+    def __init__(
+        self, loop: ClosedLoop, begin: Snapshot, duration: float, memory: Sequence[str] | None
+    ) -> None:
+        self._loop, self._begin, self._duration = loop, begin, duration
+        self._nq = loop.robot.nq
+        # Velocities count by the length they make in half a step or so.
+        self._scale = np.concatenate((np.ones(self._nq), np.full(loop.robot.nv, 0.25 * duration)))
+        self._standing = self.standing(begin)
+        self._frame()
+        self.words = Words(loop, begin, duration, memory)
+        self.of_robot = self.directions.shape[1]
+        robot = tuple(f"robot {i + 1}" for i in range(self.of_robot))
+        self.names = robot + tuple(self.words.names)
+        self.flow = self._flow()
+
+    def standing(self, at: Snapshot) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""
+        if isinstance(self._loop.simulation.method, Compliant):  # springs hold no point anywhere
+            nc = self._loop.robot.nc
+            return np.zeros(nc, bool), np.zeros((nc, 2), bool)
+        seen = contact_kinematics(self._loop.robot, at.state.q, at.state.v, self._loop.ground)
+        step = self._loop.simulation.method.step_length or 0.0
+        touching = np.abs(seen.gap) <= TOUCHING + TURNED * step * step
+        at_rest = (np.abs(seen.velocity) <= AT_REST + TURNED * step) & touching[:, None]
+        at_rest[:, 1] &= at_rest[:, 0]
+        return touching, at_rest
+
+    def feet(self, at: Snapshot) -> set[int]:
+        """Which feet are on the ground, or next to it."""
+        seen = contact_kinematics(self._loop.robot, at.state.q, at.state.v, self._loop.ground)
+        lowest = float(seen.gap.min(initial=0.0))
+        return {self._loop.foot(int(i)) for i in np.flatnonzero(seen.gap <= lowest + STANDS)}
+
+    def _equations(self, x: Floats) -> Floats:
+        """What a standing robot's errors do not change, and where along the ground it stands."""
+        robot, q, v = self._loop.robot, x[: self._nq], x[self._nq :]
+        seen = contact_kinematics(robot, q, v, self._loop.ground)
+        touching, at_rest = self._standing
+        place = seen.position @ self._loop.along
+        held = robot.model.latch_joint[self._begin.arrays["memory.loops.held"] > 0]
+        first = int(np.argmax(touching)) if touching.any() else 0
+        return np.concatenate(
+            (
+                place[first : first + 1], seen.gap[touching], seen.velocity[at_rest],
+                loop_displacement(robot, q), loop_jacobian(robot, q) @ v, q[held], v[held],
+            )
+        )  # fmt: skip
+
+    def _frame(self) -> None:
+        """Find the directions: orthonormal in scaled coordinates, feet and place kept."""
+        x = _vector(self._begin)
+        gradient = derivative(lambda dx: self._equations(x + dx), len(x), CHANGE)
+        _, singular, rows = np.linalg.svd(gradient / self._scale)
+        rank = int(np.sum(singular > RANK_TOLERANCE * singular[0]))
+        scaled = rows[rank:].T
+        self._back = np.linalg.pinv(gradient / self._scale, rcond=RANK_TOLERANCE)
+        self.directions = scaled / self._scale[:, None]
+        way = np.zeros(len(x))
+        way[:2] = self._loop.along
+        # Beside the way along the ground, which is left out: errors behind it do not matter.
+        self._read = np.linalg.pinv(np.column_stack((way * self._scale, scaled)))[1:]
+
+    def of(self, difference: Floats) -> Floats:
+        """Coordinates of a difference of two states (q, v)."""
+        coordinates: Floats = self._read @ (self._scale * difference)
+        return coordinates
+
+    def flat(self, difference: Floats) -> Floats:
+        """The difference of two states, but for the way along the ground and whole turns."""
+        moved, turns = difference.copy(), self._loop.robot.model.axis[:, 0] != 0.0
+        angles = moved[: self._nq]
+        angles[turns] = np.remainder(angles[turns] + np.pi, 2.0 * np.pi) - np.pi
+        moved[:2] -= (difference[:2] @ self._loop.along) * self._loop.along
+        return moved
+
+    def disturb(self, simulation: Simulation, begin: Snapshot, place: int, amount: float) -> None:
+        """Take up a snapshot, with one coordinate changed."""
+        if place >= self.of_robot:
+            simulation.restore(begin)
+            self.words.add(simulation, place - self.of_robot, amount)
+            return
+        x = _vector(begin)
+        there = self._equations(x)
+        moved = x + amount * self.directions[:, place]
+        for _ in range(8):
+            change = (self._back @ (self._equations(moved) - there)) / self._scale
+            moved = moved - change
+            if np.abs(change).max() <= 1e-14:
+                break
+        simulation.restore(begin.moved(State(moved[: self._nq], moved[self._nq :])))
+
+    def read(self, simulation: Simulation) -> tuple[Floats, Floats]:
+        """State (q, v) now, and the numbers of the memory in their units."""
+        state = simulation.state
+        return np.concatenate((state.q, state.v)), self.words.read(simulation)
+
+    def _flow(self) -> Floats:
+        """Rate of the state, in coordinates."""
+        simulation, short = self._loop.simulation, self._loop.grid or SHORT
+        simulation.restore(self._begin)
+        self._loop.advanced(simulation, self._begin.time + short, "the walk does not go on")
+        rate = (self.read(simulation)[0] - _vector(self._begin)) / short
+        return np.concatenate((self.of(rate), np.zeros(len(self.words.names))))
+
+
+class Words:
+    """Numbers that a controller remembers, of those on which it hangs how it goes on.
+
+    A number that one call of the controller makes what it would have been anyway is scratch, and
+    none of them. Units are how much each varies in a return; of one that does not, one.
+    """
+
+    def __init__(
+        self, loop: ClosedLoop, begin: Snapshot, duration: float, wanted: Sequence[str] | None
+    ) -> None:
+        self._loop, self._begin = loop, begin
+        self._opaque = law_of(loop.controller) is None
+        simulation = loop.simulation
+        simulation.restore(begin)
+        found = self._all(simulation)
+        if wanted is not None:
+            unknown = [name for name in wanted if not any(_is(each, name) for each in found)]
+            if unknown:
+                raise SimulationError(
+                    f"the controller's memory has no numbers {', '.join(unknown)}; it has "
+                    f"{', '.join(found) or 'none'}"
+                )
+            found = {k: v for k, v in found.items() if any(_is(k, name) for name in wanted)}
+        self.names = list(found)
+        self._units = self._varying(duration)
+        if self._opaque:  # of numbers without names, those that are always whole count something
+            self.names = [name for name in self.names if name not in self._whole]
+        if wanted is None:
+            self.names = self._that_matter()
+        self.unit = np.array([self._units[name] for name in self.names])
+
+    def _all(self, simulation: Simulation) -> dict[str, float]:
+        """All numbers that are no counts, by name."""
+        found: dict[str, float] = {}
+        if self._opaque:
+            kept = simulation.snapshot().arrays.get("controller", np.zeros(0))
+            return {f"controller[{i}]": float(x) for i, x in enumerate(np.ravel(kept))}
+        if self._loop.controller is None:
+            return found
+        for name, member, values in simulation.memory.views():
+            if member.kind is float:
+                for place in np.ndindex(values.shape):
+                    index = ", ".join(map(str, place))
+                    found[f"memory.{name}{f'[{index}]' if place else ''}"] = float(values[place])
+        return found
+
+    def counts(self, simulation: Simulation) -> dict[str, Any]:
+        """Whole numbers that it remembers, by name."""
+        if self._opaque or self._loop.controller is None:
+            return {}
+        return {
+            f"memory.{name}": values.copy()
+            for name, member, values in simulation.memory.views()
+            if member.kind is int
+        }
+
+    def _varying(self, duration: float) -> dict[str, float]:
+        """How much each number varies in a return."""
+        simulation = self._loop.simulation
+        seen = []
+        for look in range(LOOKS + 1):
+            simulation.restore(self._begin)
+            until = self._begin.time + look * duration / LOOKS
+            self._loop.advanced(simulation, until, "the walk does not go on")
+            seen.append(list(self._all(simulation).values()))
+        rows = np.array(seen).reshape(LOOKS + 1, -1)
+        spread = np.ptp(rows, axis=0)
+        every = list(self._all(simulation))
+        self._whole = {
+            name for i, name in enumerate(every) if np.array_equal(rows[:, i], np.rint(rows[:, i]))
+        }
+        good = np.isfinite(spread) & (spread > STEADY)
+        return dict(zip(every, np.where(good, spread, 1.0).tolist(), strict=True))
+
+    def _that_matter(self) -> list[str]:
+        """Those whose disturbance one call of the controller does not undo without a trace."""
+        simulation, short = self._loop.simulation, self._loop.grid or SHORT
+        size = self._loop.usual_disturbance
+
+        def after(names: list[str]) -> tuple[bytes, dict[str, float]]:
+            simulation.restore(self._begin)
+            for name in names:
+                self._put(simulation, name, size * self._units[name])
+            self._loop.advanced(simulation, self._begin.time + short, "the walk does not go on")
+            numbers = self._all(simulation)
+            others = [value for name, value in numbers.items() if name not in names]
+            state = simulation.state
+            return np.concatenate((state.q, state.v, others)).tobytes(), numbers
+
+        usual_numbers = after([])[1]
+
+        def scratch(names: list[str]) -> bool:
+            try:
+                trace, numbers = after(names)
+            except LimitCycleError:
+                return False
+            ours = [value for name, value in usual_numbers.items() if name not in names]
+            usual = np.concatenate((self._usual_state, ours)).tobytes()
+            return trace == usual and all(numbers[n] == usual_numbers[n] for n in names)
+
+        self._usual_state = np.concatenate((simulation.state.q, simulation.state.v))
+        groups: dict[str, list[str]] = {}
+        for name in self.names:
+            groups.setdefault(name.split("[")[0], []).append(name)
+        kept: list[str] = []
+        for names in groups.values():
+            if scratch(names):
+                continue
+            kept += [each for each in names if len(names) == 1 or not scratch([each])]
+        return kept
+
+    def _put(self, simulation: Simulation, name: str, change: float) -> None:
+        """Change a number."""
+        if self._opaque:
+            now = simulation.snapshot()
+            numbers = np.array(now.arrays["controller"], dtype=np.float64)
+            numbers.flat[int(name.split("[")[1][:-1])] += change
+            simulation.restore(Snapshot(now.arrays | {"controller": numbers}, now.identity))
+            return
+        for member, _, values in simulation.memory.views():
+            if name == f"memory.{member}":
+                values[...] += change
+            elif name.startswith(f"memory.{member}["):
+                inside = name[len(f"memory.{member}[") : -1]
+                values[tuple(int(i) for i in inside.split(", "))] += change
+
+    def add(self, simulation: Simulation, place: int, amount: float) -> None:
+        """Change a number by a part of its unit."""
+        self._put(simulation, self.names[place], amount * float(self.unit[place]))
+
+    def read(self, simulation: Simulation) -> Floats:
+        """The numbers now, in their units."""
+        numbers = self._all(simulation)
+        return np.array([numbers[name] for name in self.names]) / self.unit
+
+
+def _is(name: str, wanted: str) -> bool:
+    """Whether a number is meant by the name of its array, with or without what it is part of."""
+    bare = name.removeprefix("memory.")
+    return wanted in (name, bare, bare.split("[")[0], name.split("[")[0])
+
+
+def _vector(snapshot: Snapshot) -> Floats:
+    return np.concatenate((snapshot.state.q, snapshot.state.v))

@@ -1,0 +1,496 @@
+"""Forces and motion at once, where the Delassus matrix hides the forces.
+
+Contact forces come from ``J A⁻¹ Jᵀ`` as long as its digits tell them. Where a link has next to no
+inertia they do not: forces of some newtons cancel to what turns it, and of a matrix with entries of
+1e12 nothing is left but rounding. Nothing is wrong with the equations themselves::
+
+    A x − Jᵀ λ = f        J x = −b
+
+(a saddle point: A, J and their right-hand sides are known digit by digit, whatever the inverse of A
+is). They are solved by complete pivoting, in units in which the largest entry of every row and
+column is 1, and the contact modes are those that this solution agrees with.
+
+An answer is taken only with a certificate of its own (:func:`is_proven`). Like that of the contact
+problem it is measured against the size of the data: the largest ``|b|`` in these units. So the
+motion, the forces and the equations are met to a part of what is given, and unknowns that are
+a million times as large as the data prove nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from heelstrike.compiler.compilation import kernel
+from heelstrike.contact.modes import (
+    OPEN,
+    SLIDING_BACKWARD,
+    SLIDING_FORWARD,
+    SLIP_BACKWARD,
+    SLIP_FORWARD,
+    SOLVED,
+    STICK,
+)
+from heelstrike.contact.sets import INTERVAL, LINE
+from heelstrike.contact.workspace import ContactAnswer
+from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.dynamics.kernels import mass_matrix
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.geometry import add_impulse, row_product
+from heelstrike.sim.contacts.loops import rows_of
+from heelstrike.sim.event_driven.candidates import known_force, pose_problem, solve_candidates
+from heelstrike.sim.event_driven.gaps import free_gap_acceleration
+from heelstrike.sim.event_driven.phase import Phase, SaddlePoint
+from heelstrike.sim.memory import Assembly, Equations, Memory
+
+SMALL_PIVOT = 1e-6
+"""Pivots of the contacts' unit-diagonal matrix below this leave too few digits of the forces."""
+
+INCONSISTENT = 1e-9
+"""Equations dropped as dependent that are left with more than this, relative, are not dependent."""
+
+STRAINED = 1e6
+"""Velocities that cancel in a contact problem, in units of the data, from which on rounding of its
+matrix counts."""
+
+GREATEST = 1e6
+"""Unknowns larger than this, in units of the data, are not proven."""
+
+PROVEN = 1e-9
+"""Largest residual of an answer, relative to the data."""
+
+SWEEPS = 4
+"""How often rows and columns are scaled: the largest entries are within a tenth of 1 then."""
+
+ROUNDS = 12
+"""How often contact modes are amended."""
+
+
+@kernel
+def is_delicate(size: int, rank: int, system: Floats) -> bool:
+    """Whether the equations just solved by complete pivoting leave few digits, or were cut short.
+
+    ``system`` is what elimination left of them, the right-hand side in its last column.
+    """
+    if rank == 0:
+        return False
+    if abs(system[rank - 1, rank - 1]) < SMALL_PIVOT * abs(system[0, 0]):
+        return True
+    if rank == size:
+        return False
+    largest = 0.0
+    left = 0.0
+    for i in range(size):
+        if i < rank:
+            largest = max(largest, abs(system[i, size]))
+        else:
+            left = max(left, abs(system[i, size]))
+    return left > INCONSISTENT * largest
+
+
+@kernel
+def write_equations(
+    size: int, model: Model, assembly: Assembly, equations: Equations, phase: Phase
+) -> None:
+    """Write the matrix of the equations: those of motion first, then those of ``phase.row``.
+
+    A force along a row brings along its tangential one, by ``phase.lean``.
+    """
+    nv, system, matrix = model.nv, phase.saddle.system, equations.mass_matrix
+    jacobian = assembly.jacobian
+    mass_matrix(model, equations.tree, matrix)
+    for i in range(nv):
+        for j in range(nv):
+            system[i, j] = matrix[i, j]
+        system[i, i] += equations.added[i]
+    for k in range(size):
+        row, lean = phase.row[k], phase.lean[k]
+        for j in range(nv):
+            system[nv + k, j] = jacobian[row, j]
+            system[j, nv + k] = -jacobian[row, j]
+            if lean != 0.0:
+                system[j, nv + k] -= lean * jacobian[row + 1, j]
+        for other in range(size):
+            system[nv + k, nv + other] = 0.0
+
+
+@kernel
+def state_accelerations(
+    count: int, model: Model, state: Floats, memory: Memory, phase: Phase
+) -> None:
+    """State the problem of accelerations: the known force, and J̇ v of the candidates.
+
+    No force is divided by an inertia.
+    """
+    problem, bias, equations = memory.assembly.problem, phase.saddle.bias, memory.equations
+    rate, kept = equations.rate, phase.saddle.unknown
+    for i in range(model.nv):
+        kept[i] = rate[i]
+        rate[i] = 0.0
+    for place in range(count):
+        normal, tangent = problem.free[2 * place], problem.free[2 * place + 1]
+        contact = memory.assembly.candidate[place]
+        free_gap_acceleration(
+            model, memory.contacts, equations, contact, place, phase, memory.assembly
+        )
+        for row in range(2 * place, 2 * place + 2):
+            bias[row] = problem.free[row]
+        problem.free[2 * place], problem.free[2 * place + 1] = normal, tangent
+    for row in range(rows_of(memory.loops)):
+        bias[2 * (count + row)] = memory.loops.rows.bias[row]
+        bias[2 * (count + row) + 1] = 0.0
+    known_force(model, state, memory.torque, phase, memory.pushes, equations)
+    for i in range(model.nv):
+        phase.saddle.force[i] = rate[i]
+        rate[i] = kept[i]
+
+
+@kernel
+def state_velocities(total: int, free: Floats, saddle: SaddlePoint) -> None:
+    """State the problem of an impact: no known impulse, and the free velocities of the rows."""
+    for i in range(saddle.force.shape[0]):
+        saddle.force[i] = 0.0
+    for row in range(2 * total):
+        saddle.bias[row] = free[row]
+
+
+@kernel
+def solve_saddle_point(size: int, saddle: SaddlePoint) -> int:
+    """Solve the equations, their right-hand side in the last column; return their rank.
+
+    Writes ``unknown`` and ``scale``, the unit of each; the system is used up.
+    """
+    system, scale, unknown = saddle.system, saddle.scale, saddle.unknown
+    for i in range(size):
+        scale[i] = 1.0
+    for _ in range(SWEEPS):
+        for i in range(size):
+            largest = 0.0
+            for j in range(size):
+                entry = max(abs(system[i, j]), abs(system[j, i]))
+                largest = max(largest, scale[j] * entry)
+            unknown[i] = math.sqrt(scale[i] * largest)
+        for i in range(size):
+            if unknown[i] > 0.0:
+                scale[i] /= unknown[i]
+    for i in range(size):
+        for j in range(size):
+            system[i, j] *= scale[i] * scale[j]
+        system[i, size] *= scale[i]
+    rank = solve_to_rank(size, system, saddle.order, unknown)
+    for i in range(size):
+        unknown[i] *= scale[i]
+    return rank
+
+
+@kernel
+def list_rows(count: int, total: int, assembly: Assembly, phase: Phase) -> int:
+    """List the rows in which the modes of the answer allow no velocity; return how many."""
+    problem, mode = assembly.problem, assembly.answer.mode
+    size = 0
+    for place in range(total):
+        does, friction = mode[place], problem.friction[place]
+        if problem.set[place] == INTERVAL:
+            if does == STICK:
+                phase.row[size] = 2 * place + 1
+                phase.lean[size] = 0.0
+                size += 1
+            continue
+        if does == OPEN:
+            continue
+        phase.row[size] = 2 * place
+        phase.lean[size] = 0.0
+        if does in (SLIP_FORWARD, SLIDING_FORWARD):
+            phase.lean[size] = -friction
+        elif does in (SLIP_BACKWARD, SLIDING_BACKWARD):
+            phase.lean[size] = friction
+        size += 1
+        if does == STICK and place < count and friction > 0.0:
+            phase.row[size] = 2 * place + 1
+            phase.lean[size] = 0.0
+            size += 1
+    return size
+
+
+@kernel
+def begin_impulses(total: int, assembly: Assembly) -> None:
+    """Put the impulses of the answer on what its modes allow: these are corrected then."""
+    problem, mode, impulse = assembly.problem, assembly.answer.mode, assembly.answer.impulse
+    for place in range(total):
+        does = mode[place]
+        limit = problem.friction[place] * impulse[2 * place]
+        if problem.set[place] == INTERVAL:
+            impulse[2 * place] = limit = problem.bound[place]
+        elif does == OPEN:
+            impulse[2 * place] = impulse[2 * place + 1] = 0.0
+        if does in (SLIP_FORWARD, SLIDING_FORWARD):
+            impulse[2 * place + 1] = -limit
+        elif does in (SLIP_BACKWARD, SLIDING_BACKWARD):
+            impulse[2 * place + 1] = limit
+
+
+@kernel
+def solve_modes(count: int, total: int, model: Model, memory: Memory, phase: Phase) -> int:
+    """Correct the impulses of the answer, and find velocities, by the modes; return how many rows.
+
+    The motion goes to ``saddle.unknown``, the units of coordinates and rows to ``saddle.scale``.
+    """
+    assembly, nv, saddle = memory.assembly, model.nv, phase.saddle
+    answer, jacobian, bias = assembly.answer, assembly.jacobian, saddle.bias
+    begin_impulses(total, assembly)
+    size = list_rows(count, total, assembly, phase)
+    write_equations(size, model, assembly, memory.equations, phase)
+    for j in range(nv):
+        pushed = saddle.force[j]
+        for row in range(2 * total):
+            pushed += jacobian[row, j] * answer.impulse[row]
+        saddle.system[j, nv + size] = pushed
+    for k in range(size):
+        saddle.system[nv + k, nv + size] = -bias[phase.row[k]]
+    solve_saddle_point(nv + size, saddle)
+    for k in range(size):
+        row, force = phase.row[k], saddle.unknown[nv + k]
+        answer.impulse[row] += force
+        if phase.lean[k] != 0.0:
+            answer.impulse[row + 1] += phase.lean[k] * force
+    for row in range(2 * total):
+        answer.velocity[row] = bias[row] + row_product(jacobian, row, saddle.unknown[:nv])
+    for place in range(total):
+        if assembly.problem.set[place] == INTERVAL:
+            answer.velocity[2 * place] = 0.0
+    return size
+
+
+@kernel
+def unit_of(row: int, nv: int, jacobian: Floats, saddle: SaddlePoint) -> float:
+    """Unit of the velocity along a row, in which those of the coordinates are 1."""
+    largest = 0.0
+    for j in range(nv):
+        largest = max(largest, abs(jacobian[row, j]) * saddle.scale[j])
+    return largest
+
+
+@kernel
+def amended(
+    place: int, slide: int, data: float, nv: int, assembly: Assembly, saddle: SaddlePoint
+) -> int:
+    """Mode of a candidate that does not contradict its impulse and velocity as the one it has does.
+
+    What closes goes on sliding as it did, by ``slide``, or sticks to begin with.
+    """
+    problem, normal, tangent = assembly.problem, 2 * place, 2 * place + 1
+    impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
+    mode = assembly.answer.mode[place]
+    across = PROVEN * data * unit_of(tangent, nv, assembly.jacobian, saddle)
+    speed, limit = across, problem.bound[place]
+    if problem.set[place] != INTERVAL:
+        speed = PROVEN * data * unit_of(normal, nv, assembly.jacobian, saddle)
+        limit = problem.friction[place] * impulse[normal]
+    force = (PROVEN * data) ** 2 / speed if speed > 0.0 else 0.0
+    if mode == OPEN:
+        if velocity[normal] >= -speed:
+            return OPEN
+        if slide == 0:
+            return STICK
+        return SLIDING_FORWARD if slide > 0 else SLIDING_BACKWARD
+    if problem.set[place] != INTERVAL and impulse[normal] < -force:
+        return OPEN
+    if mode == STICK and limit > 0.0 and abs(impulse[tangent]) > limit + force:
+        return SLIP_BACKWARD if impulse[tangent] > 0.0 else SLIP_FORWARD
+    if mode == SLIP_FORWARD and velocity[tangent] < -across:
+        return STICK
+    if mode == SLIP_BACKWARD and velocity[tangent] > across:
+        return STICK
+    return mode
+
+
+@kernel
+def amend_modes(
+    total: int, accelerations: bool, nv: int, data: float, phase: Phase, assembly: Assembly
+) -> bool:
+    """Change the modes of the answer that it contradicts; return whether there are any."""
+    changed = False
+    for place in range(total):
+        if assembly.problem.set[place] == LINE:
+            continue
+        slide = phase.slide[assembly.candidate[place]] if accelerations else 0
+        mode = amended(place, slide, data, nv, assembly, phase.saddle)
+        changed = changed or mode != assembly.answer.mode[place]
+        assembly.answer.mode[place] = mode
+    return changed
+
+
+@kernel
+def size_of_data(total: int, nv: int, assembly: Assembly, saddle: SaddlePoint) -> float:
+    """Largest force on a coordinate, and velocity of a row that these can move, in their units."""
+    largest = 0.0
+    for i in range(nv):
+        largest = max(largest, abs(saddle.force[i]) * saddle.scale[i])
+    for row in range(2 * total):
+        unit = unit_of(row, nv, assembly.jacobian, saddle)
+        if unit > 0.0:
+            largest = max(largest, abs(saddle.bias[row]) / unit)
+    return largest
+
+
+@kernel
+def is_proven(
+    size: int, total: int, data: float, model: Model, phase: Phase, memory: Memory
+) -> bool:
+    """Certify the answer, whose modes agree with it; write its residuals.
+
+    Whether the equations of motion hold and the held rows have no velocity, to a part of the data,
+    and no unknown is beyond all proportion to them.
+    """
+    assembly, matrix, nv = memory.assembly, memory.equations.mass_matrix, model.nv
+    answer, saddle, jacobian = assembly.answer, phase.saddle, assembly.jacobian
+    worst = 0.0
+    largest = 0.0
+    for i in range(nv):
+        left = memory.equations.added[i] * saddle.unknown[i] - saddle.force[i]
+        for j in range(nv):
+            left += matrix[i, j] * saddle.unknown[j]
+        for row in range(2 * total):
+            left -= jacobian[row, i] * answer.impulse[row]
+        worst = max(worst, abs(left) * saddle.scale[i])
+        largest = max(largest, abs(saddle.unknown[i]) / saddle.scale[i])
+    for k in range(size):
+        worst = max(worst, abs(answer.velocity[phase.row[k]]) * saddle.scale[nv + k])
+        largest = max(largest, abs(answer.impulse[phase.row[k]]) / saddle.scale[nv + k])
+    answer.residual[0] = worst / data if worst > 0.0 else 0.0
+    answer.residual[1] = answer.residual[2] = 0.0  # the modes agree with it
+    return worst <= PROVEN * data and largest <= GREATEST * data
+
+
+@kernel
+def solve_by_saddle_point(
+    count: int, total: int, accelerations: bool, model: Model, memory: Memory, phase: Phase
+) -> bool:
+    """Solve the contact problem of the candidates from the full equations; return whether proven.
+
+    It begins with the modes and impulses of the answer.
+    Forces or impulses, velocities, modes and residuals go to ``assembly.answer``, the accelerations
+    of the coordinates, or what the impulses change of their velocities, to ``saddle.unknown``.
+    """
+    assembly, nv = memory.assembly, model.nv
+    for _ in range(ROUNDS):
+        size = solve_modes(count, total, model, memory, phase)
+        data = size_of_data(total, nv, assembly, phase.saddle)
+        if not amend_modes(total, accelerations, nv, data, phase, assembly):
+            return is_proven(size, total, data, model, phase, memory)
+    return False
+
+
+@kernel
+def keep(total: int, answer: ContactAnswer, saddle: SaddlePoint) -> None:
+    """Keep an answer of the contact solvers."""
+    for place in range(total):
+        saddle.mode[place] = answer.mode[place]
+    for row in range(2 * total):
+        saddle.impulse[row] = answer.impulse[row]
+        saddle.velocity[row] = answer.velocity[row]
+    for i in range(3):
+        saddle.residual[i] = answer.residual[i]
+
+
+@kernel
+def give_back(total: int, saddle: SaddlePoint, answer: ContactAnswer) -> None:
+    """Give the answer that was kept."""
+    for place in range(total):
+        answer.mode[place] = saddle.mode[place]
+    for row in range(2 * total):
+        answer.impulse[row] = saddle.impulse[row]
+        answer.velocity[row] = saddle.velocity[row]
+    for i in range(3):
+        answer.residual[i] = saddle.residual[i]
+
+
+@kernel
+def solve_at_once(count: int, model: Model, memory: Memory, phase: Phase) -> bool:
+    """Solve for accelerations without asking the solvers; return whether what comes out is proven.
+
+    That is where the last evaluation took the full equations.
+    """
+    assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
+    answer, tally = assembly.answer, assembly.solver.tally
+    pose_problem(count, memory.loops, True, friction, guess, phase, assembly)
+    total = assembly.problem.count
+    for row in range(2 * total):
+        answer.impulse[row] = 0.0
+    if not solve_by_saddle_point(count, total, True, model, memory, phase):
+        return False
+    tally.solves += 1
+    tally.shortcuts += 1
+    return True
+
+
+@kernel
+def solve_once_more(
+    status: int, count: int, accelerations: bool, model: Model, memory: Memory, phase: Phase
+) -> bool:
+    """Solve again what the solvers left like this; return whether what comes out is proven."""
+    assembly, saddle, tally = memory.assembly, phase.saddle, memory.assembly.solver.tally
+    answer, total = assembly.answer, assembly.problem.count
+    keep(total, answer, saddle)
+    for row in range(2 * total if status != SOLVED else 0):
+        answer.impulse[row] = 0.0
+    if solve_by_saddle_point(count, total, accelerations, model, memory, phase):
+        if status != SOLVED:
+            tally.failures -= 1
+            tally.fallbacks += 1
+        return True
+    give_back(total, saddle, answer)
+    return False
+
+
+@kernel
+def solve_accelerations(
+    count: int, model: Model, state: Floats, memory: Memory, phase: Phase
+) -> int:
+    """Solve the contact problem of the candidates, from the full equations where its matrix fails.
+
+    The equations of the state have been evaluated. Otherwise this is
+    :func:`~heelstrike.sim.event_driven.candidates.solve_candidates`, of whose certificate nothing
+    is left where rounding of the matrix counts.
+    """
+    assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
+    phase.saddle.used = 0
+    if phase.saddle.needed == 1:
+        state_accelerations(count, model, state, memory, phase)
+        if solve_at_once(count, model, memory, phase):
+            phase.saddle.used = 1
+            return SOLVED
+    status = solve_candidates(count, memory.loops, True, friction, guess, phase, assembly)
+    if status == SOLVED and not assembly.solver.yardstick.effort > STRAINED:
+        return status
+    state_accelerations(count, model, state, memory, phase)
+    if solve_once_more(status, count, True, model, memory, phase):
+        phase.saddle.used = 1
+        return SOLVED
+    return status
+
+
+@kernel
+def solve_velocities(count: int, model: Model, memory: Memory, phase: Phase) -> int:
+    """The same of velocities, whose free terms are those of the contact problem."""
+    assembly, friction, guess = memory.assembly, memory.surface.friction, memory.reaction.mode
+    phase.saddle.used = 0
+    status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
+    if status == SOLVED and not assembly.solver.yardstick.effort > STRAINED:
+        return status
+    state_velocities(assembly.problem.count, assembly.problem.free, phase.saddle)
+    if solve_once_more(status, count, False, model, memory, phase):
+        phase.saddle.used = 1
+        return SOLVED
+    return status
+
+
+@kernel
+def add_impulses(
+    model: Model, assembly: Assembly, phase: Phase, equations: Equations, v: Floats
+) -> None:
+    """Add what the answer of :func:`solve_velocities` does to velocities."""
+    if phase.saddle.used == 1:
+        for j in range(model.nv):
+            v[j] += phase.saddle.unknown[j]
+    else:
+        add_impulse(model, assembly, assembly.problem.count, equations, v)
