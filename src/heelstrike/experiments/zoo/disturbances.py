@@ -205,7 +205,7 @@ DISTURBANCES: tuple[Disturbance, ...] = (
         _friction, less=True,
     ),
     Disturbance(
-        "trunk-mass", "trunk ±", "%", "a trunk heavier, and lighter, than the controller knows",
+        "trunk-mass", "mass ±", "%", "a trunk heavier, and lighter, than the controller knows",
         _trunk_mass, standing=True,
     ),
     Disturbance(
