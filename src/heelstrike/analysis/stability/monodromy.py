@@ -396,9 +396,16 @@ class _Instant:
         if len(fresh) != 1 or fresh[0].kind.of_joint:
             return None
         ground = self.run.ground
-        active = _struck(struck, float(ground.model().friction[0]))
+        active = _struck(struck, self._friction())
         impact = linearize_impact(self.run.robot, q, v, active, ground=ground)
         return self._gap_gradient(fresh[0], q), rate, impact.reset @ rate
+
+    def _friction(self) -> Floats:
+        """Friction coefficients of the contact points on ground that is the same everywhere."""
+        friction: Floats = (
+            float(self.run.ground.model().friction[0]) * self.run.robot.model.friction_scale
+        )
+        return friction
 
     def _state(self, row: int) -> tuple[Floats, Floats]:
         return self.run.position[row], self.run.velocity[row]
@@ -456,8 +463,7 @@ class _Instant:
             gradient = self._gap_gradient(event, q)
             if count > 1 and gradient @ rate >= 0.0:
                 return None
-            friction = float(ground.model().friction[0]) * robot.model.friction_scale
-            active = _struck([*order[:count], *others], friction)
+            active = _struck([*order[:count], *others], self._friction())
             impact = linearize_impact(robot, q, v, active, ground=ground)
             v = impact.velocity
             if count < len(order):
