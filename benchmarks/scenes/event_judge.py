@@ -22,7 +22,9 @@ jump between two rows of one time, by impulses that stand in the events. Promise
 
 Velocities count in kinetic sizes relative to ``|v|`` and what the known forces do in a millisecond,
 forces relative to the size of the known forces. What happens within an interval in which a push
-begins or ends has no row; such intervals are left out and counted.
+begins or ends has no row; such intervals are left out and counted. So are those that end in a jam,
+before which forces grow without bound (Painlevé's paradox), as 1/t: of these it is asked that they
+make no energy.
 """
 
 from __future__ import annotations
@@ -116,6 +118,12 @@ class _Events:
         for event in run.events:
             if event.kind is EventKind.BRIDGE:
                 self.bridges[int(np.argmin(np.abs(self.instant - event.time)))] = event.impulse
+        self.jams = {
+            int(np.argmin(np.abs(self.instant - event.time)))
+            for event in run.events
+            if event.kind is EventKind.PAINLEVE and event.impulse[0] > 0.0
+        }
+        """Instants in which forces have grown without bound."""
         self.smooth = ~np.isin(np.arange(len(time)), self.last[list(self.bridges)])
         """Rows of smooth phases: those at the beginning of bridges have no contact forces."""
         self.settled &= self.smooth
@@ -418,11 +426,15 @@ class _Events:
         eventful = self.eventful()
         momentum, motion, work, times = [], [], [], []
         left_out = 0
+        found.figures["jams"] = len(self.jams)
         total = 0.0
         for k in range(len(self.instant) - 1):
             a, b = self.last[k], self.first[k + 1]
             begin, end = self.instant[k], self.instant[k + 1]
             span = end - begin
+            if k + 1 in self.jams:
+                self.jam(found, k, energy)
+                continue
             if np.any((self.edges > begin - INSTANT) & (self.edges < end + INSTANT)):
                 left_out += 1
                 continue
@@ -466,12 +478,27 @@ class _Events:
         top = max(float(kinetic.max()), float(np.ptp(potential)), 1e-9)
         found.look("energy", np.array(work) / top, ENERGY, at)
 
+    def jam(self, found: Findings, k: int, energy: Array) -> None:
+        """No more energy behind a jam than before it, but for the work of the known forces."""
+        a, b = self.last[k], self.last[k + 1]
+        span, size = (
+            self.instant[k + 1] - self.instant[k],
+            _size(self.rows.matrix[a], self.rows.v[a]),
+        )
+        size += ROW * self.force_size[a]
+        work = span * (abs(self.free_power[a]) + abs(self.free_power[b]))
+        made = (energy[b] - energy[a] - work) / size**2
+        found.look("jam makes energy", np.array([made]), GAIN, self.instant[k : k + 1])
+
     def power(self) -> Array:
         """Power of motors, dampers, pushes, contacts, stops and dry friction, (T,)."""
         rows, model, run = self.rows, self.rows.model, self.rows.run
-        force = self.pushed - model.damping * rows.v + rows.contact_force()
+        force = self.pushed - model.damping * rows.v
         force[:, model.actuator_joint] += run.torque
-        return np.sum(force * rows.v, axis=1)
+        self.free_power = np.sum(force * rows.v, axis=1)
+        """Power of motors, dampers and pushes alone."""
+        power: Array = self.free_power + np.sum(rows.contact_force() * rows.v, axis=1)
+        return power
 
     def eventful(self) -> Array:
         """Whether contact modes may have changed at each instant."""
@@ -505,7 +532,7 @@ class _Events:
         usable = [int(self.last[i]) for i in range(low, high)]
         # In the row before an event modes may be those after it, so that it counts if need be only.
         two = self.first[high] != self.last[high]
-        if not eventful[high] or (two and len(usable) < 3):
+        if high not in self.jams and (not eventful[high] or (two and len(usable) < 3)):
             usable.append(int(self.first[high]))
         return np.array(usable)
 

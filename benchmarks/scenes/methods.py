@@ -22,12 +22,15 @@ METHODS = (*STEPPING, "event_driven", "hunt_crossley", "kelvin_voigt")
 """Names of the methods: the schemes of time stepping, event-driven contact, two compliant laws."""
 
 
-def method_of(name: str, scene: Scene) -> Any:
-    """Return a method; compliant ground is made as stiff as the weight of the scene wants it."""
+def method_of(name: str, scene: Scene, rows: float = STEP) -> Any:
+    """Return a method; compliant ground is made as stiff as the weight of the scene wants it.
+
+    `rows` is the time between two rows of an event-driven run (s).
+    """
     if name in STEPPING:
         return hs.TimeStepping(step=STEP, scheme=STEPPING[name])
     if name == "event_driven":
-        return hs.EventDriven(output_period=STEP)
+        return hs.EventDriven(output_period=rows)
     weight = 0.5 * GRAVITY * sum(link.mass for link in scene.links)
     if name == "hunt_crossley":
         law = hs.HuntCrossley.from_sink(weight=weight, sink=2e-4, restitution=0.5, speed=0.5)
@@ -59,7 +62,7 @@ class Setting:
 
     def run(
         self, name: str, *, state: hs.State | None = None, begin: float = 0.0,
-        duration: float = DURATION,
+        duration: float = DURATION, rows: float = STEP,
     ) -> Run:  # fmt: skip
         """Simulate the scene, from its start or from another state at a time `begin`."""
         scene, robot = self.scene, self.robot
@@ -68,7 +71,7 @@ class Setting:
             scene.controller(robot),
             state=scene.state(robot) if state is None else state,
             duration=duration,
-            method=method_of(name, scene),
+            method=method_of(name, scene, rows),
             ground=scene.ground(restitution=bounces(name)),
             pushes=scene.pushes(begin),
             stop_when_fallen=False,
