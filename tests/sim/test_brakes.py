@@ -14,6 +14,8 @@ from heelstrike.analysis import energy_balance
 from heelstrike.errors import RobotError, SimulationError
 from heelstrike.robot import Robot, RobotBuilder
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.memory import allocate_memory
+from heelstrike.sim.time_stepping.impact import allocate_impact
 
 MASS, LENGTH, INERTIA = 2.0, 0.8, 0.05
 ABOUT_PIVOT = INERTIA + MASS * LENGTH**2
@@ -147,6 +149,14 @@ def test_a_brake_takes_hold_with_the_ground_under_the_foot() -> None:
         assert np.abs(simulation.state.v[3:]).max() < 1e-10
     away = {name: np.abs(found[name] - found["event-driven"]).max() for name in ("coarse", "fine")}
     assert away["fine"] < 0.05 * away["coarse"] < 0.05
+
+
+def test_an_impact_has_room_for_all_that_can_touch_and_all_brakes() -> None:
+    """Compiled code writes beyond what has no room, and says nothing."""
+    for robot in (pendulum(), standing_leg()):
+        impact, candidates = allocate_impact(robot), allocate_memory(robot).assembly.candidate
+        assert impact.member.shape == candidates.shape
+        assert impact.problem.set.shape == candidates.shape
 
 
 def test_brakes_are_named_where_there_are_none(tmp_path: Path) -> None:
