@@ -147,6 +147,9 @@ def test_a_brake_takes_hold_with_the_ground_under_the_foot() -> None:
         simulation.advance(0.04)
         found[name] = simulation.state.v.copy()
         assert np.abs(simulation.state.v[3:]).max() < 1e-10
+        # What rests and goes on resting has no energy to tell rounding by; the brakes have.
+        kinds = {event.kind for event in simulation.record.events}
+        assert EventKind.ENERGY_GAIN not in kinds
     away = {name: np.abs(found[name] - found["event-driven"]).max() for name in ("coarse", "fine")}
     assert away["fine"] < 0.05 * away["coarse"] < 0.05
 
