@@ -154,6 +154,28 @@ def test_a_brake_takes_hold_with_the_ground_under_the_foot() -> None:
     assert away["fine"] < 0.05 * away["coarse"] < 0.05
 
 
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_two_brakes_stop_a_loop_that_one_would_stop(method: Any) -> None:
+    """Four bars have one way to move: brakes of crank and rocker are told the same twice."""
+    build = RobotBuilder("four_bar")
+    crank = build.hinge("crank", None, mass=1.0, inertia=0.02, center_of_mass=(0, 0.1))
+    coupler = build.hinge("coupler", crank, at=(0, 0.2), mass=1.5, inertia=0.08)
+    rocker = build.hinge("rocker", None, at=(0.5, 0), mass=1.2, inertia=0.05)
+    build.loop(coupler, rocker, at=(0.5, 0.3))
+    build.brake("crank")
+    build.brake("rocker")
+    robot = build.build()
+    start = robot.closed(robot.state({}, {"crank": 4.0}))
+    simulation = hs.Simulation(robot, state=start, method=method)
+    simulation.advance(0.02)
+    before = simulation.state
+    assert np.abs(before.v).min() > 0.5
+    simulation.braked = ["crank", "rocker"]
+    simulation.advance(0.03)
+    np.testing.assert_allclose(simulation.state.q, before.q, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(simulation.state.v, 0.0, atol=1e-9)
+
+
 def test_an_impact_has_room_for_all_that_can_touch_and_all_brakes() -> None:
     """Compiled code writes beyond what has no room, and says nothing."""
     for robot in (pendulum(), standing_leg()):
