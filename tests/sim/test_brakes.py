@@ -14,6 +14,8 @@ from heelstrike.analysis import energy_balance
 from heelstrike.errors import RobotError, SimulationError
 from heelstrike.robot import Robot, RobotBuilder
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.memory import allocate_memory
+from heelstrike.sim.time_stepping.impact import allocate_impact
 
 MASS, LENGTH, INERTIA = 2.0, 0.8, 0.05
 ABOUT_PIVOT = INERTIA + MASS * LENGTH**2
@@ -145,8 +147,41 @@ def test_a_brake_takes_hold_with_the_ground_under_the_foot() -> None:
         simulation.advance(0.04)
         found[name] = simulation.state.v.copy()
         assert np.abs(simulation.state.v[3:]).max() < 1e-10
+        # What rests and goes on resting has no energy to tell rounding by; the brakes have.
+        kinds = {event.kind for event in simulation.record.events}
+        assert EventKind.ENERGY_GAIN not in kinds
     away = {name: np.abs(found[name] - found["event-driven"]).max() for name in ("coarse", "fine")}
     assert away["fine"] < 0.05 * away["coarse"] < 0.05
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_two_brakes_stop_a_loop_that_one_would_stop(method: Any) -> None:
+    """Four bars have one way to move: brakes of crank and rocker are told the same twice."""
+    build = RobotBuilder("four_bar")
+    crank = build.hinge("crank", None, mass=1.0, inertia=0.02, center_of_mass=(0, 0.1))
+    coupler = build.hinge("coupler", crank, at=(0, 0.2), mass=1.5, inertia=0.08)
+    rocker = build.hinge("rocker", None, at=(0.5, 0), mass=1.2, inertia=0.05)
+    build.loop(coupler, rocker, at=(0.5, 0.3))
+    build.brake("crank")
+    build.brake("rocker")
+    robot = build.build()
+    start = robot.closed(robot.state({}, {"crank": 4.0}))
+    simulation = hs.Simulation(robot, state=start, method=method)
+    simulation.advance(0.02)
+    before = simulation.state
+    assert np.abs(before.v).min() > 0.5
+    simulation.braked = ["crank", "rocker"]
+    simulation.advance(0.03)
+    np.testing.assert_allclose(simulation.state.q, before.q, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(simulation.state.v, 0.0, atol=1e-9)
+
+
+def test_an_impact_has_room_for_all_that_can_touch_and_all_brakes() -> None:
+    """Compiled code writes beyond what has no room, and says nothing."""
+    for robot in (pendulum(), standing_leg()):
+        impact, candidates = allocate_impact(robot), allocate_memory(robot).assembly.candidate
+        assert impact.member.shape == candidates.shape
+        assert impact.problem.set.shape == candidates.shape
 
 
 def test_brakes_are_named_where_there_are_none(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -282,6 +283,15 @@ def test_a_snapshot_of_something_else_is_refused(change: dict[str, Any], words: 
     another = hs.Simulation(rabbit, state=rabbit.reference_state())
     with pytest.raises(hs.SimulationError, match="another robot"):
         another.restore(kept)
+
+
+def test_snapshots_of_an_older_layout_are_refused_for_that(tmp_path: Path) -> None:
+    """Before points could touch two faces, arrays were shorter; such a file is not damaged."""
+    kept = simulation("time stepping").snapshot()
+    identity = np.array(json.dumps({"format": 1, **kept.identity}))
+    np.savez(tmp_path / "old.npz", identity=identity, **kept.arrays)
+    with pytest.raises(hs.SimulationError, match="layout 1, this version of heelstrike reads 2"):
+        hs.load_snapshot(tmp_path / "old.npz")
 
 
 def test_files_that_are_no_snapshots_are_refused(tmp_path: Path) -> None:

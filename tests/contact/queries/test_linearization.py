@@ -89,6 +89,27 @@ def test_impacts_have_exact_derivatives() -> None:
     np.testing.assert_allclose(found.reset, np.transpose(by_state), atol=1e-6)
 
 
+def test_an_impact_throws_only_what_comes_down() -> None:
+    """One end of a bar comes down, the other is on its way up and is held by the impact."""
+    builder = hs.RobotBuilder("bar")
+    bar = builder.floating_base("bar", (0.0, 0.1), mass=2.0, inertia=0.02)
+    for x in (-0.1, 0.1):
+        builder.contact(bar, (x, -0.1))
+    robot, q, v = builder.build(), np.array([0.0, 0.1, 0.0]), np.array([0.0, -0.2, -6.0])
+    ground = hs.Ground(friction=0.0, restitution=0.5)
+    np.testing.assert_allclose(
+        hs.contact_kinematics(robot, q, v, ground).velocity[:, 0], [-0.8, 0.4], atol=1e-12
+    )
+    struck = hs.ActiveContacts(sliding=((0, 1), (1, 1)))
+    found = hs.linearize_impact(robot, q, v, struck, ground=ground)
+    after = hs.contact_kinematics(robot, q, found.velocity, ground)
+    np.testing.assert_allclose(after.velocity[:, 0], [0.4, 0.0], atol=1e-12)
+    before = hs.contact_kinematics(robot, q, v, ground)
+    thrown = after.jacobian[:, 0] @ found.reset[3:, 3:]
+    np.testing.assert_allclose(thrown[0], -0.5 * before.jacobian[0, 0], atol=1e-12)
+    np.testing.assert_allclose(thrown[1], 0.0, atol=1e-12)
+
+
 def test_a_point_that_slides_pulls_against_its_motion() -> None:
     """Sliding forward, the friction of a foot gives less to the trunk than rolling without it."""
     robot = walking.bravo7()

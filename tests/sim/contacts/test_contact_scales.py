@@ -60,6 +60,23 @@ def test_each_runner_of_a_sledge_rubs_by_its_own_coefficient(method: Any) -> Non
     assert abs(energy_balance(run).residual[-1]) < 5e-3
 
 
+@pytest.mark.parametrize("scales", [(0.0, 1.0), (1.0, 0.0)])
+def test_a_sledge_with_one_smooth_runner_comes_to_rest_on_the_other(
+    scales: tuple[float, float],
+) -> None:
+    """It is in the same group of contacts as the rough one, whichever comes first."""
+    robot, slope = sledge(*scales), 0.1
+    ground = hs.Ground(friction=0.6, slope=-slope)
+    lying = robot.placed(robot.state({"root_pitch": slope}), ground)
+    for speed in (0.0, 0.1):
+        start = hs.State(lying.q, [speed * np.cos(slope), -speed * np.sin(slope), 0.0])
+        run = hs.simulate(robot, state=start, duration=0.2, method=METHODS[0], ground=ground)
+        assert run.completed, run.message
+        np.testing.assert_allclose(run.velocity[-1], 0.0, atol=1e-9)
+        held = -3.0 * 9.81 * np.sin(slope) * np.array(scales)
+        np.testing.assert_allclose(run.contact_force[-1, :, 1], held, atol=1e-6)
+
+
 @pytest.mark.parametrize("method", METHODS[:2], ids=str)
 def test_a_scale_holds_on_every_segment(method: Any) -> None:
     """Over a joint of two segments, level, so that nothing else changes."""

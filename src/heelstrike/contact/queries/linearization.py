@@ -327,9 +327,11 @@ def _equations(
     motion[robot.model.actuator_joint] -= symbols(torque)
     moved = casadi.vertcat(expression(motion) - pushes.T @ force, rows @ acceleration + bias)
     mass = expression(at.mass_matrix())
+    came = rows @ v
+    # Points that are on their way up are not thrown down.
+    thrown = casadi.DM(bounces) * (came < GRAZING) * came
     collided = casadi.vertcat(
-        mass @ (acceleration - v) - pushes.T @ force,
-        rows @ acceleration + casadi.diag(casadi.DM(bounces)) @ (rows @ v),
+        mass @ (acceleration - v) - pushes.T @ force, rows @ acceleration + thrown
     )
     unknown = casadi.vertcat(acceleration, force)
     ways = unknown, casadi.vertcat(q, v), torque

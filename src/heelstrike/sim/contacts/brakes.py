@@ -37,12 +37,12 @@ def awaits_hold(loops: Loops) -> bool:
 
 @kernel
 def take_hold(loops: Loops) -> bool:
-    """Let the brakes hold that have been put on; return whether there are any."""
+    """Let the brakes hold that have been put on; return whether any takes hold."""
     found = False
     for brake in range(loops.braked.shape[0]):
         if loops.braked[brake] == PUT_ON:
             loops.braked[brake] = TAKES_HOLD
-            found = True
+        found = found or loops.braked[brake] == TAKES_HOLD
     return found
 
 

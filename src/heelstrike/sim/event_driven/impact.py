@@ -100,7 +100,7 @@ def collide(
     note_residual(assembly.answer.residual, memory.tally)
     made = 0.0
     through = 0.0
-    for row in range(2 * count):
+    for row in range(2 * total):
         work = impulse[row] * row_product(jacobian, row, v)
         made += work
         through += abs(work)
@@ -118,6 +118,10 @@ def collide(
         rests = normal <= REST or phase.plastic[contact] == AT_REST
         phase.closed[contact] = 1 if rests else 0
         phase.slide[contact] = heading(tangent) if rests else 0
+    for row in range(2 * count, 2 * total):  # what brakes take is not made by contacts at rest
+        work = impulse[row] * row_product(jacobian, row, v)
+        made += work
+        through += abs(work)
     for dry in range(phase.dry_joint.shape[0]):
         phase.slide[phase.first_dry + dry] = heading(v[phase.dry_joint[dry]])
     return status == SOLVED, made / through if through > 0.0 else 0.0

@@ -73,7 +73,7 @@ def form_groups(
             continue
         if phase.closed[leader] == 1 and phase.group[leader] == leader:
             find_carriers(model, contacts, leader, phase)
-            if phase.slide[leader] == 0 and friction[leader] > 0.0:
+            if agree(leader, friction, phase) and phase.slide[leader] == 0:
                 phase.holder[leader] = 1
     for contact in range(phase.watched):
         if model.nc <= contact < phase.first_second:
@@ -113,7 +113,6 @@ def join_group(model: Model, contacts: Contacts, contact: int, phase: Phase) -> 
         its_x, its_z = normal_of(other, contacts, phase)
         if abs(its_x * z - its_z * x) < PARALLEL and its_x * x + its_z * z > 0.0:
             phase.group[contact] = other
-            phase.slide[contact] = phase.slide[other]
             return
 
 
@@ -147,6 +146,27 @@ def find_carriers(model: Model, contacts: Contacts, leader: int, phase: Phase) -
                 last = contact
     phase.carrier[first] = 1
     phase.carrier[last] = 1
+
+
+@kernel
+def agree(leader: int, friction: Floats, phase: Phase) -> bool:
+    """Let a group slide as its first point does; return whether one that carries it has friction.
+
+    What a point without friction does of itself says nothing of the others.
+    """
+    slide = phase.slide[leader]
+    rubs = friction[leader] > 0.0 and phase.carrier[leader] == 1
+    known = friction[leader] > 0.0
+    for contact in range(leader + 1, phase.watched):
+        carries = phase.group[contact] == leader and phase.carrier[contact] == 1
+        if carries and friction[contact] > 0.0:
+            slide = slide if known else phase.slide[contact]
+            rubs, known = True, True
+    for contact in range(leader + 1, phase.watched):
+        if phase.closed[contact] == 1 and phase.group[contact] == leader:
+            phase.slide[contact] = slide
+    phase.slide[leader] = slide
+    return rubs
 
 
 @kernel

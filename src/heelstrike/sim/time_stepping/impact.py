@@ -32,7 +32,7 @@ from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.modes import OPEN, SOLVED
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
-from heelstrike.dynamics.loops import count_rows
+from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.closed_sets import EventKind
@@ -95,7 +95,7 @@ class Impact(Bundle):
 
 def allocate_impact(robot: Robot) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
-    capacity = contact_capacity(robot) + robot.nc + count_rows(robot.model)
+    capacity = contact_capacity(robot) + robot.nc + most_rows(robot.model)
     places = 2 * (robot.nc + robot.nv)
     return Impact.allocate(
         nv=robot.nv,

@@ -264,6 +264,20 @@ def add_springs(
         added[i] = ahead * (damping[i] + ahead * stiffness[i])
 
 
+@kernel
+def find_loops_of_step(model: Model, memory: Memory) -> None:
+    """Find the rows of loops and brakes.
+
+    Where brakes take hold the velocity that J̇ v is of ends: brakes that stop a loop twice over
+    could not meet it.
+    """
+    loops = memory.loops
+    stops = take_hold(loops)
+    find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
+    for row in range(loops.rows.bias.shape[0] if stops else 0):
+        loops.rows.bias[row] = 0.0
+
+
 @dissolved_kernel
 def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -> None:
     """Kinematics, contact points, mass matrix and bias force of the state now."""
@@ -274,8 +288,7 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
-    take_hold(memory.loops)
-    find_loops(model, memory.q, memory.v, equations.tree, memory.loops)
+    find_loops_of_step(model, memory)
     if ground.concave == 1:
         locate_corners(model, ground, equations.tree, work.impact.corner)
 
