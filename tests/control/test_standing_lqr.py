@@ -152,7 +152,7 @@ def test_advice_is_true() -> None:
     assert hs.StandingLQR(robot, robot.standing(hs.Ground()).q).poles.real.max() < 0.0
     most = np.full(robot.nu, 40.0)
     weak = replace(robot, model=robot.model.replaced(torque_upper=most, torque_lower=-most))
-    with pytest.raises(ControllerError, match="torque limit.*Bring its joints nearer to straight"):
+    with pytest.raises(ControllerError, match=r"torque limit.*Bring its joints nearer to straight"):
         hs.StandingLQR(weak, crouch())
     assert hs.StandingLQR(weak).poles.real.max() < 0.0
 
