@@ -44,6 +44,8 @@ def test_no_step_suits_a_robot_without_feet(bravo7: hs.Robot) -> None:
             contact_link=model.contact_link[:0],
             contact_position=model.contact_position[:0],
             contact_radius=model.contact_radius[:0],
+            friction_scale=model.friction_scale[:0],
+            restitution_scale=model.restitution_scale[:0],
         ),
     )
     with pytest.raises(hs.GaitError, match="'footless' has no contact points"):

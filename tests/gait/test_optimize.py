@@ -416,6 +416,8 @@ def robot_without(robot: hs.Robot, what: str) -> hs.Robot:
         contact_link=np.zeros(0, np.int64),
         contact_position=np.zeros((0, 2)),
         contact_radius=np.zeros(0),
+        friction_scale=np.zeros(0),
+        restitution_scale=np.zeros(0),
     )
     return dataclasses.replace(robot, model=model, feet=())
 

@@ -19,6 +19,8 @@ def with_contacts(robot: hs.Robot, position: list[list[float]], radius: list[flo
         contact_link=np.full(count, robot.feet[0].link),
         contact_position=np.array(position),
         contact_radius=np.array(radius),
+        friction_scale=np.ones(count),
+        restitution_scale=np.ones(count),
     )
     foot = dataclasses.replace(robot.feet[0], contacts=tuple(range(count)))
     return dataclasses.replace(robot, model=model, feet=(foot, robot.feet[1]))

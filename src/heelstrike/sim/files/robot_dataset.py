@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.robot.model import NUMBERS, SELDOM, Model
+from heelstrike.robot.model import NUMBERS, SCALES, SELDOM, Model, bounds
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.shapes.outlines import Outline
 from heelstrike.robot.sides.mirror import Mirror
@@ -176,8 +176,8 @@ def _check(robot: Robot) -> None:
     }
     for name, number in NUMBERS.items():
         values = np.asarray(getattr(model, name))
-        if number.shape == ("nc",) and np.any((values < number.least) | (values > number.most)):
-            raise DamageError(f"{name} must lie between {number.least:g} and {number.most:g}")
+        if name in SCALES and not np.all((values >= number.least) & (values <= number.most)):
+            raise DamageError(f"{name} must be {bounds(name)}")
         if number.points:
             high = model.extents[number.points]
             astray[name] = astray.get(name) or np.any((values < number.least) | (values >= high))
