@@ -53,6 +53,9 @@ LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
     ),
     "JointPD": lambda: on_flat_feet(lambda *given: hs.JointPD(*given, kp=1000.0, kd=20.0)),
     "StandingLQR": lambda: standing(hs.StandingLQR),
+    "SteppingConstraints": lambda: on_points(
+        lambda gait: hs.SteppingConstraints(hs.StepFamily.around(gait))
+    ),
     "VirtualConstraints": lambda: on_points(hs.VirtualConstraints),
     "WholeBody": lambda: on_flat_feet(hs.WholeBody),
     "ZeroMomentPointRegulation": lambda: on_flat_feet(hs.ZeroMomentPointRegulation),

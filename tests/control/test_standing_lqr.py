@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -108,8 +110,8 @@ def test_other_robots_stand(name: str) -> None:
     np.testing.assert_allclose(run.final_state.q, q, atol=1e-4)
 
 
-def in_the_air(q: np.ndarray) -> np.ndarray:
-    return q + 0.01 * np.eye(9)[1]
+def in_the_air(q: np.ndarray, height: float = 0.01) -> np.ndarray:
+    return q + height * np.eye(9)[1]
 
 
 def leaning(q: np.ndarray) -> np.ndarray:
@@ -127,7 +129,9 @@ def leaning(q: np.ndarray) -> np.ndarray:
     ("posture", "options", "said"),
     [
         (in_the_air, {}, "does not stand in this posture: .* 0.01 m above the ground"),
-        (leaning, {}, "cannot rest in this posture"),
+        (lambda q: in_the_air(q, -0.01), {}, "0.01 m below the ground"),
+        (lambda q: np.nan * q, {}, "a posture is of finite numbers"),
+        (leaning, {}, "cannot rest in this posture.*centre of mass over its feet"),
         (None, {"torque_weight": 0.0}, "torque_weight must be positive"),
         (None, {"position_weight": [1.0, 2.0]}, "position_weight must be one number"),
         (None, {"velocity_weight": -1.0}, "velocity_weight must be one number"),
@@ -138,3 +142,32 @@ def test_what_cannot_stand_is_refused(posture: Any, options: Any, said: str) -> 
     q = crouch() if posture is None else posture(crouch())
     with pytest.raises(ControllerError, match=said):
         hs.StandingLQR(walking.bravo7(), q, **options)
+
+
+def test_advice_is_true() -> None:
+    """The state that a refusal names stands; joints that are too weak crouched hold straight."""
+    robot = walking.bravo7()
+    with pytest.raises(ControllerError, match=re.escape("robot.standing(hs.Ground()).q")):
+        hs.StandingLQR(robot, in_the_air(crouch()))
+    assert hs.StandingLQR(robot, robot.standing(hs.Ground()).q).poles.real.max() < 0.0
+    most = np.full(robot.nu, 40.0)
+    weak = replace(robot, model=robot.model.replaced(torque_upper=most, torque_lower=-most))
+    with pytest.raises(ControllerError, match=r"torque limit.*Bring its joints nearer to straight"):
+        hs.StandingLQR(weak, crouch())
+    assert hs.StandingLQR(weak).poles.real.max() < 0.0
+
+
+@pytest.mark.parametrize("period", [1e-3, None])
+def test_without_motors_nothing_stands(period: float | None) -> None:
+    robot = hs.load_robot("compass_gait")
+    with pytest.raises(ControllerError, match="has no motors"):
+        hs.StandingLQR(robot, period=period)
+
+
+def test_motors_that_do_not_reach_what_falls_are_refused() -> None:
+    """Two pendulums upright beside each other, of which one has a motor."""
+    build = hs.RobotBuilder("apart")
+    for name, torque in (("free", None), ("driven", 100.0)):
+        build.hinge(name, None, mass=1.0, inertia=0.1, center_of_mass=(0.0, 0.5), torque=torque)
+    with pytest.raises(ControllerError, match="do not reach what falls"):
+        hs.StandingLQR(build.build())

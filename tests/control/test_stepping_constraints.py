@@ -178,6 +178,17 @@ def test_it_stands_what_the_law_without_feedback_does_not() -> None:
         assert bool(trial(law).recovered(pushed, (began, began + 0.1))) is stands
 
 
+def test_it_walks_on_ground_that_gives_way() -> None:
+    """There an impact takes a while: velocities before it are not what a step begins with."""
+    law, robot = hs.SteppingConstraints(family()), family().gait.robot
+    start, method = zero().initial_state, hs.Compliant()
+    run = hs.simulate(robot, law, state=start, duration=2.0, method=method)
+    assert run.completed, run.message
+    usual = run.time[-1] * zero().step_length / zero().period
+    assert run.final_state.q[0] - start.q[0] == pytest.approx(usual, rel=0.05)
+    assert np.abs(run.torque).max() < 0.5 * robot.model.torque_upper.max()
+
+
 def test_it_keeps_its_speed_down_a_slope() -> None:
     """Of seven degrees, which takes a third of it from the law without feedback."""
     down = hs.Ground(profile=np.array([(-1.0, 0.0), (1.25, 0.0), (101.25, -12.5)]))

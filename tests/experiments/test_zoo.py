@@ -406,6 +406,11 @@ def test_the_figure_has_a_panel_a_disturbance_and_a_mark_a_cell(tmp_path: Path) 
     ]  # fmt: skip
     names = [label.get_text() for label in panels[0].get_yticklabels()]
     assert names == ["bravo7", "rabbit"]
+    (arrow,) = [
+        each for each in figure.legends[0].legend_handles
+        if each is not None and each.get_label() == "more was not tried"
+    ]  # fmt: skip
+    assert "$" not in str(arrow.get_marker())  # type: ignore[attr-defined]
     drawn = len(CONTROLLERS) - 1  # springs cannot drive them: no row at all
     for axes, disturbance in zip(panels, DISTURBANCES, strict=True):
         crosses = [line for line in axes.lines if line.get_marker() == "x"]

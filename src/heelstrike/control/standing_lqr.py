@@ -115,16 +115,15 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
         robot can move.
     """
     refuse_loops(robot, "a regulator of standing", ControllerError)
+    if not robot.nu:
+        raise ControllerError(f"robot {robot.name!r} has no motors to stand by")
     q, rest = np.asarray(posture, dtype=np.float64), np.zeros(robot.nv)
+    if not np.all(np.isfinite(q)):
+        raise ControllerError(f"a posture is of finite numbers, got {q.tolist()}")
     kinematics = contact_kinematics(robot, q, rest)
     touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < TOUCHING))
     if not touching and robot.floating:
-        raise ControllerError(
-            f"robot {robot.name!r} does not stand in this posture: its lowest contact point is "
-            f"{kinematics.gap.min():.3g} m above the ground. robot.standing() puts its feet there."
-            if robot.nc
-            else f"robot {robot.name!r} has no contact points to stand on"
-        )
+        _refuse_what_floats(robot, kinematics.gap)
     held = contact_inverse_dynamics(robot, q, rest, rest, contacts=touching)
     _refuse_what_falls(robot, held)
     jacobian = kinematics.jacobian[list(touching)].reshape(-1, robot.nv)
@@ -139,12 +138,25 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
     )
 
 
+def _refuse_what_floats(robot: Robot, gap: Floats) -> None:
+    if not robot.nc:
+        raise ControllerError(f"robot {robot.name!r} has no contact points to stand on")
+    side = "above" if gap.min() > 0.0 else "below"
+    raise ControllerError(
+        f"robot {robot.name!r} does not stand in this posture: its lowest contact point is "
+        f"{abs(gap.min()):.3g} m {side} the ground. In robot.standing(hs.Ground()).q its feet are "
+        "on it"
+    )
+
+
 def _refuse_what_falls(robot: Robot, held: ContactInverseDynamics) -> None:
-    if not held.feasible:
-        raise ControllerError(
-            f"robot {robot.name!r} cannot rest in this posture: {held.message}. Bring its centre "
-            "of mass over its feet"
-        )
+    if held.feasible:
+        return
+    strong = not np.any(held.torque_excess > 0.0)
+    advice = "its centre of mass over its feet" if strong else "its joints nearer to straight"
+    raise ControllerError(
+        f"robot {robot.name!r} cannot rest in this posture: {held.message}. Bring {advice}"
+    )
 
 
 class StandingLQR(Law):
@@ -254,5 +266,10 @@ def _regulator(
             f"no regulator makes robot {robot.name!r} stand in this posture: its motors do not "
             f"reach what falls, or weights leave it without cost ({error})"
         ) from None
+    if not np.all(poles.real < 0.0):
+        raise ControllerError(
+            f"no regulator makes robot {robot.name!r} stand in this posture: its motors do not "
+            "reach what falls"
+        )
     order = np.argsort(poles.real)[::-1]
     return gain, poles[order].astype(complex)

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
+from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
 from heelstrike.control.virtual_constraints import (
     demand,
     gains_of,
@@ -108,6 +109,8 @@ class Memory(Bundle):
         The foot that stands.
     begun : int
         Whether the step has begun.
+    landed : int
+        Whether the foot that stands is past the impact with which it came down.
     slope : float
         Slope that is believed, in steepest ones.
     before, shift : float
@@ -126,6 +129,7 @@ class Memory(Bundle):
 
     stance: int = cell(int)
     begun: int = cell(int)
+    landed: int = cell(int)
     slope: float = cell(float)
     before: float = cell(float)
     shift: float = cell(float)
@@ -272,7 +276,7 @@ def begin_step(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
     memory: Memory,
 ) -> None:  # fmt: skip
-    """Look at the footholds, and note how far the joints are from the gait."""
+    """Look at the footholds: which gait of the family begins here."""
     here = robot.foot_contact[memory.stance]
     there = robot.foot_contact[1 - memory.stance]
     length = contacts.position[here, 0] - contacts.position[there, 0]
@@ -282,16 +286,32 @@ def begin_step(
         found = min(max(found / parameters.steepest, -1.0), 1.0)
         memory.slope += parameters.trust * (found - memory.slope)
     take_slope(parameters, memory)
+    theta, _ = phase_and_rate(state, parameters.phase, memory.stance)
+    memory.before = shift_at_end(memory, theta) if landed else 0.0
+    memory.begun = 1
+    memory.landed = 0
+
+
+@kernel
+def note_missing(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Note how far the joints are from the gait, until the impact that began the step is over.
+
+    Where the ground gives way, velocities before it are seen, and between.
+    """
     theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
     rate = max(rate, LEAST_RATE * parameters.rate)
-    memory.before = shift_at_end(memory, theta) if landed else 0.0
     memory.start = theta
     follow(memory, theta, memory.before, 0.0, 0.0)
     for i in range(robot.nu):
         memory.missing[i] = state.joint_position[i] - memory.value[i]
         memory.bend[i] = state.joint_velocity[i] / rate - memory.gradient[i]
         memory.bend[i] *= 2.0 * FADES * memory.half[0]
-    memory.begun = 1
+    here = robot.foot_contact[memory.stance]
+    speed = approaching_speed(state.kinematics, contacts, robot.foot_link[memory.stance], here)
+    memory.landed = 1 if speed < LANDED_SPEED else 0
 
 
 @kernel
@@ -369,6 +389,8 @@ def stepping_constraints(
     if memory.begun == 0 or lands(state, contacts, robot, parameters, memory):
         memory.stance = memory.stance if memory.begun == 0 else 1 - memory.stance
         begin_step(state, contacts, robot, parameters, memory)
+    if memory.landed == 0:
+        note_missing(state, contacts, robot, parameters, memory)
     theta, rate = phase_and_rate(state, parameters.phase, memory.stance)
     half = memory.half[0]
     x = (theta - memory.middle[0]) / half

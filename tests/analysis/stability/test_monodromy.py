@@ -123,11 +123,43 @@ def lags(t, state, memory: Lag, torque):
     torque[0] = -1e-4 * memory.rate
 
 
+class Note(hs.Bundle):
+    begun: int = hs.cell(int)
+    told: float = hs.cell(float)
+
+
+@hs.controller
+def notes(state, memory: Note, torque):
+    """Brake by what the rate was as the step began."""
+    if memory.begun == 0:
+        memory.begun = 1
+        memory.told = state.joint_velocity[0]
+    torque[0] = -1e-4 * memory.told
+
+
 class Silent:
     """A controller in Python, which is called every millisecond."""
 
     def torque(self, t: float, state: hs.State, contacts: object) -> NDArray[np.float64]:
         return np.zeros(6)
+
+
+@hs.controller
+def stiff(state, torque):
+    torque[0] = -1e6 * state.joint_position[0]
+
+
+def test_a_stiff_law() -> None:
+    """A spring of 1000 rad/s swings thrice in 20 ms, of which a usual stretch is too long."""
+    build = hs.RobotBuilder("spring")
+    build.hinge("joint", None, mass=1.0, inertia=1.0, center_of_mass=(0.0, 0.0), torque=1e3)
+    robot = build.build()
+    law, still = stiff(), hs.State(np.zeros(1), np.zeros(1))
+    rest = hs.Simulation(robot, law, state=still, method=hs.EventDriven())
+    found = Variation(rest, law).flow(0.0, 0.02, hs.ActiveContacts())
+    cosine, sine = np.cos(20.0), np.sin(20.0)
+    turned = [[cosine, 1e-3 * sine], [-1e3 * sine, cosine]]
+    np.testing.assert_allclose(found, turned, rtol=1e-7)
 
 
 def vary(controller: Any) -> None:
@@ -148,3 +180,5 @@ def test_what_cannot_be_linearised() -> None:
         vary(Silent())
     with pytest.raises(hs.SimulationError, match=r"memory\.rate changes within a step"):
         vary(lags())
+    with pytest.raises(hs.SimulationError, match=r"memory\.told keeps something of the state"):
+        vary(notes())

@@ -64,3 +64,11 @@ def test_the_compass_on_one_higher_foothold() -> None:
         error = step.matrix @ error
     np.testing.assert_allclose(measured, predicted, atol=1e-4)
     assert step.gait_sensitivity_norm == pytest.approx(np.linalg.norm(measured), rel=1e-5)
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_numbers_that_are_not_finite(place: int) -> None:
+    given = [np.array([[0.5]]) for _ in range(4)]
+    given[place][...] = np.nan
+    with pytest.raises(hs.SimulationError, match="finite numbers"):
+        hs.gait_sensitivity_norm(*given)

@@ -40,7 +40,7 @@ def gait_sensitivity_norm(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike
     Raises
     ------
     SimulationError
-        If shapes do not fit.
+        If shapes do not fit, or a number is not finite.
 
     Examples
     --------
@@ -63,6 +63,8 @@ def gait_sensitivity_norm(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike
             f"A (m, m), B (m, k), C (l, m) and D (l, k) do not fit: got shapes {state.shape}, "
             f"{given.shape}, {seen.shape} and {through.shape}"
         )
+    if not all(np.all(np.isfinite(each)) for each in (state, given, seen, through)):
+        raise SimulationError("A, B, C and D must be of finite numbers")
     if np.abs(np.linalg.eigvals(state)).max(initial=0.0) >= 1.0:
         return float("inf")
     gramian = solve_discrete_lyapunov(state.T, seen.T @ seen)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +24,9 @@ Floats = NDArray[np.float64]
 PANEL = 0.005
 """Longest stretch of time (s) that is taken at once: gaits are smooth by pieces only."""
 
+FASTEST = 0.5
+"""Longest stretch in parts of the time in which the fastest error of the closed loop changes."""
+
 STAGES = 4
 """Gauss's nodes in it: collocation of order 8."""
 
@@ -31,6 +35,11 @@ DISTURBANCE = 3e-6
 
 PRESSED = 1e-3
 """Change of a number that a law remembers, by which is seen whether torques hang on it."""
+
+
+def _rate(slope: Floats) -> float:
+    """Largest rate (1/s) of errors; not zero."""
+    return max(float(np.abs(np.linalg.eigvals(slope)).max()), 1.0)
 
 
 def _collocation() -> tuple[Floats, Floats, Floats]:
@@ -68,6 +77,7 @@ class Variation:
         self._simulation = simulation
         self._robot, self._ground = simulation.robot, simulation.ground
         self._asked: AskedLaw | None = None
+        self._first: _Instant | None = None
         self._constant: dict[str, float] = {}
         if controller is None:
             return
@@ -83,15 +93,15 @@ class Variation:
                 "hs.find_limit_cycle takes differences instead"
             )
         self._asked = AskedLaw(self._robot, law, compiled=True)
+        self._first = replace(self._instant(), numbers=self._asked.snapshot())
 
     def flow(self, begin: float, end: float, active: ActiveContacts) -> Floats:
         """Return what the motion from one time to another does to errors, (nq + nv, nq + nv)."""
         size = self._robot.nq + self._robot.nv
         error = np.eye(size)
-        panels = max(1, int(np.ceil((end - begin) / PANEL)))
-        span = (end - begin) / panels
-        for panel in range(panels):
-            start = begin + panel * span
+        start, fastest = begin, self._fastest(begin, active)
+        while (left := end - start) > 0.0:
+            span = left / np.ceil(left / min(PANEL, FASTEST / fastest))
             self._check_memory(start + span * NODES[0])
             slopes = [self._slope(start + span * node, active) for node in NODES]
             system = np.eye(STAGES * size)
@@ -101,7 +111,14 @@ class Variation:
             rates = np.linalg.solve(system, np.vstack([slope @ error for slope in slopes]))
             stages = rates.reshape(STAGES, size, size)
             error = error + span * np.tensordot(WEIGHTS, stages, axes=1)
+            fastest = _rate(slopes[-1])
+            start = end if span == left else start + span
+        self._check_beginning()
         return error
+
+    def _fastest(self, time: float, active: ActiveContacts) -> float:
+        """How fast errors change at the beginning of a flow (1/s)."""
+        return _rate(self._slope(time, active))
 
     def _slope(self, time: float, active: ActiveContacts) -> Floats:
         """Derivative of the closed loop's rate by the state."""
@@ -123,31 +140,64 @@ class Variation:
         force = simulation.contacts.force
         return _Instant(self._asked, numbers, simulation.time, state, at, force)
 
+    def _check_beginning(self) -> None:
+        """Refuse a law that acts on what it made of the state in which the step began."""
+        if self._first is None:
+            return
+        first, asked, self._first = self._first, self._first.asked, None
+        changes = DISTURBANCE * np.eye(self._robot.nq + self._robot.nv)
+        first.torque()
+        usual = self._remembered()
+        then = replace(first, numbers=asked.snapshot())
+        seen = []
+        for change in changes:
+            first.torque(change)
+            seen.append(self._remembered())
+        for label, held in usual.items():
+            if any(each[label] != held for each in seen) and self._acts_on(label, then):
+                raise SimulationError(
+                    f"the controller's memory.{label} keeps something of the state in which the "
+                    "step begins and its torques hang on it, which is not linearised here. "
+                    "hs.find_limit_cycle takes differences instead"
+                )
+
     def _check_memory(self, time: float) -> None:
         """Refuse a law that acts on something that changes within the step: a state of its own."""
         if self._asked is None:
             return
         self._simulation.advance(time)
-        instant, asked = self._instant(), self._asked
-        usual = instant.torque()
-        asked.restore(instant.numbers)
-        for name, member, values in asked.numbers.memory.views():
-            if member.kind is not float:
+        instant = self._instant()
+        self._asked.restore(instant.numbers)
+        for label, held in self._remembered().items():
+            if self._constant.setdefault(label, held) == held:
                 continue
-            for place in np.ndindex(values.shape):
-                label = f"{name}{list(place) if place else ''}"
-                held = float(values[place])
-                if self._constant.setdefault(label, held) == held:
-                    continue
-                values[place] = held + PRESSED
-                pressed = replace(instant, numbers=asked.snapshot())
-                if not np.array_equal(pressed.torque(), usual):
-                    raise SimulationError(
-                        f"the controller's memory.{label} changes within a step and its torques "
-                        "hang on it: it is a state of its own, which is not linearised here. "
-                        "hs.floquet_multipliers takes differences of whole steps instead"
-                    )
-                asked.restore(instant.numbers)
+            if self._acts_on(label, instant):
+                raise SimulationError(
+                    f"the controller's memory.{label} changes within a step and its torques "
+                    "hang on it: it is a state of its own, which is not linearised here. "
+                    "hs.floquet_multipliers takes differences of whole steps instead"
+                )
+
+    def _remembered(self) -> dict[str, float]:
+        """The numbers of the law's memory now, by name."""
+        return {label: float(values[place]) for label, values, place in self._numbers()}
+
+    def _numbers(self) -> Iterator[tuple[str, Floats, tuple[int, ...]]]:
+        assert self._asked is not None
+        for name, member, values in self._asked.numbers.memory.views():
+            if member.kind is float:
+                for place in np.ndindex(values.shape):
+                    yield f"{name}{list(place) if place else ''}", values, place
+
+    def _acts_on(self, wanted: str, instant: _Instant) -> bool:
+        """Whether torques hang on a number of the memory at an instant."""
+        usual = instant.torque()
+        instant.asked.restore(instant.numbers)
+        for label, values, place in self._numbers():
+            if label == wanted:
+                values[place] += PRESSED
+        pressed = replace(instant, numbers=instant.asked.snapshot())
+        return not np.array_equal(pressed.torque(), usual)
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class ZeroMomentPointRegulation(Law):
     hurry : float
         Greatest change |s̈| of the clock's rate (1/s).
     slowest, fastest : float
-        Bounds of the clock's rate.
+        Bounds of the clock's rate, from 0 to 1 and from 1 on.
     bandwidth : float or None
         Frequency (Hz) up to which the law feels what pushes the robot, by velocities, torques and
         contact forces; None for not at all.
@@ -151,10 +151,10 @@ def _check_numbers(
             f"margin must be from 0 to less than half the sole of robot {robot.name!r}, "
             f"{half:.4g} m, got {margin!r}"
         )
-    if not rates[0] <= 1.0 <= rates[1]:
+    if not 0.0 <= rates[0] <= 1.0 <= rates[1]:
         raise ControllerError(
-            f"the clock's rate is 1 as it begins; slowest and fastest must lie about it, got "
-            f"{rates[0]!r} and {rates[1]!r}"
+            f"the clock's rate is 1 as it begins, and the clock never goes back; slowest and "
+            f"fastest must lie about 1, from 0 on, got {rates[0]!r} and {rates[1]!r}"
         )
     for name, value in positive.items():
         if not 0.0 < value < np.inf:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 from matplotlib.ticker import LogLocator, NullLocator
 
 from heelstrike.experiments.zoo.disturbances import Disturbance
@@ -25,6 +26,9 @@ GAP = 0.8
 
 CANNOT = ("needs ", "no ", "not on", "trunk is", "refused")
 """How words begin that say that a controller cannot drive a robot at all: it has no row."""
+
+ARROW = Path([(-1, 0), (1, 0), (0.3, 0.5), (1, 0), (0.3, -0.5)], [1, 2, 1, 2, 2])
+"""A marker of the legend; letters between dollars would be drawn as they are."""
 
 Row = tuple[str, str]
 """Robot, controller."""
@@ -147,7 +151,7 @@ def _legend(figure: Figure, looks: dict[str, tuple[str, str]], results: Results)
     ]
     style = {"color": GREY, "linestyle": "none", "markersize": 6.0}
     handles += [
-        Line2D([], [], marker=r"$\rightarrow$", label="more was not tried", **style),  # type: ignore[arg-type]
+        Line2D([], [], marker=ARROW, label="more was not tried", **style),  # type: ignore[arg-type]
         Line2D([], [], marker="x", label="fails undisturbed", **style),  # type: ignore[arg-type]
     ]
     trials = results.settings.trials
