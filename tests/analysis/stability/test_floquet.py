@@ -37,6 +37,7 @@ def test_two_steps_of_the_compass() -> None:
     assert found.period == pytest.approx(cycle.period, abs=1e-6)
     assert found.step_length == pytest.approx(cycle.step_length, abs=1e-6)
     assert found.residual < 1e-6
+    assert found.repeats
     assert found.coordinates == ("robot 1", "robot 2", "robot 3", "robot 4")
     assert "stable" in repr(found)
     assert next(iter(found.slowest)) in found.coordinates

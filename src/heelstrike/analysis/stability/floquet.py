@@ -64,8 +64,9 @@ class Floquet:
         this is one but for the error of the differences. None of a walk that a clock drives.
     multipliers : (n,) complex
         The others, of a return, largest first.
-    residual : float
-        Largest difference of position and velocity between two returns (m, rad, m/s, rad/s).
+    disturbance, residual : float
+        Size of the disturbances, and the largest difference of position and velocity between two
+        returns of the walk itself (m, rad, m/s, rad/s).
     neutral, one_sided, switched : tuple of str
         Numbers of the memory whose errors do nothing, which are left out; coordinates whose errors
         of either sign do different things, of which the mean counts: there the loop has a kink, and
@@ -82,6 +83,7 @@ class Floquet:
     step_length: float
     along: complex | None
     multipliers: NDArray[np.complex128]
+    disturbance: float
     residual: float
     neutral: tuple[str, ...]
     one_sided: tuple[str, ...]
@@ -111,6 +113,14 @@ class Floquet:
         return self.largest < 1.0
 
     @property
+    def repeats(self) -> bool:
+        """Whether the walk comes back to itself nearer than what it was disturbed by.
+
+        If not, the multipliers are not those of a walk that repeats itself, and may be of none.
+        """
+        return self.residual <= self.disturbance
+
+    @property
     def slowest(self) -> dict[str, float]:
         """What the slowest error is made of: shares of the coordinates, largest first."""
         values, vectors = np.linalg.eig(self.matrix)
@@ -122,10 +132,13 @@ class Floquet:
     _flow: Floats | None = None
 
     def __repr__(self) -> str:
+        verdict = "stable" if self.stable else "unstable"
+        if not self.repeats:
+            verdict = f"undecided, returns differ by {self.residual:.2g}"
         return (
             f"Floquet(largest factor {self.largest:.4g} ± {self.error:.1g} a step of "
             f"{self.period:.6g} s, {len(self.coordinates)} coordinates: "
-            f"{'stable' if self.stable else 'unstable'})"
+            f"{verdict})"
         )
 
 
@@ -224,10 +237,10 @@ def floquet_multipliers(
     walk = loop.follow(settling, returns, longest_step)
     section = Section(loop, walk.begins[0], walk.duration, memory)
     found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    return _combined(walk, section, found)
+    return _combined(walk, section, size, found)
 
 
-def _combined(walk: Walk, section: Section, found: list[Disturbed]) -> Floquet:
+def _combined(walk: Walk, section: Section, size: float, found: list[Disturbed]) -> Floquet:
     """Put returns together; leave out what stays without doing anything."""
     matrices = [each.matrix for each in found]
     mean = np.mean(matrices, axis=0)
@@ -250,6 +263,7 @@ def _combined(walk: Walk, section: Section, found: list[Disturbed]) -> Floquet:
         step_length=walk.length / walk.steps,
         along=along,
         multipliers=others,
+        disturbance=size,
         residual=max(each.residual for each in found),
         neutral=tuple(names[i] for i in inert),
         one_sided=tuple(names[i] for i in kept if names[i] in one_sided),

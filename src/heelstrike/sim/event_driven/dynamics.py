@@ -375,7 +375,8 @@ def evaluate(
     try_torque(model, control, q, v, memory.tally, memory.command, memory.torque)
     free_acceleration(model, state, memory.torque, phase, memory.pushes, equations)
     loops = rows_of(memory.loops)
-    find_loops(model, q, v, equations.tree, memory.loops)
+    if loops > 0:
+        find_loops(model, q, v, equations.tree, memory.loops)
     count = gather_closed(model, memory.contacts, phase, memory.loops, equations, assembly)
     phase.closed_count = count
     phase.saddle.needed = 0
@@ -451,7 +452,8 @@ def project(
     for attempt in range(5):
         observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
-        find_loops(model, q, v, equations.tree, memory.loops)
+        if loops > 0:
+            find_loops(model, q, v, equations.tree, memory.loops)
         count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
         total = count + loops
         if total == 0:

@@ -288,7 +288,8 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, work: Stepping) -
         add_springs(model, 0.5 * work.step, model.stiffness, model.damping, equations.added)
     evaluate_equations(model, memory.q, memory.v, equations)
     locate_contacts(model, ground, equations.tree, memory.contacts, memory.surface)
-    find_loops_of_step(model, memory)
+    if memory.loops.unknown.shape[0] > 0:
+        find_loops_of_step(model, memory)
     if ground.concave == 1:
         locate_corners(model, ground, equations.tree, work.impact.corner)
 
