@@ -215,3 +215,16 @@ def test_members_are_not_called_like_what_every_bundle_has(name: str) -> None:
     for member in (array(2), cell(int), number(float), extent()):
         with pytest.raises(TypeError, match=f"Some.{name}: every bundle has .* by the name"):
             type("Some", (Bundle,), {name: member})
+
+
+def test_a_class_keeps_its_type_however_many_there_are() -> None:
+    """Were it made anew, machine code for it would be looked for again at every call."""
+
+    def made(name: str) -> type[Bundle]:
+        return type(name, (Bundle,), {"size": number(float)})
+
+    first = made("First")
+    kind = first.compiled_type()
+    for k in range(300):
+        made(f"Other{k}").compiled_type()
+    assert first.compiled_type() is kind

@@ -17,7 +17,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -621,7 +621,7 @@ def _plan(cls: Any, given: frozenset[str], sizes: tuple[tuple[str, int], ...]) -
     )
 
 
-@lru_cache
+@cache
 def _settable(cls: Any) -> Any:
     numbers = {
         name: cell(member.kind, unit=member.unit, label=member.label)

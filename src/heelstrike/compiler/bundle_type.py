@@ -8,7 +8,7 @@ Only names of :mod:`numba.extending` are used here. How compiled code finds a me
 from __future__ import annotations
 
 import hashlib
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 from llvmlite import ir
@@ -112,7 +112,7 @@ class BundleType(types.Type):
         return made._getvalue()
 
 
-@lru_cache
+@cache  # for good: a type made anew would be another, and machine code for it compiled again
 def bundle_type(cls: Any) -> BundleType:
     """Return the type of a class of bundles."""
     kind: type[BundleType] = type(cls.__name__, (BundleType,), {})
@@ -154,7 +154,7 @@ def _unbox_bundle(_: BundleType, value: Any, c: Any) -> NativeValue:
     return NativeValue(c.builder.inttoptr(word.value, _WORD.as_pointer()), is_error=word.is_error)
 
 
-@lru_cache
+@cache
 def bundle_at(cls: Any) -> Any:
     """Return an intrinsic that returns the bundle of a class whose table is at an address."""
     name = bundle_type(cls).name

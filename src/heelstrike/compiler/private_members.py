@@ -6,7 +6,7 @@ Numba knows them no more: then every member that is read is a function to compil
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 from numba import typeof, types
@@ -29,7 +29,7 @@ def _read(context: Any, builder: Any, kind: BundleType, table: Any, name: str) -
     return kind.read(context, builder, table, name)
 
 
-@lru_cache
+@cache
 def _method(kind: BundleType, name: str) -> Any:
     """Type of a kernel of the class of a bundle, bound to the bundle."""
     if kind.method(name) is None:

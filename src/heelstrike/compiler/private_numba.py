@@ -35,6 +35,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
+from numba.core.sigutils import normalize_signature
 from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
 from numba.core.types.functions import BaseFunction
 from numba.core.untyped_passes import InlineClosureLikes
@@ -255,7 +256,10 @@ class _Cache(NullCache):
             parts = pickle.loads(found)
         except (AttributeError, ImportError):  # it calls kernels of modules that are not here now
             return None
-        return CompileResult._rebuild(context, *parts)
+        result = CompileResult._rebuild(context, *parts)
+        # Of types that only look alike Numba would not find it, and would load it at every call.
+        asked, _ = normalize_signature(signature)
+        return result if result.signature.args == asked else None
 
     def read(self, signature: Any) -> bytes | None:
         """Return what is kept for a signature, if there is something."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, ClassVar
 
 from numba import types
@@ -192,7 +192,7 @@ class FrictionLaw(ContactLaw):
         return 1e-4
 
 
-@lru_cache
+@cache
 def _numbers(law: Any, *names: str) -> type[Bundle]:
     """Bundle of the settings of a law."""
     return type(law.__name__, (Bundle,), {name: number(float) for name in names})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -180,7 +180,7 @@ class ReadyLaw:
 _NOWHERE = np.zeros(0, dtype=np.int64)
 
 
-@lru_cache
+@cache
 def _kept(memory: Any, log: Any) -> Any:
     """Class of what a law keeps from call to call."""
     return type("Kept", (Bundle,), {"memory": part(memory), "log": part(log)})
