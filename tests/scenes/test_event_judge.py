@@ -99,6 +99,17 @@ def test_impact_that_makes_energy() -> None:
     assert found.figures["energy gains named"] == 1
 
 
+def test_jam_that_makes_energy() -> None:
+    """Of what leads to a jump without a collision no more is asked."""
+    for bounce, made in ((0.9, False), (1.05, True)):
+        run = bouncing(bounce, ground=bounce if bounce <= 1.0 else 1.0)
+        (event,) = run.events
+        jam = dataclasses.replace(event, kind=EventKind.PAINLEVE)
+        found = judge_events(dataclasses.replace(run, events=(jam,)))
+        assert found.figures["jams"] == 1
+        assert ("jam makes energy" in broken(found)) is made
+
+
 def test_friction_of_an_impact() -> None:
     assert "impact: friction opposes" in broken(judge_events(bouncing(friction=MU, turn=0.5)))
     assert "impact: friction opposes" in broken(judge_events(bouncing(friction=MU, turn=-1.0)))

@@ -381,27 +381,17 @@ def solve_by_saddle_point(
 
 
 @kernel
-def keep(total: int, answer: ContactAnswer, saddle: SaddlePoint) -> None:
-    """Keep an answer of the contact solvers."""
+def copy_answer(
+    total: int, source: ContactAnswer | SaddlePoint, target: ContactAnswer | SaddlePoint
+) -> None:
+    """Copy an answer of the contact solvers to where it is kept, or back."""
     for place in range(total):
-        saddle.mode[place] = answer.mode[place]
+        target.mode[place] = source.mode[place]
     for row in range(2 * total):
-        saddle.impulse[row] = answer.impulse[row]
-        saddle.velocity[row] = answer.velocity[row]
+        target.impulse[row] = source.impulse[row]
+        target.velocity[row] = source.velocity[row]
     for i in range(3):
-        saddle.residual[i] = answer.residual[i]
-
-
-@kernel
-def give_back(total: int, saddle: SaddlePoint, answer: ContactAnswer) -> None:
-    """Give the answer that was kept."""
-    for place in range(total):
-        answer.mode[place] = saddle.mode[place]
-    for row in range(2 * total):
-        answer.impulse[row] = saddle.impulse[row]
-        answer.velocity[row] = saddle.velocity[row]
-    for i in range(3):
-        answer.residual[i] = saddle.residual[i]
+        target.residual[i] = source.residual[i]
 
 
 @kernel
@@ -442,7 +432,7 @@ def solve_once_more(
     """Solve again what the solvers left like this; return whether what comes out is proven."""
     assembly, saddle, tally = memory.assembly, phase.saddle, memory.assembly.solver.tally
     answer, total = assembly.answer, assembly.problem.count
-    keep(total, answer, saddle)
+    copy_answer(total, answer, saddle)
     for attempt in range(1 if status == SOLVED or accelerations else 2):
         if attempt == 1:
             guess_modes(total, phase, assembly)
@@ -453,7 +443,7 @@ def solve_once_more(
                 tally.failures -= 1
                 tally.fallbacks += 1
             return True
-    give_back(total, saddle, answer)
+    copy_answer(total, saddle, answer)
     return False
 
 
