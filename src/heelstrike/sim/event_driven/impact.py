@@ -123,7 +123,8 @@ def collide(
         made += work
         through += abs(work)
     for dry in range(phase.dry_joint.shape[0]):
-        phase.slide[phase.first_dry + dry] = heading(v[phase.dry_joint[dry]])
+        contact = phase.first_dry + dry
+        phase.slide[contact] = phase.closed[contact] * heading(v[phase.dry_joint[dry]])
     return status == SOLVED, made / through if through > 0.0 else 0.0
 
 
