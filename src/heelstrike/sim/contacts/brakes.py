@@ -1,9 +1,9 @@
 """Brakes: joints that are held wherever they are, while a command says so.
 
-A brake that does not slip is one more row of the loops (:mod:`heelstrike.sim.contacts.loops`) while
-it is on: its force, a torque of the joint, may be anything, and what it keeps at zero is the joint's
-motion. It takes hold at the instant at which it is put on, of a joint that moves by an impact of all
-that touches.
+A brake that does not slip is one more row of the loops (:mod:`heelstrike.sim.contacts.loops`)
+while it is on: its force, a torque of the joint, may be anything, and what it keeps at zero is the
+joint's motion. It takes hold at the instant at which it is put on, of a joint that moves by an
+impact of all that touches.
 
 One that slips is dry friction of its joint (:mod:`heelstrike.sim.contacts.dry_friction`): while it
 is on it adds what it holds at most to that of the joint itself. What there is of both is shared in

@@ -23,9 +23,9 @@ def select_dry_joints(
 ) -> int:  # fmt: skip
     """Append the joints with dry friction to the candidates of a step; return how many there are.
 
-    Those whose brake is off, and that have none of their own, are left out. They are numbered on from
-    the joint stops and the second faces of corners, one a contact point; `guess` holds their contact
-    modes.
+    Those whose brake is off, and that have none of their own, are left out. They are numbered on
+    from the joint stops and the second faces of corners, one a contact point; `guess` holds their
+    contact modes.
     """
     first = 2 * model.nc + 2 * model.nv
     problem = assembly.problem
