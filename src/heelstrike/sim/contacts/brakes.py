@@ -53,6 +53,16 @@ def take_hold(model: Model, loops: Loops) -> bool:
 
 
 @kernel
+def stops_any(model: Model, v: Floats, rest: float, loops: Loops) -> bool:
+    """Whether any of the brakes that take hold stops a joint that is faster than `rest`."""
+    found = False
+    for brake in range(loops.braked.shape[0]):
+        moves = abs(v[model.brake_joint[brake]]) > rest
+        found = found or (loops.braked[brake] == TAKES_HOLD and moves)
+    return found
+
+
+@kernel
 def note_brakes(model: Model, time: float, span: float, record: Record, loops: Loops) -> None:
     """Tell of the brakes that take hold, with their impulses over a span of time.
 

@@ -26,7 +26,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, stops_any, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
@@ -694,7 +694,9 @@ def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: 
     if phase.last_row < phase.time:
         write_row(scene, phase.time, phase.begin, control, memory, phase, record)
     begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
-    if take_hold(model, memory.loops):
+    stops = take_hold(model, memory.loops)
+    # Of joints at rest there is no impact to solve: its data would be rounding.
+    if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
         evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         for contact in range(phase.closed.shape[0]):
             phase.hit[contact] = 0
