@@ -59,6 +59,17 @@ def heading(speed: float) -> int:
 
 
 @kernel
+def clear_rounding(first: int, end: int, free: Floats) -> None:
+    """Let rows of loops be at rest that are but for rounding.
+
+    Loops that say the same twice would not agree on it.
+    """
+    for place in range(first, end):
+        if abs(free[2 * place]) <= ROUNDING:
+            free[2 * place] = 0.0
+
+
+@kernel
 def collide(
     model: Model, nudge: float, memory: Memory, phase: Phase, state: Floats
 ) -> tuple[bool, float]:
@@ -97,9 +108,7 @@ def collide(
     find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
-    for place in range(count, total):
-        if abs(free[2 * place]) <= ROUNDING:  # loops that say the same twice would not agree on it
-            free[2 * place] = 0.0
+    clear_rounding(count, total, free)
     assemble_delassus(model, total, equations, assembly)
     status = solve_velocities(count, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
