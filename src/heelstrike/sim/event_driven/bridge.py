@@ -337,7 +337,7 @@ def cross(
     """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     if phase.time - phase.series >= PROGRESS:
         phase.series = phase.time
         phase.bridges = 0
@@ -361,7 +361,7 @@ def cross(
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows
-    write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     for dry in range(phase.dry_joint.shape[0]):
         torque = phase.impulse[phase.first_dry + dry, 1] / phase.length
         record.friction_torque[row, phase.dry_joint[dry]] = torque

@@ -100,6 +100,8 @@ FIRST_LOOK = 1e-9
 LAST_LOOK = 1e-4
 CLEARLY = 1e-7
 LOOKS = 24
+# Forces that are so far beyond a limit, as a fraction of the weight, when a phase begins, are none.
+CONTRADICTION = 1e-3
 
 # Places in the life of a simulation: the first contact modes are being decided; they have been.
 BEGUN = 1
@@ -422,6 +424,9 @@ def decide_modes(
         if not jammed:
             return begin_phase(model, scene.ground, count, memory, phase, record)
         jammed = False
+        if phase.last_row < phase.time:
+            write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[1])
         if not jump(model, memory, phase, record):
             return False
     return False
@@ -527,6 +532,7 @@ def find_what_happened(
             impact = True
         elif first and normal <= rest:
             phase.closed[contact] = 1
+            phase.hit[contact] = UNPRESSED
             phase.slide[contact] = 0
             if abs(tangent) > rest:
                 phase.slide[contact] = 1 if tangent > 0.0 else -1
@@ -674,7 +680,7 @@ def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: 
     """Let the brakes that have been put on take hold, by an impact of all that touches."""
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     take_hold(memory.loops)
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     for contact in range(phase.closed.shape[0]):
@@ -682,6 +688,24 @@ def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: 
     if not strike(model, scene.ground, memory, phase, record):
         phase.bridging = 1
     note_brakes(model, phase.time, 1.0, record, memory.loops)
+
+
+@kernel
+def contradicts_itself(phase: Phase) -> bool:
+    """Whether forces of the phase that begins are far beyond limits at once.
+
+    At a pole of the forces, before which they grow without bound, the modes of a moment later may
+    be none of now. An event function that is negative from the beginning would not end the phase.
+    """
+    if phase.deficient == 1:
+        return False
+    least = -CONTRADICTION * phase.weight
+    for contact in range(phase.watched):
+        if phase.carrier[contact] == 1 and phase.value[2 * contact] < least:
+            return True
+        if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < least:
+            return True
+    return False
 
 
 @kernel
@@ -709,6 +733,11 @@ def decide(
     phase.forced = 0
     phase.jammed = 0
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    if open_modes and contradicts_itself(phase):
+        phase.bridging = 1
+        phase.at_event = 0
+        phase.undecided = 1
+        return DONE
     if phase.at_event == 1:
         show_forces(phase.force, phase, memory.contacts)
     return DONE
@@ -722,7 +751,7 @@ def report(
     every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
     last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
     if phase.at_event == 1 or last:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
 
 
 @kernel

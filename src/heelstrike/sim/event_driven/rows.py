@@ -11,6 +11,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
+from heelstrike.sim.event_driven.location import TOGETHER
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
@@ -38,10 +39,13 @@ def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
 
 @kernel
 def write_row(
-    scene: Scene, time: float, state: Floats, control: Control, memory: Memory, phase: Phase,
-    record: Record,
+    scene: Scene, time: float, state: Floats, lawful: bool, control: Control, memory: Memory,
+    phase: Phase, record: Record,
 ) -> None:  # fmt: skip
-    """Append a state, put on its constraints, with the certified contact forces in it."""
+    """Append a state, put on its constraints, with the certified contact forces in it.
+
+    Where no contact forces obey the laws there are none in the row.
+    """
     model, contacts, assembly = scene.model, memory.contacts, memory.assembly
     trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
     for i in range(state.shape[0]):
@@ -54,7 +58,9 @@ def write_row(
     for k in range(3):
         residual[k] = 0.0
     count, loops = phase.closed_count, rows_of(memory.loops)
-    if count + loops > 0:
+    if not lawful:
+        count = 0
+    elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
         note_loops(model, count + loops, impulse, memory.loops)
@@ -96,6 +102,16 @@ def write_row(
 
 
 @kernel
+def comes_down(contact: int, phase: Phase) -> bool:
+    """Whether an open contact reaches its limit at the end of the step, or is hit there with others.
+
+    What the end looked like is kept: the rows of the step may be written in parts.
+    """
+    near = phase.end_value[2 * contact] <= 2.0 * TOGETHER and phase.end_rate[2 * contact] < 0.0
+    return bool(phase.fired[2 * contact] == 1 or near)
+
+
+@kernel
 def write_rows_within(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
 ) -> bool:
@@ -109,7 +125,7 @@ def write_rows_within(
     if phase.has_fired == 1:
         last -= 1e-12
         for contact in range(phase.watched):
-            touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+            touch = touch or (phase.closed[contact] == 0 and comes_down(contact, phase))
         for corner in range(2 * phase.watched, 2 * phase.watched + scene.model.nc):
             touch = touch or phase.fired[corner] == 1
     state = phase.slopes[SLOPES - 1]
@@ -132,4 +148,4 @@ def write_rows_within(
         else:  # the end has been put on its constraints, and on the event
             for i in range(state.shape[0]):
                 state[i] = phase.end[i]
-        write_row(scene, time, state, control, memory, phase, record)
+        write_row(scene, time, state, True, control, memory, phase, record)
