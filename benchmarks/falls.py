@@ -66,6 +66,8 @@ TRUNK, PITCH, JOINT = 1.0, 1.0, 2.0
 UNMOVED = "moves without speed"
 PLACE = 1e-10
 """How exactly the ground and the ranges of joints are kept (m, rad)."""
+PULL = 1e-9
+"""Normal force that may be negative, relative to the weight."""
 MOTION = 1e-7
 """Change of a coordinate (m, rad, relative beyond one) that may be without explanation."""
 ENERGY = 1e-6
@@ -122,8 +124,9 @@ def judge(run: hs.Run) -> Findings:
     found.look("in the ground", -above, PLACE, at, points)
     apart = np.where(force > 0.0, np.abs(above), 0.0)
     found.look("force off the ground", apart, PLACE, at, points)
-    found.look("force that pulls", -force, 0.0, at, points)
     model = run.robot.model
+    weight = float(np.sum(model.mass) * np.linalg.norm(model.gravity))
+    found.look("force that pulls", -force / weight, PULL, at, points)
     beyond = np.maximum(model.lower - q, q - model.upper)
     found.look("joint beyond its range", beyond, PLACE, at, joints)
     moved = np.minimum(*unexplained(rows))
@@ -154,15 +157,18 @@ def judge_energy(rows: Rows, found: Findings) -> None:
     energy = kinetic + potential
     play = max(float(kinetic.max() + np.ptp(potential)), 1e-300)
     least = np.minimum.accumulate(energy)
-    found.look("energy rises", (energy - least) / play, ENERGY, at)
-    lengths, gains = [0.0], [0.0]
+    lengths, gains, inside = [0.0], [0.0], np.zeros(len(at), dtype=bool)
     for event in run.events:
         if event.kind is EventKind.BRIDGE:
             length = event.impulse[0]
             begin = int(np.searchsorted(at, event.time - 1e-14))
             end = int(np.searchsorted(at, event.time + length - 1e-14))
+            inside[int(np.searchsorted(at, event.time + 1e-14)) - 1] = True
             lengths.append(length)
             gains.append(float(energy[min(end, len(at) - 1)] - energy[begin]))
+    # Impulses at the beginning of a bridge are those of forces that act in all its time.
+    rise = np.where(inside, 0.0, energy - least)
+    found.look("energy rises", rise / play, ENERGY, at)
     total = sum(lengths)
     found.look("bridges last", np.array([total / DURATION]), BRIDGED, at[-1:])
     found.figures |= {
