@@ -49,7 +49,13 @@ from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, h
 from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
-from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
+from heelstrike.sim.event_driven.rows import (
+    NO_ROOM,
+    ROWS_OF_AN_INSTANT,
+    TOO_FAR,
+    write_row,
+    write_rows_within,
+)
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
@@ -827,8 +833,12 @@ def move(
                 phase.bridging = 1
             phase.next_length = 1e-6
             return DONE
-    if not write_rows_within(scene, control, memory, phase, record):
+    written = write_rows_within(scene, control, memory, phase, record)
+    if written == NO_ROOM:
         return RECORD_FULL
+    if written == TOO_FAR:  # the step is taken again, to end there
+        phase.finished = 0
+        return DONE
     end_step(model, clock, memory, phase, record)
     clock.time = phase.time
     if phase.has_fired == 1:

@@ -21,6 +21,10 @@ from heelstrike.sim.record.recording import note_residual, note_row
 
 # Rows that an instant may add: one due before it, two of an event, one at the end.
 ROWS_OF_AN_INSTANT = 4
+# What came of writing the rows within a step.
+WRITTEN, NO_ROOM, TOO_FAR = 0, 1, 2
+# Part of a step from which on a row is at its end.
+AT_ITS_END = 0.999
 
 
 @kernel
@@ -38,6 +42,23 @@ def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
 
 
 @kernel
+def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool:
+    """Write a state that is to become a row, put on its constraints, to ``phase.trial``.
+
+    Returns whether the error of the dense output explains how far it is moved. If not it stays.
+    """
+    trial = phase.trial
+    for i in range(state.shape[0]):
+        trial[i] = state[i]
+    project(scene.model, scene.ground, memory, phase, trial)
+    fits = explained(state, trial, INTERPOLATED, phase)
+    if not fits:
+        for i in range(state.shape[0]):
+            trial[i] = state[i]
+    return bool(fits)
+
+
+@kernel
 def write_row(
     scene: Scene, time: float, state: Floats, lawful: bool, control: Control, memory: Memory,
     phase: Phase, record: Record,
@@ -46,14 +67,18 @@ def write_row(
 
     Where no contact forces obey the laws there are none in the row.
     """
+    put_right(scene, state, memory, phase)
+    write_right(scene, time, lawful, control, memory, phase, record)
+
+
+@kernel
+def write_right(
+    scene: Scene, time: float, lawful: bool, control: Control, memory: Memory, phase: Phase,
+    record: Record,
+) -> None:  # fmt: skip
+    """Append the state in ``phase.trial``, as :func:`write_row` does."""
     model, contacts, assembly = scene.model, memory.contacts, memory.assembly
     trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
-    for i in range(state.shape[0]):
-        trial[i] = state[i]
-    project(model, scene.ground, memory, phase, trial)
-    if not explained(state, trial, INTERPOLATED, phase):
-        for i in range(state.shape[0]):
-            trial[i] = state[i]
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
@@ -114,10 +139,12 @@ def comes_down(contact: int, phase: Phase) -> bool:
 @kernel
 def write_rows_within(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
-) -> bool:
-    """Append the rows due within the finished step; return whether there was room for all.
+) -> int:
+    """Append the rows due within the finished step; return whether all, or what is in the way.
 
-    An event at its end has rows of its own, one before it if velocities or normals may jump.
+    An event at its end has rows of its own, one before it if velocities or normals may jump. Where
+    the dense output is too far from the constraints, as beside a singular pose, the step has to end
+    at the row: nothing but integration finds the state there.
     """
     period = phase.output_period * phase.row_every
     last = phase.time + phase.length
@@ -134,7 +161,7 @@ def write_rows_within(
         part = (time - phase.time) / phase.length
         if not (period > 0.0 and time <= last):
             if not touch:
-                return True
+                return WRITTEN
             touch = False
             time = phase.time + phase.length
             part = 1.0
@@ -142,10 +169,13 @@ def write_rows_within(
                 meets = phase.closed[second] == 0 and phase.fired[2 * second] == 1
                 phase.meets[second - phase.first_second] = 1 if meets else 0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
-            return False
+            return NO_ROOM
         if part < 1.0:
             interpolate(part, phase.begin, phase.dense, state)
         else:  # the end has been put on its constraints, and on the event
             for i in range(state.shape[0]):
                 state[i] = phase.end[i]
-        write_row(scene, time, state, True, control, memory, phase, record)
+        if not put_right(scene, state, memory, phase) and part < AT_ITS_END:
+            phase.next_length = time - phase.time
+            return TOO_FAR
+        write_right(scene, time, True, control, memory, phase, record)
