@@ -137,7 +137,8 @@ class JointPD(Law):
     Parameters
     ----------
     robot : Robot
-        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated.
+        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated, or
+        driven by such through closed loops and couplings.
     gait : Gait
         The gait to follow, on flat feet.
     kp, kd : float or (nu,) array
@@ -174,7 +175,7 @@ class JointPD(Law):
         kd: ArrayLike,
         feedforward: Feedforward | str = Feedforward.FULL,
     ) -> None:
-        refuse_loops(robot, "springs and dampers about a gait", ControllerError)
+        refuse_loops(robot, "springs and dampers about a gait", ControllerError, loops=False)
         pitch_of(robot)
         try:
             gait.check_joints(robot)

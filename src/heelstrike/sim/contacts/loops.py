@@ -36,6 +36,9 @@ ROUNDING = 1e-11
 OFF, PUT_ON, TAKES_HOLD, HOLDS = 0, 1, 2, 3
 """A brake is off; shall hold from this instant on; does, as it could not before; holds."""
 
+BEGINS_TO_RUB, RUBS = -2, -1
+"""One that slips, since this instant and since an earlier one: no row, but dry friction."""
+
 ATTEMPTS = 20
 """Newton's method takes three steps from where a simulation is."""
 

@@ -38,6 +38,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
 from heelstrike.sim.controller import stance
+from heelstrike.sim.controller import tied as following
 from heelstrike.sim.controller.interface import Contacts
 
 
@@ -341,6 +342,7 @@ class ControlledRobot(Bundle):
         """Centroidal momentum matrix (3, nv): times v it is :meth:`momentum`."""
         momentum_matrix(self.model, state.kinematics, matrix)
 
+    follow_motors = following.follow_motors
     flat_foot_torque = stance.flat_foot_torque
     point_foot_torque = stance.point_foot_torque
 

@@ -26,7 +26,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, stops_any, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
@@ -454,13 +454,26 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
 
 
 @kernel
-def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
-    """Let joints with dry friction begin as they move."""
+def rubs_otherwise(breakaway: Floats, phase: Phase) -> bool:
+    """Whether a joint has other dry friction from now on."""
+    found = False
+    for joint in phase.dry_joint:
+        found = found or phase.breakaway[joint] != breakaway[joint]
+    return found
+
+
+@kernel
+def begin_rubbing(v: Floats, breakaway: Floats, phase: Phase, reported: Reported) -> None:
+    """Let joints with dry friction begin as they move, and those with none any more be free."""
     for dry in range(phase.dry_joint.shape[0]):
-        contact = phase.first_dry + dry
-        phase.slide[contact] = heading(v[phase.dry_joint[dry]])
-        reported.closed[contact] = 1
-        reported.slipping[contact] = phase.slide[contact]
+        contact, joint = phase.first_dry + dry, phase.dry_joint[dry]
+        phase.breakaway[joint] = breakaway[joint]
+        rubs = 1 if breakaway[joint] > 0.0 else 0
+        if phase.closed[contact] != rubs:
+            phase.closed[contact] = rubs
+            phase.slide[contact] = rubs * heading(v[joint])
+            reported.closed[contact] = rubs
+            reported.slipping[contact] = phase.slide[contact]
 
 
 @kernel
@@ -518,6 +531,8 @@ def find_what_happened(
                         phase.slide[other] = 0
             elif first or second:
                 forced = True
+            continue
+        if phase.first_dry <= contact < phase.first_second:
             continue
         gap = gap_now(contact, contacts, phase, phase.begin)
         normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
@@ -664,7 +679,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]
-    begin_dry_joints(v, phase, memory.reported)
+    begin_rubbing(v, memory.breakaway, phase, memory.reported)
     evaluate_equations(model, q, v, equations)
     locate(model, ground, equations.tree, phase, memory.contacts, memory.surface)
     code = meet_event(True, model, ground, memory, phase, record)
@@ -683,16 +698,22 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 @kernel
 def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
-    """Let the brakes that have been put on take hold, by an impact of all that touches."""
+    """Let the brakes that have been put on take hold, by an impact of all that touches.
+
+    Those that slip begin to, and end.
+    """
     model = scene.model
     if phase.last_row < phase.time:
         write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
-    take_hold(memory.loops)
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    for contact in range(phase.closed.shape[0]):
-        phase.hit[contact] = 0
-    if not strike(model, scene.ground, memory, phase, record):
-        phase.bridging = 1
+    begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
+    stops = take_hold(model, memory.loops)
+    # Of joints at rest there is no impact to solve: its data would be rounding.
+    if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
+        evaluate(scene, phase.time, phase.begin, True, control, memory, phase, phase.slopes[0])
+        for contact in range(phase.closed.shape[0]):
+            phase.hit[contact] = 0
+        if not strike(model, scene.ground, memory, phase, record):
+            phase.bridging = 1
     note_brakes(model, phase.time, 1.0, record, memory.loops)
 
 
@@ -725,7 +746,7 @@ def decide(
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops):
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, phase):
         brake(scene, control, memory, phase, record)
     phase.at_event = phase.undecided
     open_modes = phase.at_event == 1 or jumped

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
@@ -93,7 +94,7 @@ def write_right(
     note_row(time, memory, record)
     note_state(model, row, trial, record)
     slide = phase.slide[phase.first_dry :]
-    dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
+    dry_force(phase.dry_joint, slide, phase.breakaway, friction_torque)
     deepest = memory.tally.penetration
     for contact in range(model.nc):
         if phase.passing[contact] == 0:
@@ -118,6 +119,7 @@ def write_right(
             _, record.slip_velocity[row, contact] = contact_velocity(
                 model, memory.equations.tree, contacts, contact
             )
+    share_friction(model, phase.breakaway, friction_torque, record.brake_torque[row])
     for second in range(phase.first_second, phase.watched):
         record_corner(row, second - phase.first_second, model, memory, phase, record)
     phase.last_row = time
