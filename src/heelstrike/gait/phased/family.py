@@ -11,7 +11,6 @@ Legs that would be too short for it make the hips sink. Joints follow by inverse
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from numbers import Real
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -174,7 +173,7 @@ class StepFamily:
                 f"a family is one around a PhasedGait, got {type(gait).__name__}; "
                 "hs.PhasedGait.from_gait(robot, gait) makes one"
             )
-        numbers = isinstance(slope, Real) and isinstance(shift, Real)
+        numbers = all(isinstance(x, (int, float, np.floating)) for x in (slope, shift))
         if not (numbers and 0.0 < slope < 1.0 and 0.0 < shift < np.inf):
             raise GaitError(
                 "a family needs a steepest slope between 0 and 1 and a positive largest shift; got "

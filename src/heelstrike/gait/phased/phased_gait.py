@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from numbers import Integral, Real
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -197,7 +196,7 @@ class PhasedGait:
                 "virtual constraints are for gaits on point feet: on a flat foot nothing is left "
                 "without a motor, and ComputedTorque follows the gait"
             )
-        if not (isinstance(degree, Integral) and degree >= 3):
+        if not (isinstance(degree, (int, np.integer)) and degree >= 3):
             raise GaitError(
                 f"degree must be a whole number, 3 or more to meet both ends of a step; got "
                 f"{degree!r}"
@@ -394,7 +393,7 @@ def phase_of(robot: Robot, stance_foot: int, factors: Mapping[str, float] | None
     _check_foot(stance_foot)
     if factors is not None:
         if not isinstance(factors, Mapping) or not all(
-            isinstance(each, Real) for each in factors.values()
+            isinstance(each, (int, float, np.integer, np.floating)) for each in factors.values()
         ):
             raise GaitError(
                 f"a phase is factors by the names of coordinates, {{'hip': 1.0, ...}}; got "

@@ -7,7 +7,6 @@ import inspect
 import sys
 from collections.abc import Callable, Mapping
 from functools import cached_property, update_wrapper
-from numbers import Real
 from typing import Any, ClassVar, overload
 
 import numpy as np
@@ -33,6 +32,8 @@ CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 
 REAL = "biuf"
 """Kinds of arrays of real numbers."""
+
+REAL_NUMBER = (int, float, np.integer, np.floating)
 
 
 class ControllerFunction:
@@ -286,7 +287,7 @@ class Law:
         self.memory = dict(memory or {})
         strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
         strange -= function.log.extent_names
-        if period is not None and not (isinstance(period, Real) and 0.0 < period < np.inf):
+        if period is not None and not (isinstance(period, REAL_NUMBER) and 0.0 < period < np.inf):
             raise ControllerError(
                 f"the period of a controller must be a positive number of seconds, got {period!r}"
             )
