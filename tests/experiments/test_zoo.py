@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import html
 import math
-import re
 import threading
 from collections.abc import Callable
 from dataclasses import replace
