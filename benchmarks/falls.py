@@ -38,14 +38,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-import heelstrike as hs
-from heelstrike.errors import HeelstrikeError
-from heelstrike.sim import EventKind
 from scenes.campaign import Task, campaign, results_in
 from scenes.findings import Findings
 from scenes.mechanics import Poses, Tree
 from scenes.record import Rows
+
+import heelstrike as hs
+from heelstrike.errors import HeelstrikeError
+from heelstrike.sim import EventKind
 
 Array = NDArray[Any]
 

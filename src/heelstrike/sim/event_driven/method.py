@@ -709,7 +709,7 @@ def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: 
     stops = take_hold(model, memory.loops)
     # Of joints at rest there is no impact to solve: its data would be rounding.
     if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
-        evaluate(scene, phase.time, phase.begin, True, control, memory, phase, phase.slopes[0])
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         for contact in range(phase.closed.shape[0]):
             phase.hit[contact] = 0
         if not strike(model, scene.ground, memory, phase, record):
