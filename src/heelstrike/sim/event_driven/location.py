@@ -151,9 +151,9 @@ def find_root(
     """Fraction of the step at which an event function first changes sign, or turns round.
 
     In the bracket (low, its value, high, its value) it is positive at `low` and negative at `high`;
-    with `turn` not zero these are `turn` times its rate (that of a speed takes the forces). Regula
-    falsi that halves the interval every third time. An event function that is zero at `low`, where its phase begins, is first
-    followed back from `high` to where it is positive.
+    with `turn` not zero these are `turn` times its rate, which takes forces if it is that of a
+    speed. Regula falsi that halves the interval every third time. An event function that is zero at
+    `low`, where its phase begins, is first followed back from `high` to where it is positive.
     """
     low, low_value, high, high_value = bracket
     forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase)
@@ -253,7 +253,7 @@ def crossing(
         span = length * (high - low)
         dips = is_sliding_speed(function, phase) and may_dip(function, span, phase)
     if dips:
-        # An open point came down and went up again: how close was it? Or what slides, nearly at rest.
+        # An open point came down and went up again, or what slides was slower: how near to zero?
         bracket = low, -rate, high, -later_rate
         end = find_root(scene, function, -1.0, bracket, length, control, memory, phase)
         value = phase.value[function]
@@ -320,7 +320,7 @@ def first_event(
     functions = 2 * phase.watched
     if has_corners(scene.ground):
         functions += scene.model.nc
-    together = EVENT_TIME / length
+    together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
     low = 0.0
     for k in range(1, SAMPLES + 1):
         high = k / SAMPLES

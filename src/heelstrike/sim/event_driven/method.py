@@ -817,6 +817,7 @@ def move_over(
     phase.burst = 0
     phase.allowance = EVENTS_A_BRIDGE
     phase.next_length = 1e-6
+    write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     meet_event(False, scene.model, scene.ground, memory, phase, record)
     show_state(scene.model, phase, memory)

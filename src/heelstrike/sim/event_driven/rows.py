@@ -130,7 +130,7 @@ def write_right(
 
 @kernel
 def comes_down(contact: int, phase: Phase) -> bool:
-    """Whether an open contact reaches its limit at the end of the step, or is hit there with others.
+    """Whether an open contact reaches its limit at the end of the step, or is hit with others.
 
     What the end looked like is kept: the rows of the step may be written in parts.
     """
