@@ -149,13 +149,17 @@ def leave_faces(model: Model, phase: Phase) -> None:
 
 @kernel
 def collect_impulses(count: int, assembly: Assembly, reaction: Reaction, phase: Phase) -> None:
-    """Write what the bridge found: impulses, and modes of what does not leave by its end."""
-    impulse, nv = assembly.answer.impulse, phase.begin.shape[0] // 2
+    """Write what the bridge found: impulses, and modes of what does not leave by its end.
+
+    Its velocity then is that of the problem, which knows how the ground turns under the robot in
+    this time, but for restitution and gaps that close.
+    """
+    impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     for place in range(count):
         contact = assembly.candidate[place]
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        if not row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING:
+        if not velocity[2 * place] - phase.lean[place] > TOUCHING:
             reaction.mode[contact] = assembly.answer.mode[place]
 
 

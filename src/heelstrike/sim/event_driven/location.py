@@ -23,7 +23,14 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import EXPLAINED, evaluate, explained, look, project
+from heelstrike.sim.event_driven.dynamics import (
+    EXPLAINED,
+    evaluate,
+    explained,
+    is_in_place,
+    look,
+    project,
+)
 from heelstrike.sim.event_driven.faces import has_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
@@ -377,8 +384,12 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     end, before = phase.end, phase.trial
     for i in range(end.shape[0]):
         before[i] = end[i]
-    left = project(scene.model, scene.ground, memory, phase, end)
-    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
+    left, strayed, fastest = project(scene.model, scene.ground, memory, phase, end)
+    if left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase):
+        return True
+    for i in range(end.shape[0]):
+        end[i] = before[i]
+    return is_in_place(strayed, fastest)
 
 
 @kernel

@@ -35,7 +35,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
 from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
-from heelstrike.sim.event_driven.dynamics import evaluate, project
+from heelstrike.sim.event_driven.dynamics import evaluate, is_in_place, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
     is_at_second,
@@ -93,7 +93,7 @@ SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
 # How far the first projection of a phase may move coordinates and velocities (m, rad, m/s, rad/s;
-# of large ones, this part): at the start of a run, later, and how much further after a bridge, for
+# of large ones, this part): at the start of a run, later, and how much faster after a bridge, for
 # each second of its length, up to a longest. Impacts and events leave nothing to be projected.
 FITTING = 1e-4
 UNSEEN = 1e-6
@@ -374,20 +374,23 @@ def begin_phase(
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    phase.left = project(model, ground, memory, phase, begin)
+    phase.left, strayed, fastest = project(model, ground, memory, phase, begin)
     closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
+    quick = slip
     if phase.bridge_end == phase.time:
-        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
+        quick += BRIDGED * min(phase.length, LONG_BRIDGE)
     fits = phase.left <= closest
     for i in range(begin.shape[0]):
-        fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
+        most = slip if i < model.nq else quick
+        fits = fits and abs(begin[i] - before[i]) <= most * (1.0 + abs(before[i]))
+    if not fits:
+        for i in range(begin.shape[0]):
+            begin[i] = before[i]
+        fits = is_in_place(strayed, fastest)
     if fits:
         first = record.events
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
         react(model, first, begin[: model.nq], record, memory.loops)
-    else:
-        for i in range(begin.shape[0]):
-            begin[i] = before[i]
     return fits
 
 

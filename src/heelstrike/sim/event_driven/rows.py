@@ -11,7 +11,13 @@ from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
-from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
+from heelstrike.sim.event_driven.dynamics import (
+    INTERPOLATED,
+    evaluate,
+    explained,
+    is_in_place,
+    project,
+)
 from heelstrike.sim.event_driven.location import TOGETHER
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
@@ -51,12 +57,12 @@ def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool
     trial = phase.trial
     for i in range(state.shape[0]):
         trial[i] = state[i]
-    project(scene.model, scene.ground, memory, phase, trial)
-    fits = explained(state, trial, INTERPOLATED, phase)
-    if not fits:
-        for i in range(state.shape[0]):
-            trial[i] = state[i]
-    return bool(fits)
+    _, strayed, fastest = project(scene.model, scene.ground, memory, phase, trial)
+    if explained(state, trial, INTERPOLATED, phase):
+        return True
+    for i in range(state.shape[0]):
+        trial[i] = state[i]
+    return is_in_place(strayed, fastest)
 
 
 @kernel
