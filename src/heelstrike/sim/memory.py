@@ -207,6 +207,9 @@ class Loops(Bundle):
     loop_force : (loops, axes) float
     coupling_force : (couplings,) float
         Forces of the last solve.
+    lean : (loops, axes) float
+        What a row of each loop is of the other, where both say the same; see
+        :func:`heelstrike.sim.contacts.loops.leave_one`.
     held : (latches,) int
         Whether each latch is engaged.
     latch_stop : (latches,) int
@@ -226,6 +229,7 @@ class Loops(Bundle):
     order: Integers = array("loop_rows", of=int)
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
+    lean: Floats = array("loops", "axes")
     held: Integers = array("latches", of=int)
     latch_stop: Integers = array("latches", of=int)
     braked: Integers = array("brakes", of=int)

@@ -349,7 +349,8 @@ class ControlledRobot(Bundle):
 
 def extents_of(robot: Robot) -> dict[str, int]:
     """Sizes of a robot by the names under which arrays of controllers are declared."""
-    return {**robot.model.extents, "components": 2}
+    held = 2 * robot.nc + count_rows(robot.model)  # rows of all that ground and loops can hold
+    return {**robot.model.extents, "components": 2, "held": held}
 
 
 def controlled_robot(robot: Robot) -> ControlledRobot:
