@@ -28,6 +28,9 @@ LATE = 2.0
 """Disturbances (m, rad) are this many times the seconds between two calls, as a touchdown falls
 somewhere between them and is felt at the end."""
 
+UNEVEN = 10.0
+"""The same, of a fixed step, where steps fall otherwise in every return."""
+
 SMOOTH, ROUGH = 1e-5, 0.05
 """Least and largest disturbance that is chosen so."""
 
@@ -96,11 +99,21 @@ class ClosedLoop:
         """Return a simulation at the beginning of the walk."""
         return Simulation(self.robot, self.controller, record_every=FEW_ROWS, **self._setup)
 
-    @property
-    def usual_disturbance(self) -> float:
+    def usual_disturbance(self, walk: Walk) -> float:
         """How large disturbances are if nobody says."""
+        step = self.simulation.method.step_length
+        if step is None:
+            return float(np.clip(LATE * self.grid, SMOOTH, ROUGH))
+        return SMOOTH if self.even(walk) else float(np.clip(UNEVEN * step, SMOOTH, ROUGH))
+
+    def even(self, walk: Walk) -> bool:
+        """Whether steps of the integration fall alike in every return."""
+        # On another one the walk is as far on as it moves in one, much more than this.
+        first = walk.begins[0].state.v
         fixed = self.simulation.method.step_length is not None
-        return SMOOTH if fixed else float(np.clip(LATE * self.grid, SMOOTH, ROUGH))
+        return not fixed or all(
+            np.abs(each.state.v - first).max() <= SMOOTH for each in walk.begins
+        )
 
     @property
     def along(self) -> Floats:
