@@ -39,8 +39,9 @@ class Across:
         Coordinates on which something hangs, and the rest.
     matrices, across : tuple of float arrays
         Derivatives of the returns in the coordinates that are kept; the same across the walk.
-    basis : (n, m) float
-        What the errors across the walk are in these coordinates, at the first return's beginning.
+    bases : tuple of (n, m) float
+        What the errors across the walk are in these coordinates, at the beginnings of the returns
+        and the end of the last.
     along : float or None
         What stays of being early; None of a walk that a clock drives.
     """
@@ -49,7 +50,7 @@ class Across:
     inert: tuple[int, ...]
     matrices: tuple[Floats, ...]
     across: tuple[Floats, ...]
-    basis: Floats
+    bases: tuple[Floats, ...]
     along: float | None
 
     @classmethod
@@ -62,8 +63,9 @@ class Across:
         kept, inert = _with_consequence([each.matrix for each in found], of_robot)
         square = np.ix_(kept, kept)
         matrices = tuple(each.matrix[square] for each in found)
+        same = tuple(np.eye(len(kept)) for _ in range(len(found) + 1))
         if not abs(early.left - 1.0) <= STAYS:
-            return cls(tuple(kept), tuple(inert), matrices, matrices, np.eye(len(kept)), None)
+            return cls(tuple(kept), tuple(inert), matrices, matrices, same, None)
         rates = [found[0].begins, *(each.ends for each in found)]
         if even:
             remembered = _remembered(np.mean(matrices, axis=0), np.mean(rates[:-1], axis=0))
@@ -72,7 +74,7 @@ class Across:
         ways = [np.concatenate((rate, remembered)) for rate in rates]
         bases = _alike([null_space(way[None, :]) for way in ways])
         across = [bases[k + 1].T @ each @ bases[k] for k, each in enumerate(matrices)]
-        return cls(tuple(kept), tuple(inert), matrices, tuple(across), bases[0], early.left)
+        return cls(tuple(kept), tuple(inert), matrices, tuple(across), tuple(bases), early.left)
 
     def largest(self, without: int | None = None) -> float:
         """Largest multiplier of a return, one of them left out."""
@@ -90,7 +92,7 @@ class Across:
     def slowest(self) -> Floats:
         """The error that shrinks least, in the coordinates that are kept."""
         values, vectors = np.linalg.eig(np.mean(self.across, axis=0))
-        return np.abs(self.basis @ vectors[:, int(np.argmax(np.abs(values)))])
+        return np.abs(self.bases[0] @ vectors[:, int(np.argmax(np.abs(values)))])
 
 
 def _remembered(matrix: Floats, rate: Floats) -> Floats:

@@ -68,7 +68,7 @@ class ClosedLoop:
     robot : Robot
     controller : object with ``torque(t, state, contacts)``, or None
     state : State or Snapshot
-    method, ground, control_period
+    method, ground, control_period, record_every
         As of :class:`~heelstrike.Simulation`.
 
     Raises
@@ -80,10 +80,12 @@ class ClosedLoop:
     def __init__(
         self, robot: Robot, controller: Controller | None, state: State | Snapshot, *,
         method: Method | None, ground: Ground | None, control_period: float | None,
+        record_every: int = FEW_ROWS,
     ) -> None:  # fmt: skip
         self.robot, self.controller, self.ground = robot, controller, ground or Ground()
         self._setup: dict[str, Any] = {
             "state": state, "method": method, "ground": ground, "control_period": control_period,
+            "record_every": record_every,
         }  # fmt: skip
         if len(self.ground.model().friction) > 1:
             raise SimulationError("steps repeat on level or sloping ground only")
@@ -97,7 +99,7 @@ class ClosedLoop:
 
     def fresh(self) -> Simulation:
         """Return a simulation at the beginning of the walk."""
-        return Simulation(self.robot, self.controller, record_every=FEW_ROWS, **self._setup)
+        return Simulation(self.robot, self.controller, **self._setup)
 
     def usual_disturbance(self, walk: Walk) -> float:
         """How large disturbances are if nobody says."""

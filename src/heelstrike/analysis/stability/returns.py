@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
 from heelstrike.robot.state import State
+from heelstrike.sim.run import Run
 from heelstrike.sim.snapshot import Snapshot
+from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 
@@ -28,6 +31,8 @@ class Disturbed:
     ----------
     matrix : (n, n) float
         Columns by coordinate disturbed.
+    seen : (l, n) float
+        The same of indicators.
     residual, residual_but_late : float
         How far the undisturbed walk is from where it was one return before (m, rad, velocities by
         the length they make in half a step), and apart from being early or late.
@@ -39,6 +44,7 @@ class Disturbed:
     """
 
     matrix: Floats
+    seen: Floats
     residual: float
     residual_but_late: float
     begins: Floats
@@ -47,16 +53,22 @@ class Disturbed:
     switched: frozenset[str]
 
 
-def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: float) -> Disturbed:
-    """Disturb a walk in every coordinate, both ways, and see what is left one return later."""
+def returned(
+    loop: ClosedLoop, section: Section, walk: Walk, place: int, size: float,
+    indicator: Callable[[Run], ArrayLike] | None = None,
+) -> Disturbed:  # fmt: skip
+    """Disturb a walk in every coordinate, both ways, and see what is left one return later.
+
+    And what an indicator of the return makes of it.
+    """
     begin, end = walk.begins[place], walk.begins[place + 1]
     simulation = loop.simulation
     simulation.restore(end)
     state, words = section.read(simulation)
     counts = section.words.counts(simulation)
-    columns, one_sided, switched = [], set(), set()
+    columns, told, one_sided, switched = [], [], set(), set()
     for coordinate, name in enumerate(section.names):
-        sides = []
+        sides, seen = [], []
         for sign in (1.0, -1.0):
             section.disturb(simulation, begin, coordinate, sign * size)
             loop.advanced(simulation, end.time, f"a disturbance of {name} by {sign * size:.3g}")
@@ -64,6 +76,8 @@ def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: f
             there, numbers = section.read(simulation)
             error = np.concatenate((section.of(there - state), numbers - words))
             sides.append(error / (sign * size))
+            if indicator is not None:
+                seen.append(np.atleast_1d(np.asarray(indicator(whole(simulation.record)))))
             now = section.words.counts(simulation)
             switched |= {each for each in now if not np.array_equal(now[each], counts[each])}
         sizes = [float(np.linalg.norm(side)) for side in sides]
@@ -71,10 +85,12 @@ def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: f
         if apart > max(DIFFERENT * max(sizes), NOTICEABLE):
             one_sided.add(name)
         columns.append(0.5 * (sides[0] + sides[1]))
+        told.append((seen[0] - seen[1]) / (2.0 * size) if seen else np.zeros(0))
     missed = section.flat(state - np.concatenate((begin.state.q, begin.state.v)))
     rate = section.rate(begin)
     return Disturbed(
         matrix=np.array(columns).T,
+        seen=np.array(told).T,
         residual=section.size(missed),
         residual_but_late=section.size(section.but_late(missed, rate)),
         begins=section.of(rate),

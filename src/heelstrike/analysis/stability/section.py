@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import RANK_TOLERANCE, derivative
 from heelstrike.analysis.stability.loop import ClosedLoop
+from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
@@ -108,7 +109,11 @@ class Section:
 
     def feet(self, at: Snapshot) -> set[int]:
         """Which feet are on the ground, or next to it."""
-        seen = contact_kinematics(self._loop.robot, at.state.q, at.state.v, self._loop.ground)
+        return self.feet_of(at.state, self._loop.ground)
+
+    def feet_of(self, state: State, ground: Ground) -> set[int]:
+        """Which feet are on a ground, or next to it."""
+        seen = contact_kinematics(self._loop.robot, state.q, state.v, ground)
         lowest = float(seen.gap.min(initial=0.0))
         return {self._loop.foot(int(i)) for i in np.flatnonzero(seen.gap <= lowest + STANDS)}
 
