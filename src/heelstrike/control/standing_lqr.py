@@ -22,7 +22,7 @@ from scipy.signal import cont2discrete
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.contact import ContactInverseDynamics, contact_inverse_dynamics, contact_kinematics
-from heelstrike.control.weights import weights_of
+from heelstrike.control.arguments import must_be, numbers_of, positive, weights_of
 from heelstrike.dynamics import linearize, loop_displacement, loop_jacobian
 from heelstrike.errors import ControllerError
 from heelstrike.robot.loops import refuse_loops
@@ -119,9 +119,9 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
     refuse_loops(robot, "a regulator of standing", ControllerError, loops=False)
     if not robot.nu:
         raise ControllerError(f"robot {robot.name!r} has no motors to stand by")
-    q, rest = np.asarray(posture, dtype=np.float64), np.zeros(robot.nv)
-    if not np.all(np.isfinite(q)):
-        raise ControllerError(f"a posture is of finite numbers, got {q.tolist()}")
+    q, rest = numbers_of("posture", posture), np.zeros(robot.nv)
+    if q.shape != (robot.nq,) or not np.all(np.isfinite(q)):
+        raise ControllerError(f"a posture is of {robot.nq} finite numbers, got {q.tolist()}")
     _refuse_what_is_open(robot, q)
     kinematics = contact_kinematics(robot, q, rest)
     touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < TOUCHING))
@@ -231,7 +231,10 @@ class StandingLQR(Law):
         torque_weight: ArrayLike = 1.0,
         period: float | None = 1e-3,
     ) -> None:
-        q = robot.reference_state().q if posture is None else np.asarray(posture, np.float64)
+        must_be(Robot, "robot", robot)
+        if period is not None:
+            positive("period", period)
+        q = robot.reference_state().q if posture is None else numbers_of("posture", posture)
         linear = linear_standing(robot, q)
         by_position = weights_of("position_weight", position_weight, robot.nv)
         by_velocity = weights_of("velocity_weight", velocity_weight, robot.nv)
@@ -262,8 +265,6 @@ def _regulator(
 ) -> tuple[Floats, NDArray[np.complex128]]:
     """Gains of the regulator and poles of the closed loop."""
     A, B = linear.A, linear.B
-    if period is not None and not 0.0 < period < np.inf:
-        raise ControllerError(f"the period of a controller must be positive, got {period}")
     try:
         if period is None:
             value = solve_continuous_are(A, B, cost, effort)

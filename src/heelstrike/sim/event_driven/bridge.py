@@ -149,13 +149,17 @@ def leave_faces(model: Model, phase: Phase) -> None:
 
 @kernel
 def collect_impulses(count: int, assembly: Assembly, reaction: Reaction, phase: Phase) -> None:
-    """Write what the bridge found: impulses, and modes of what does not leave by its end."""
-    impulse, nv = assembly.answer.impulse, phase.begin.shape[0] // 2
+    """Write what the bridge found: impulses, and modes of what does not leave by its end.
+
+    Its velocity then is that of the problem, which knows how the ground turns under the robot in
+    this time, but for restitution and gaps that close.
+    """
+    impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     for place in range(count):
         contact = assembly.candidate[place]
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        if not row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING:
+        if not velocity[2 * place] - phase.lean[place] > TOUCHING:
             reaction.mode[contact] = assembly.answer.mode[place]
 
 
@@ -340,7 +344,7 @@ def cross(
     """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     if phase.time - phase.series >= PROGRESS:
         phase.series = phase.time
         phase.bridges = 0
@@ -364,7 +368,7 @@ def cross(
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows
-    write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     for dry in range(phase.dry_joint.shape[0]):
         torque = phase.impulse[phase.first_dry + dry, 1] / phase.length
         record.friction_torque[row, phase.dry_joint[dry]] = torque

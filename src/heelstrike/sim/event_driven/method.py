@@ -35,7 +35,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
 from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
-from heelstrike.sim.event_driven.dynamics import evaluate, project
+from heelstrike.sim.event_driven.dynamics import evaluate, is_in_place, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
     is_at_second,
@@ -49,7 +49,13 @@ from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, h
 from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
-from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
+from heelstrike.sim.event_driven.rows import (
+    NO_ROOM,
+    ROWS_OF_AN_INSTANT,
+    TOO_FAR,
+    write_row,
+    write_rows_within,
+)
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
@@ -87,7 +93,7 @@ SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
 # How far the first projection of a phase may move coordinates and velocities (m, rad, m/s, rad/s;
-# of large ones, this part): at the start of a run, later, and how much further after a bridge, for
+# of large ones, this part): at the start of a run, later, and how much faster after a bridge, for
 # each second of its length, up to a longest. Impacts and events leave nothing to be projected.
 FITTING = 1e-4
 UNSEEN = 1e-6
@@ -100,6 +106,8 @@ FIRST_LOOK = 1e-9
 LAST_LOOK = 1e-4
 CLEARLY = 1e-7
 LOOKS = 24
+# Forces that are so far beyond a limit, as a fraction of the weight, when a phase begins, are none.
+CONTRADICTION = 1e-3
 
 # Places in the life of a simulation: the first contact modes are being decided; they have been.
 BEGUN = 1
@@ -366,20 +374,23 @@ def begin_phase(
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    phase.left = project(model, ground, memory, phase, begin)
+    phase.left, strayed, fastest = project(model, ground, memory, phase, begin)
     closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
+    quick = slip
     if phase.bridge_end == phase.time:
-        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
+        quick += BRIDGED * min(phase.length, LONG_BRIDGE)
     fits = phase.left <= closest
     for i in range(begin.shape[0]):
-        fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
+        most = slip if i < model.nq else quick
+        fits = fits and abs(begin[i] - before[i]) <= most * (1.0 + abs(before[i]))
+    if not fits:
+        for i in range(begin.shape[0]):
+            begin[i] = before[i]
+        fits = is_in_place(strayed, fastest)
     if fits:
         first = record.events
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
         react(model, first, begin[: model.nq], record, memory.loops)
-    else:
-        for i in range(begin.shape[0]):
-            begin[i] = before[i]
     return fits
 
 
@@ -422,6 +433,9 @@ def decide_modes(
         if not jammed:
             return begin_phase(model, scene.ground, count, memory, phase, record)
         jammed = False
+        if phase.last_row < phase.time:
+            write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[1])
         if not jump(model, memory, phase, record):
             return False
     return False
@@ -542,6 +556,7 @@ def find_what_happened(
             impact = True
         elif first and normal <= rest:
             phase.closed[contact] = 1
+            phase.hit[contact] = UNPRESSED
             phase.slide[contact] = 0
             if abs(tangent) > rest:
                 phase.slide[contact] = 1 if tangent > 0.0 else -1
@@ -692,7 +707,7 @@ def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: 
     """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
     stops = take_hold(model, memory.loops)
     # Of joints at rest there is no impact to solve: its data would be rounding.
@@ -703,6 +718,24 @@ def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: 
         if not strike(model, scene.ground, memory, phase, record):
             phase.bridging = 1
     note_brakes(model, phase.time, 1.0, record, memory.loops)
+
+
+@kernel
+def contradicts_itself(phase: Phase) -> bool:
+    """Whether forces of the phase that begins are far beyond limits at once.
+
+    At a pole of the forces, before which they grow without bound, the modes of a moment later may
+    be none of now. An event function that is negative from the beginning would not end the phase.
+    """
+    if phase.deficient == 1:
+        return False
+    least = -CONTRADICTION * phase.weight
+    for contact in range(phase.watched):
+        if phase.carrier[contact] == 1 and phase.value[2 * contact] < least:
+            return True
+        if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < least:
+            return True
+    return False
 
 
 @kernel
@@ -730,6 +763,11 @@ def decide(
     phase.forced = 0
     phase.jammed = 0
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    if open_modes and contradicts_itself(phase):
+        phase.bridging = 1
+        phase.at_event = 0
+        phase.undecided = 1
+        return DONE
     if phase.at_event == 1:
         show_forces(phase.force, phase, memory.contacts)
     return DONE
@@ -743,7 +781,7 @@ def report(
     every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
     last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
     if phase.at_event == 1 or last:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
 
 
 @kernel
@@ -782,6 +820,7 @@ def move_over(
     phase.burst = 0
     phase.allowance = EVENTS_A_BRIDGE
     phase.next_length = 1e-6
+    write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     meet_event(False, scene.model, scene.ground, memory, phase, record)
     show_state(scene.model, phase, memory)
@@ -819,8 +858,12 @@ def move(
                 phase.bridging = 1
             phase.next_length = 1e-6
             return DONE
-    if not write_rows_within(scene, control, memory, phase, record):
+    written = write_rows_within(scene, control, memory, phase, record)
+    if written == NO_ROOM:
         return RECORD_FULL
+    if written == TOO_FAR:  # the step is taken again, to end there
+        phase.finished = 0
+        return DONE
     end_step(model, clock, memory, phase, record)
     clock.time = phase.time
     if phase.has_fired == 1:
