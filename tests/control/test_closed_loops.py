@@ -16,7 +16,7 @@ from mechanisms import parallel_ankles
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.control.computed_torque import ComputedTorque
+from heelstrike.control.computed_torque import ComputedTorque, pitch_of
 from heelstrike.control.standing_lqr import linear_standing
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.request import Request
@@ -30,7 +30,7 @@ LEVER = 0.05
 
 def biped(ankle: str, *, weight: float = LIGHT, lever: float = LEVER, toe: bool = False) -> Robot:
     """Biped with its ankle motors in the ankles, on the shanks, or in both places."""
-    build = RobotBuilder("biped")
+    build = RobotBuilder("parallel_ankles")
     trunk = build.floating_base("trunk", (0, 0.85), mass=20, inertia=1, center_of_mass=(0, 0.2))
     for side in ("right", "left"):
         thigh = build.hinge(
@@ -325,7 +325,7 @@ def test_what_motors_do_not_reach_is_refused(gait: hs.Gait) -> None:
         assert arm
     loose = build.build()
     with pytest.raises(ControllerError, match="nothing drives right_ankle, left_ankle"):
-        ComputedTorque(loose, gait)
+        pitch_of(loose)
     with pytest.raises(GaitError, match="leave 2 of them free"):
         hs.optimize_gait(loose, step_length=0.2)
     with pytest.raises(GaitError, match="bind joints with motors to each other"):
