@@ -3,16 +3,17 @@
 The stance foot lies flat and at rest, so that the trunk follows from the joints and every joint has
 its motor: of joints' errors e = (δq, δq̇) at a time s since the last touchdown
 
-    ė = A(s) e + B(s) δτ,    e⁺ = Π DΔ (I − f ∇h/(∇h f)) e⁻
+    ė = A(s) e + B(s) δτ,    e⁺ = J e⁻.
 
-with f the rate of the gait, h the height of the middle of the swing sole, at whose zero the clock
-begins anew, Δ a plastic impact of that sole and Π the exchange of legs. Heel and toe meet the
-ground together on the gait; a disturbed foot's come down one after the other, which changes e⁺ by
-as much as the robot moves between them.
+Heel and toe meet the ground together on the gait. A disturbed foot's come down one after the other,
+and the clock begins anew at the first: the robot goes on to there, suffers a plastic impact of one
+point, turns about it until the other is down, and suffers another. To first order that is J, one
+for either order; the regulator is for their mean.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -90,22 +91,30 @@ class FlatStance:
         ).state_derivative
         return np.asarray(found[self.robot.nv :][self.driven])
 
-    def height(self, joints: Floats) -> float:
-        """Height of the middle of the swing sole (m)."""
-        places = dynamics.contact_positions(self.robot, self.position(joints))
-        return float(places[list(self.swing.contacts), 1].mean())
+    def stopped(self, q: Floats, v: Floats, points: Sequence[int]) -> Floats:
+        """Velocities (nv,) just after a plastic impact of contact points."""
+        robot = self.robot
+        rows = dynamics.contact_jacobian(robot, q)[list(points)].reshape(-1, robot.nv)
+        moved = np.linalg.solve(dynamics.mass_matrix(robot, q), rows.T)
+        return np.asarray(v - moved @ (np.linalg.pinv(rows @ moved, rcond=1e-9) @ (rows @ v)))
+
+    def rate(self, q: Floats, v: Floats, torque: Floats, points: Sequence[int]) -> Floats:
+        """Accelerations (nv,) while contact points stay in place."""
+        found = dynamics.linearize(self.robot, q, v, torque, contacts=list(points))
+        return np.asarray(found.state_derivative[self.robot.nv :])
+
+    def relabelled(self, q: Floats, v: Floats) -> Floats:
+        """Joints (2 nu,) with legs exchanged."""
+        mirror = self.robot.mirror
+        assert mirror is not None  # see pitch_of
+        return np.concatenate([mirror.position(q)[self.driven], mirror.velocity(v)[self.driven]])
 
     def after(self, state: Floats) -> Floats:
         """Joints (2 nu,) just after a plastic impact of the swing sole, legs exchanged."""
-        robot, nu = self.robot, self.robot.nu
+        nu = self.robot.nu
         q = self.position(state[:nu])
         v = self.velocity(q, state[nu:])
-        rows = dynamics.contact_jacobian(robot, q)[list(self.swing.contacts)].reshape(-1, robot.nv)
-        stopped = np.linalg.solve(dynamics.mass_matrix(robot, q), rows.T)
-        v = v - stopped @ (np.linalg.pinv(rows @ stopped, rcond=1e-9) @ (rows @ v))
-        mirror = robot.mirror
-        assert mirror is not None  # see pitch_of
-        return np.concatenate([mirror.position(q)[self.driven], mirror.velocity(v)[self.driven]])
+        return self.relabelled(q, self.stopped(q, v, self.swing.contacts))
 
 
 class FlatOrbit:
@@ -173,17 +182,20 @@ class FlatOrbit:
         raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
 
     def over_a_step(self, gains: Floats) -> Floats:
-        """What a step makes of errors under gains (FINE, nu, 2 nu), impact included."""
+        """What a step makes of errors under gains (FINE, nu, 2 nu), to before its impact."""
         width = self.gait.step_duration / FINE
         moved = np.eye(len(self.jump))
         for (A, B), gain in zip(self.between(), gains, strict=True):
             moved = expm(width * (A - B @ gain)) @ moved
-        return np.asarray(self.jump @ moved)
+        return moved
 
     def between(self) -> list[tuple[Floats, Floats]]:
         """A and B in the middles of FINE intervals."""
         middles = (np.arange(FINE) + 0.5) * self.gait.step_duration / FINE
-        A, B = (CubicSpline(self.time, np.array(each))(middles) for each in zip(*self.linear))
+        A, B = (
+            CubicSpline(self.time, np.array(each))(middles)
+            for each in zip(*self.linear, strict=True)
+        )
         return list(zip(A, B, strict=True))
 
     @cached_property
@@ -205,14 +217,47 @@ class FlatOrbit:
 
     @cached_property
     def jump(self) -> Floats:
-        """Errors just after a touchdown of those just before."""
-        nu = self.stance.robot.nu
-        q, v, acceleration = self.joints(self.gait.step_duration)
-        flow = np.concatenate([v, acceleration])
-        falls = _slope(lambda x: np.array([self.stance.height(x)]), q)[0]
-        falls = np.concatenate([falls, np.zeros(nu)])
-        to_ground = np.eye(2 * nu) - np.outer(flow, falls) / (falls @ flow)
-        return np.asarray(_slope(self.stance.after, np.concatenate([q, v])) @ to_ground)
+        """Errors after a touchdown of those before: the mean of those of either order."""
+        return np.asarray(np.mean(self.jumps, axis=0))
+
+    @cached_property
+    def jumps(self) -> tuple[Floats, Floats]:
+        """The same where one end of the sole comes down first, and where the other does."""
+        points = self.stance.swing.contacts
+        return self._jump(points[0]), self._jump(points[-1])
+
+    def _jump(self, first: int) -> Floats:
+        """Errors after a touchdown of which one point comes down first, and begins the step."""
+        stance, nu = self.stance, self.stance.robot.nu
+        points = stance.swing.contacts
+        (second,) = {points[0], points[-1]} - {first}
+        q, v, _ = self.joints(self.gait.step_duration)
+        begin = self.joints(0.0)
+        mirror = stance.robot.mirror
+        assert mirror is not None  # see pitch_of
+        driven = mirror.among(stance.driven)
+        torque = driven.sign * self.torque[0][driven.joint]
+
+        def falls(at: Floats, rate: Floats, point: int) -> float:
+            """Time until a point is down, to first order."""
+            height = dynamics.contact_positions(stance.robot, at)[point, 1]
+            return float(-height / (dynamics.contact_jacobian(stance.robot, at)[point, 0] @ rate))
+
+        def through(state: Floats) -> Floats:
+            at = stance.position(state[:nu])
+            rate = stance.velocity(at, state[nu:])
+            until = falls(at, rate, first)
+            hurry = stance.rate(at, rate, self.torque[-1], stance.foot.contacts)
+            at, rate = at + until * rate, rate + until * hurry
+            rate = stance.stopped(at, rate, (first,))
+            until = falls(at, rate, second)
+            hurry = stance.rate(at, rate, torque, (first,))
+            at, rate = at + until * rate, rate + until * hurry
+            rate = stance.stopped(at, rate, points)
+            passed = np.concatenate([begin[1], begin[2]])
+            return stance.relabelled(at, rate) - until * passed
+
+        return _slope(through, np.concatenate([q, v]))
 
     @property
     def misses(self) -> float:
@@ -222,7 +267,7 @@ class FlatOrbit:
         return float(np.abs(self.stance.after(np.concatenate([q, v])) - begin).max())
 
 
-def _slope(function, x: Floats) -> Floats:  # type: ignore[no-untyped-def]
+def _slope(function: Callable[[Floats], Floats], x: Floats) -> Floats:
     """Derivative by central differences, (m, n)."""
     columns = [
         (function(x + SMALL * one) - function(x - SMALL * one)) / (2.0 * SMALL)

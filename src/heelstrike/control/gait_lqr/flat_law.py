@@ -163,7 +163,10 @@ class FlatGaitLQR(Law):
     Attributes
     ----------
     multipliers : (2 nu,) complex
-        Floquet multipliers of a step that the linear equations predict, the largest first.
+        Floquet multipliers of a step that the linear equations predict, the largest first: of the
+        mean of those in which heel or toe come down first.
+    either : tuple of two float
+        Size of the largest if one end of the sole always comes down first, and if the other does.
 
     Raises
     ------
@@ -207,9 +210,9 @@ class FlatGaitLQR(Law):
         gains = _table(orbit.regulator(cost, np.diag(effort)))
         # What the table makes of the gains is what is predicted.
         places = (np.arange(FINE) + 0.5) / FINE
-        self.multipliers: NDArray[np.complex128] = multipliers_of(
-            orbit.over_a_step(_at(gains, places))
-        )
+        step = orbit.over_a_step(_at(gains, places))
+        self.multipliers: NDArray[np.complex128] = multipliers_of(orbit.jump @ step)
+        self.either = tuple(float(abs(multipliers_of(each @ step)[0])) for each in orbit.jumps)
         if not np.all(np.abs(self.multipliers) < 1.0):
             raise ControllerError("no regulator makes this walk repeat; try other weights")
         mirror = robot.mirror
