@@ -30,6 +30,7 @@ from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_still
+from heelstrike.sim.controller.tied import follow_positions
 
 # A point of the swing foot that comes down more slowly than this (m/s) has landed.
 LANDED_SPEED = 1e-3
@@ -264,6 +265,7 @@ def estimate_pose(
     for i in range(robot.nu):
         seen.joint_position[i] = memory.readings[0, i]
         seen.q[model.actuator_joint[i]] = memory.readings[0, i]
+    follow_positions(robot, seen)
     forward_kinematics(model, seen.q, seen.kinematics)
     link = robot.foot_link[memory.stance]
     seen.q[parameters.pitch] -= parameters.pitch_sign * seen.kinematics.angle[link]
@@ -378,11 +380,6 @@ class ComputedTorque(Law):
         pitch = pitch_of(robot)
         if encoder is not None:
             must_be(Encoder, "encoder", encoder)
-        if encoder is not None and robot.model.loops + robot.model.couplings:
-            raise ControllerError(
-                "encoders of motors alone do not tell where joints are that follow by closed loops "
-                "or couplings; leave encoder out"
-            )
         if gait.point_feet:
             _check_points(robot, encoder)
         duration = gait.step_duration

@@ -138,7 +138,8 @@ class JointPD(Law):
     Parameters
     ----------
     robot : Robot
-        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated.
+        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated, or
+        driven by such through closed loops and couplings.
     gait : Gait
         The gait to follow, on flat feet.
     kp, kd : float or (nu,) array
@@ -176,7 +177,7 @@ class JointPD(Law):
         feedforward: Feedforward | str = Feedforward.FULL,
     ) -> None:
         check_gait(robot, gait)
-        refuse_loops(robot, "springs and dampers about a gait", ControllerError)
+        refuse_loops(robot, "springs and dampers about a gait", ControllerError, loops=False)
         pitch_of(robot)
         try:
             known = Feedforward(feedforward)
