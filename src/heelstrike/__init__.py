@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from heelstrike.control import Encoders as Encoders
     from heelstrike.control import Estimated as Estimated
     from heelstrike.control import Feedforward as Feedforward
+    from heelstrike.control import FlatGaitLQR as FlatGaitLQR
     from heelstrike.control import FootSensors as FootSensors
     from heelstrike.control import FootstepFeedback as FootstepFeedback
     from heelstrike.control import GaitLQR as GaitLQR
@@ -152,6 +153,7 @@ _HOME = {
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
     "Floquet": "heelstrike.analysis.stability.floquet",
+    "FlatGaitLQR": "heelstrike.control",
     "FootSensors": "heelstrike.control",
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",

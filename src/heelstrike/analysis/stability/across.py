@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from heelstrike.analysis.stability.returns import Disturbed, Early
+from heelstrike.analysis.stability.returns import Disturbed
 
 Floats = NDArray[np.float64]
 
@@ -54,27 +54,27 @@ class Across:
     along: float | None
 
     @classmethod
-    def of(cls, found: list[Disturbed], early: Early, of_robot: int, *, even: bool) -> Across:
+    def of(cls, found: list[Disturbed], early: float, of_robot: int, *, smooth: bool) -> Across:
         """Look at returns whose first so many coordinates are the robot's.
 
-        `early` is a walk that is, and stays so unless a clock drives it. What is remembered of that
-        follows from the returns if all are `even`, and is as it was seen if not.
+        `early` is what is left of being early: all of it, or less if a clock drives the walk.
+        Disturbances that are `smooth`, less than what moves in a sample, tell by themselves what is
+        remembered of being early by as little.
         """
         kept, inert = _with_consequence([each.matrix for each in found], of_robot)
         square = np.ix_(kept, kept)
         matrices = tuple(each.matrix[square] for each in found)
         same = tuple(np.eye(len(kept)) for _ in range(len(found) + 1))
-        if not abs(early.left - 1.0) <= STAYS:
+        if not abs(early - 1.0) <= STAYS:
             return cls(tuple(kept), tuple(inert), matrices, matrices, same, None)
-        rates = [found[0].begins, *(each.ends for each in found)]
-        if even:
-            remembered = _remembered(np.mean(matrices, axis=0), np.mean(rates[:-1], axis=0))
-        else:
-            remembered = early.remembered[[i - of_robot for i in kept if i >= of_robot]]
-        ways = [np.concatenate((rate, remembered)) for rate in rates]
+        ways = [each[kept] for each in (found[0].begins, *(each.ends for each in found))]
+        if smooth:
+            m = sum(i < of_robot for i in kept)
+            remembered = _remembered(np.mean(matrices, axis=0), np.mean(ways[:-1], axis=0)[:m])
+            ways = [np.concatenate((each[:m], remembered)) for each in ways]
         bases = _alike([null_space(way[None, :]) for way in ways])
         across = [bases[k + 1].T @ each @ bases[k] for k, each in enumerate(matrices)]
-        return cls(tuple(kept), tuple(inert), matrices, tuple(across), tuple(bases), early.left)
+        return cls(tuple(kept), tuple(inert), matrices, tuple(across), tuple(bases), early)
 
     def largest(self, without: int | None = None) -> float:
         """Largest multiplier of a return, one of them left out."""

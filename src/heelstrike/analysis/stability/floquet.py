@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import ClosedLoop, Walk
-from heelstrike.analysis.stability.returns import Disturbed, Early, returned
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
+from heelstrike.analysis.stability.returns import Disturbed, returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
@@ -232,7 +232,7 @@ def floquet_multipliers(
         raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)
     size = loop.usual_disturbance(walk) if disturbance is None else float(disturbance)
-    section = Section(loop, walk.begins[0], walk.duration, size, memory)
+    section = Section(loop, walk, size, memory)
     try:
         found = [returned(loop, section, walk, k, size) for k in range(returns)]
     except LimitCycleError:
@@ -240,7 +240,9 @@ def floquet_multipliers(
             raise
         size *= LESS  # what steps make uneven is large for it, and it falls
         found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    errors = Across.of(found, Early.of(loop, section, walk), section.of_robot, even=loop.even(walk))
+    errors = Across.of(
+        found, stays_early(loop, section, walk), section.of_robot, smooth=size <= SMOOTH
+    )
     return _combined(walk, section, size, found, errors)
 
 

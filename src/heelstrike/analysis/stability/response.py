@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import ClosedLoop, Walk
-from heelstrike.analysis.stability.returns import Early, returned
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
+from heelstrike.analysis.stability.returns import returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
 from heelstrike.contact.ground import Ground
@@ -223,9 +223,11 @@ def disturbance_response(
         raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)
     size = loop.usual_disturbance(walk) if disturbance is None else float(disturbance)
-    section = Section(loop, walk.begins[0], walk.duration, size, None)
+    section = Section(loop, walk, size, None)
     found = [returned(loop, section, walk, k, size, indicator) for k in range(returns)]
-    errors = Across.of(found, Early.of(loop, section, walk), section.of_robot, even=loop.even(walk))
+    errors = Across.of(
+        found, stays_early(loop, section, walk), section.of_robot, smooth=size <= SMOOTH
+    )
     kept = list(errors.kept)
     into, through = [], []
     for name, (disturb, amount) in disturbances.items():

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
-from heelstrike.robot.state import State
 from heelstrike.sim.run import Run
 from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
@@ -36,8 +35,8 @@ class Disturbed:
     residual, residual_but_late : float
         How far the undisturbed walk is from where it was one return before (m, rad, velocities by
         the length they make in half a step), and apart from being early or late.
-    begins, ends : (m,) float
-        Rates of the walk at its beginning and end, in the robot's coordinates.
+    begins, ends : (n,) float
+        Rates of the walk at its beginning and end.
     one_sided, switched : frozenset of str
         Coordinates whose errors of either sign do different things; whole numbers of the memory
         that came out otherwise.
@@ -87,60 +86,37 @@ def returned(
         columns.append(0.5 * (sides[0] + sides[1]))
         told.append((seen[0] - seen[1]) / (2.0 * size) if seen else np.zeros(0))
     missed = section.flat(state - np.concatenate((begin.state.q, begin.state.v)))
-    rate = section.rate(begin)
     return Disturbed(
         matrix=np.array(columns).T,
         seen=np.array(told).T,
         residual=section.size(missed),
-        residual_but_late=section.size(section.but_late(missed, rate)),
-        begins=section.of(rate),
-        ends=section.of(section.rate(end)),
+        residual_but_late=section.size(section.but_late(missed, section.rate(begin))),
+        begins=section.way(begin),
+        ends=section.way(end),
         one_sided=frozenset(one_sided),
         switched=frozenset(switched),
     )
 
 
-@dataclass(frozen=True)
-class Early:
-    """A walk whose robot began where it is a little later.
+def stays_early(loop: ClosedLoop, section: Section, walk: Walk) -> float:
+    """Begin as the walk is a little later; say how much of that is left in the end.
 
-    What the controller remembers is not early at first: that dies away in the first return, if
-    there are more, and what stays is being early alone.
-
-    Attributes
-    ----------
-    left : float
-        How much is left of it in the end; zero if the walk does not go on.
-    remembered : (numbers of the memory,) float
-        What a second of it has made of the memory then.
+    What this makes of a controller is not known to the last: a first return takes that away, if
+    there are more, and what stays is being early alone. Zero if it does not go on so.
     """
-
-    left: float
-    remembered: Floats
-
-    @classmethod
-    def of(cls, loop: ClosedLoop, section: Section, walk: Walk) -> Early:
-        """Let it walk."""
-        simulation, seconds = loop.fresh(), section.early
-        begin, nq = walk.begins[0], loop.robot.nq
-        moved = section.later(begin, seconds)
-        simulation.restore(begin.moved(State(moved[:nq], moved[nq:])))
-        by, nothing = [1.0], cls(0.0, np.zeros(len(section.words.names)))
-        for end in walk.begins[1:]:
-            try:
-                loop.advanced(simulation, end.time, "a walk that is early")
-            except LimitCycleError:
-                return nothing
-            here = np.concatenate((end.state.q, end.state.v))
-            way = section.of(section.later(end, seconds) - here)
-            state, early = section.read(simulation)
-            by.append(float(way @ section.of(state - here) / (way @ way)))
-        loop.simulation.restore(walk.begins[-1])
-        usual = section.read(loop.simulation)[1]
-        first = by[1] if len(by) > 2 else by[0]
-        if first == 0.0 or by[-1] == 0.0:
-            return nothing
-        return cls(by[-1] / first, (early - usual) / (by[-1] * seconds))
+    simulation, seconds = loop.fresh(), section.early
+    section.put_early(simulation, walk.begins[0], seconds)
+    by = [1.0]
+    for end in walk.begins[1:]:
+        try:
+            loop.advanced(simulation, end.time, "a walk that is early")
+        except LimitCycleError:
+            return 0.0
+        here = np.concatenate((end.state.q, end.state.v))
+        way = section.of(section.later(end, seconds)[0] - here)
+        by.append(float(way @ section.of(section.read(simulation)[0] - here) / (way @ way)))
+    first = by[1] if len(by) > 2 else by[0]
+    return by[-1] / first if first != 0.0 else 0.0
 
 
 def _same_feet(
