@@ -102,7 +102,10 @@ class Balance:
 
     @property
     def missing_off_bridges(self) -> float:
-        """The same without bridges, whose error is of their own."""
+        """The same without bridges, whose error is of their own.
+
+        In a corner the impulses that begin one have no frame that a row would show.
+        """
         smooth = [0.0 if "bridge" in word else 1.0 for word in self.what]
         return float(np.max(np.abs(np.cumsum(self.left * smooth)), initial=0.0)) / self.in_play
 
@@ -139,7 +142,8 @@ def balance(work: Work) -> Balance:
             words += " before an event" if work.eventful[k] else ""
             found.append((k, at, left, doubt[k - 1], words))
         if a != b:
-            found.append((-1, at, energy[b] - energy[a] - work.of_kick(k), 0.0, "jump"))
+            words = "jump at a bridge" if k in rows.bridges else "jump"
+            found.append((-1, at, energy[b] - energy[a] - work.of_kick(k), 0.0, words))
             made = kinetic[b] - kinetic[a]
             if k in work.gains:
                 gained += max(made, 0.0)
