@@ -103,13 +103,6 @@ class EventRows:
         time, run = rows.time, rows.run
         edges = [edge for one in run.pushes for edge in (one.start, one.end)]
         self.edges = np.array(sorted(edges))
-        acts = [(one.start < time) & (time <= one.end) for one in run.pushes]
-        share = np.stack(acts, axis=1) if acts else np.zeros((len(time), 0))
-        self.pushed = rows.push(share.astype(float))
-        self.known = rows.smooth + self.pushed
-        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
-        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
-        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -117,6 +110,24 @@ class EventRows:
         self.instant = time[self.first]
         self.settled = np.isin(np.arange(len(time)), self.last)
         """Rows that show what follows their instant, not what went before."""
+        # Where a push begins or ends at the instant of an event, its last row shows what follows.
+        events = np.array([event.time for event in run.events])
+        met = np.abs(time[:, None] - events).min(axis=1, initial=np.inf) <= INSTANT
+        follows = (met & self.settled)[:, None]
+        # Without an event nobody knows which side of such an instant its row shows.
+        edge = np.abs(time[:, None] - self.edges).min(axis=1, initial=np.inf) <= INSTANT
+        self.settled &= met | ~edge
+        begins = np.array([one.start for one in run.pushes])
+        ends = np.array([one.end for one in run.pushes])
+        at = time[:, None]
+        acts = np.where(
+            follows, (begins <= at) & (at < ends), (begins < at) & (at <= ends)
+        )  # fmt: skip
+        self.pushed = rows.push(acts.astype(float))
+        self.known = rows.smooth + self.pushed
+        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
+        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
+        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         self.bridges: dict[int, tuple[float, float]] = {}
         """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
         for event in run.events:
@@ -464,6 +475,8 @@ class EventRows:
             )
             leap = np.abs(rows.q[b] - rows.q[a] - span * rows.v[a] - bent)
             leap -= 2.0 * doubt_q + span * np.abs(change - integral[:n])
+            if k in self.bridges:
+                leap -= self.bridges[k][1]
             motion.append(np.maximum(leap, 0.0) / (1.0 + np.abs(rows.q[b])))
             after = rows.v[b] - jump
             gained = energy[b] - energy[a]
