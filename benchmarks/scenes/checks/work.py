@@ -84,12 +84,11 @@ class Work:
             at = rows.instant[k]
             if len(rows.edges) and np.min(np.abs(rows.edges - at)) <= INSTANT:
                 continue
+            row, two = int(rows.first[k]), rows.first[k] != rows.last[k]
             if at < high - INSTANT:
-                chosen.append(rows.last[k])
-            elif not self.eventful[k]:
-                chosen.append(rows.first[k])
-            elif rows.first[k] != rows.last[k] and not self._meets(int(rows.first[k])):
-                chosen.append(rows.first[k])
+                chosen.append(int(rows.last[k]))
+            elif not self.eventful[k] or (two and not self._meets(row)):
+                chosen.append(row)
         return np.array(chosen, dtype=int)
 
     def _meets(self, row: int) -> bool:

@@ -64,8 +64,10 @@ TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
 # Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
 SLOW = 1e-3
-# The two halves of a bridge of order one are half as wrong as the whole.
-SAFETY = 2.0
+# The two halves of a bridge of order one are half as wrong as the whole, so that it is twice as
+# wrong as they are apart; and what puts its end on the ground afterwards, which they do not know
+# of, moves it up to as far again in most cases.
+SAFETY = 4.0
 # Slopes of the step to come, where states can be kept until then.
 HERE, HALVED = 2, 3
 
