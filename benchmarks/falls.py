@@ -120,6 +120,7 @@ def judge(run: hs.Run) -> Findings:
     if not len(run.time):
         return found
     rows = Rows(run, instants=True)
+    found.look("time goes back", -np.diff(at), 0.0, at[1:])
     above, force = heights(run.robot, q), run.contact_force[..., 0]
     found.look("in the ground", -above, PLACE, at, points)
     apart = np.where(force > 0.0, np.abs(above), 0.0)
