@@ -71,7 +71,8 @@ def test_a_start_is_above_the_ground_and_within_the_ranges(name: str) -> None:
         friction, state = falls.random_start(robot, seed)
         assert 0.1 <= friction <= 1.0
         assert 0.0 <= falls.heights(robot, state.q[None]).min() <= falls.DROP
-        assert np.all(state.q >= robot.model.lower) and np.all(state.q <= robot.model.upper)
+        assert np.all(state.q >= robot.model.lower)
+        assert np.all(state.q <= robot.model.upper)
         again = falls.random_start(robot, seed)[1]
         np.testing.assert_array_equal(state.q, again.q)
         assert not np.array_equal(state.q, falls.random_start(robot, seed + 100)[1].q)
@@ -82,3 +83,11 @@ def test_the_table_counts_what_did_not_arrive() -> None:
     text = falls.table([lost])
     assert "| bravo7 | 1 | 0 | 1 |" in text
     assert "- bravo7 3: hang." in text
+
+
+@pytest.mark.parametrize(("robot", "seed"), [("bravo7", 15), ("human7", 14), ("walker2d", 5)])
+def test_what_once_left_its_place_stays_there(robot: str, seed: int) -> None:
+    """Straight legs that coincide; a stop touched and left within a step; one beyond its end."""
+    worst = falls.judge(falls.fall(robot, seed)).worst
+    for law in ("in the ground", "force off the ground", "joint beyond its range"):
+        assert worst[law] <= falls.PLACE
