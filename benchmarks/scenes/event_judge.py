@@ -70,6 +70,8 @@ ROW = 1e-3
 """What the known forces do in this time (s) is a velocity to reckon with, even at rest."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
+EDGE = 1e-12
+"""An event this near (s) to where a push begins or ends happens there."""
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.PAINLEVE)
 
@@ -89,23 +91,18 @@ def judge_events(run: Any, start: Any = None) -> Findings:
     rows.geometry(found)
     found.figures["penetration"] = float(max(np.max(-rows.gap, initial=0.0), 0.0))
     if len(rows.time):
-        _Events(rows, start).judge(found)
+        EventRows(rows, start).judge(found)
     return found
 
 
-class _Events:
+class EventRows:
+    """The rows of an event-driven run by instants, and the laws that hold at and between them."""
+
     def __init__(self, rows: Rows, start: Any) -> None:
         self.rows, self.start = rows, start
         time, run = rows.time, rows.run
         edges = [edge for one in run.pushes for edge in (one.start, one.end)]
         self.edges = np.array(sorted(edges))
-        acts = [(one.start < time) & (time <= one.end) for one in run.pushes]
-        share = np.stack(acts, axis=1) if acts else np.zeros((len(time), 0))
-        self.pushed = rows.push(share.astype(float))
-        self.known = rows.smooth + self.pushed
-        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
-        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
-        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -113,6 +110,24 @@ class _Events:
         self.instant = time[self.first]
         self.settled = np.isin(np.arange(len(time)), self.last)
         """Rows that show what follows their instant, not what went before."""
+        # Where a push begins or ends at the instant of an event, its last row shows what follows.
+        events = np.array([event.time for event in run.events])
+        met = np.abs(time[:, None] - events).min(axis=1, initial=np.inf) <= INSTANT
+        follows = (met & self.settled)[:, None]
+        # Without an event nobody knows which side of such an instant its row shows.
+        edge = np.abs(time[:, None] - self.edges).min(axis=1, initial=np.inf) <= INSTANT
+        self.settled &= met | ~edge
+        begins = np.array([one.start for one in run.pushes])
+        ends = np.array([one.end for one in run.pushes])
+        at = time[:, None]
+        acts = np.where(
+            follows, (begins <= at) & (at < ends), (begins < at) & (at <= ends)
+        )  # fmt: skip
+        self.pushed = rows.push(acts.astype(float))
+        self.known = rows.smooth + self.pushed
+        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
+        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
+        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         self.bridges: dict[int, tuple[float, float]] = {}
         """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
         for event in run.events:
@@ -460,6 +475,8 @@ class _Events:
             )
             leap = np.abs(rows.q[b] - rows.q[a] - span * rows.v[a] - bent)
             leap -= 2.0 * doubt_q + span * np.abs(change - integral[:n])
+            if k in self.bridges:
+                leap -= self.bridges[k][1]
             motion.append(np.maximum(leap, 0.0) / (1.0 + np.abs(rows.q[b])))
             after = rows.v[b] - jump
             gained = energy[b] - energy[a]
@@ -507,10 +524,14 @@ class _Events:
         for k, (length, _) in self.bridges.items():
             changes |= np.abs(self.instant - self.instant[k] - length) <= INSTANT
         for event in self.rows.run.events:
+            if event.kind is EventKind.ZENO:  # says when the bounces would have ended: it rests
+                continue
             near = np.abs(self.instant - event.time) <= INSTANT
             if np.any(near):
                 changes |= near
-            else:  # it has no row of its own: nothing may be integrated across it
+            elif not np.any(np.abs(self.edges - event.time) <= EDGE):
+                # It has no row of its own, as at the edges of pushes: nothing may be integrated
+                # across it.
                 changes |= np.abs(self.instant - event.time) < 2e-3
         return changes
 

@@ -22,6 +22,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -106,6 +107,8 @@ def gather_near(model: Model, length: float, bouncing: bool, phase: Phase, memor
             point = contact - phase.first_second
             if phase.passing[point] == 1 or phase.seconds.gap[point] == np.inf:
                 continue
+        if phase.first_dry <= contact < phase.first_second and phase.closed[contact] == 0:
+            continue
         gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
         if phase.first_dry <= contact < phase.first_second:
             write_free(0.0, length, contact, count, model, phase, memory)
@@ -320,7 +323,7 @@ def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -
             if contacts.gap[point] <= TOUCHING:
                 stand_on_face(model, ground, tree, point, contacts, memory.surface, phase)
         elif contact >= phase.first_dry:
-            if mode[contact] != STICK:
+            if phase.closed[contact] == 1 and mode[contact] != STICK:
                 joint = phase.dry_joint[contact - phase.first_dry]
                 phase.slide[contact] = heading(phase.begin[model.nq + joint])
             continue
@@ -341,7 +344,7 @@ def cross(
     """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     if phase.time - phase.series >= PROGRESS:
         phase.series = phase.time
         phase.bridges = 0
@@ -365,10 +368,11 @@ def cross(
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows
-    write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     for dry in range(phase.dry_joint.shape[0]):
         torque = phase.impulse[phase.first_dry + dry, 1] / phase.length
         record.friction_torque[row, phase.dry_joint[dry]] = torque
+    share_friction(model, phase.breakaway, record.friction_torque[row], record.brake_torque[row])
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
     adopt_end(model, scene.ground, memory, phase)

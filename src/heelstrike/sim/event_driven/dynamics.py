@@ -319,7 +319,7 @@ def hold_closed(
         impulse[2 * place + 1] = 0.0
         if phase.first_dry <= contact < phase.first_second:
             joint = phase.dry_joint[contact - phase.first_dry]
-            impulse[2 * place] = model.dry_friction[joint]
+            impulse[2 * place] = phase.breakaway[joint]
     loops = rows_of(memory.loops)
     total = count + loops
     free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)

@@ -57,9 +57,11 @@ NEAR_ENOUGH = 0.1
 # How often a step is looked through for its first event.
 ATTEMPTS = 3
 # Where a point that has just left the ground is looked for: at this part of the way to the first
-# sample, and so on, until that is less than this (s).
+# sample, and so on, until that is less than this (s); and one that rises no further from it than
+# this (m), until that is less than this (s).
 EARLIER = 0.25
 SOONEST = 1e-8
+LOW, SOON = 1e-5, 1e-6
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
@@ -155,12 +157,12 @@ def find_root(
     """Fraction of the step at which an event function first changes sign, or turns round.
 
     In the bracket (low, its value, high, its value) it is positive at `low` and negative at `high`;
-    with `turn` not zero these are `turn` times its rate. Regula falsi that halves the interval
-    every third time. An event function that is zero at `low`, where its phase begins, is first
-    followed back from `high` to where it is positive.
+    with `turn` not zero these are `turn` times its rate, which takes forces if it is that of a
+    speed. Regula falsi that halves the interval every third time. An event function that is zero at
+    `low`, where its phase begins, is first followed back from `high` to where it is positive.
     """
     low, low_value, high, high_value = bracket
-    forces = not is_geometric(function, phase)
+    forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase)
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
@@ -184,10 +186,35 @@ def find_root(
 
 @kernel
 def just_left(function: int, phase: Phase) -> bool:
-    """Whether it is the gap of an open contact that is still on the ground."""
+    """Whether it is the gap of an open contact still on the ground, or rising close above it."""
     contact = function // 2
-    is_gap = contact < phase.watched and function % 2 == 0
-    return bool(is_gap and phase.closed[contact] == 0 and phase.before[function] <= TOGETHER)
+    if contact >= phase.watched or function % 2 == 1 or phase.closed[contact] == 1:
+        return False
+    rises = phase.before_rate[function] >= 0.0
+    return bool(phase.before[function] <= (LOW if rises else TOGETHER))
+
+
+@kernel
+def is_sliding_speed(function: int, phase: Phase) -> bool:
+    """Whether it is the speed of what slides, whose rate is known."""
+    contact = function // 2
+    if contact >= phase.watched or function % 2 == 0 or phase.slide[contact] == 0:
+        return False
+    return bool(phase.group[contact] == contact)
+
+
+@kernel
+def may_dip(function: int, span: float, phase: Phase) -> bool:
+    """Whether a function that falls at one sample and rises at the next may vanish between them.
+
+    A convex one is nowhere below both tangents; it is given twice that depth.
+    """
+    before, rate = phase.before[function], phase.before_rate[function]
+    value, later_rate = phase.sample[function], phase.sample_rate[function]
+    where = (before - value + later_rate * span) / (later_rate - rate)
+    if not 0.0 <= where <= span:
+        return True
+    return bool(2.0 * (before + rate * where) <= min(before, value))
 
 
 @kernel
@@ -227,8 +254,12 @@ def crossing(
     rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
     is_gap = function < 2 * phase.watched
     is_gap = is_gap and function % 2 == 0 and phase.closed[function // 2] == 0
-    if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
-        # An open point came down and went up again: how close was it?
+    dips = rate < 0.0 and later_rate > 0.0 and value >= 0.0
+    if dips and not is_gap:
+        span = length * (high - low)
+        dips = is_sliding_speed(function, phase) and may_dip(function, span, phase)
+    if dips:
+        # An open point came down and went up again, or what slides was slower: how near to zero?
         bracket = low, -rate, high, -later_rate
         end = find_root(scene, function, -1.0, bracket, length, control, memory, phase)
         value = phase.value[function]
@@ -268,9 +299,10 @@ def early_crossing(
     but on a scale of its own: it is looked for at ever smaller parts of the way there.
     """
     value, rate = phase.sample[function], phase.sample_rate[function]
+    soonest = SOONEST if phase.before[function] <= TOGETHER else SOON
     root = NO_EVENT
     part = high
-    while root == NO_EVENT and part * length > SOONEST:
+    while root == NO_EVENT and part * length > soonest:
         part *= EARLIER
         evaluate_within(scene, part, length, False, control, memory, phase)
         phase.sample[function] = phase.value[function]
@@ -294,7 +326,7 @@ def first_event(
     functions = 2 * phase.watched
     if has_corners(scene.ground):
         functions += scene.model.nc
-    together = EVENT_TIME / length
+    together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
     low = 0.0
     for k in range(1, SAMPLES + 1):
         high = k / SAMPLES

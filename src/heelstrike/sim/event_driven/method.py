@@ -26,7 +26,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, stops_any, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
@@ -106,6 +106,8 @@ FIRST_LOOK = 1e-9
 LAST_LOOK = 1e-4
 CLEARLY = 1e-7
 LOOKS = 24
+# Forces that are so far beyond a limit, as a fraction of the weight, when a phase begins, are none.
+CONTRADICTION = 1e-3
 
 # Places in the life of a simulation: the first contact modes are being decided; they have been.
 BEGUN = 1
@@ -431,6 +433,9 @@ def decide_modes(
         if not jammed:
             return begin_phase(model, scene.ground, count, memory, phase, record)
         jammed = False
+        if phase.last_row < phase.time:
+            write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[1])
         if not jump(model, memory, phase, record):
             return False
     return False
@@ -452,13 +457,26 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
 
 
 @kernel
-def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
-    """Let joints with dry friction begin as they move."""
+def rubs_otherwise(breakaway: Floats, phase: Phase) -> bool:
+    """Whether a joint has other dry friction from now on."""
+    found = False
+    for joint in phase.dry_joint:
+        found = found or phase.breakaway[joint] != breakaway[joint]
+    return found
+
+
+@kernel
+def begin_rubbing(v: Floats, breakaway: Floats, phase: Phase, reported: Reported) -> None:
+    """Let joints with dry friction begin as they move, and those with none any more be free."""
     for dry in range(phase.dry_joint.shape[0]):
-        contact = phase.first_dry + dry
-        phase.slide[contact] = heading(v[phase.dry_joint[dry]])
-        reported.closed[contact] = 1
-        reported.slipping[contact] = phase.slide[contact]
+        contact, joint = phase.first_dry + dry, phase.dry_joint[dry]
+        phase.breakaway[joint] = breakaway[joint]
+        rubs = 1 if breakaway[joint] > 0.0 else 0
+        if phase.closed[contact] != rubs:
+            phase.closed[contact] = rubs
+            phase.slide[contact] = rubs * heading(v[joint])
+            reported.closed[contact] = rubs
+            reported.slipping[contact] = phase.slide[contact]
 
 
 @kernel
@@ -517,6 +535,8 @@ def find_what_happened(
             elif first or second:
                 forced = True
             continue
+        if phase.first_dry <= contact < phase.first_second:
+            continue
         gap = gap_now(contact, contacts, phase, phase.begin)
         normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
         if starting:
@@ -536,6 +556,7 @@ def find_what_happened(
             impact = True
         elif first and normal <= rest:
             phase.closed[contact] = 1
+            phase.hit[contact] = UNPRESSED
             phase.slide[contact] = 0
             if abs(tangent) > rest:
                 phase.slide[contact] = 1 if tangent > 0.0 else -1
@@ -661,7 +682,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]
-    begin_dry_joints(v, phase, memory.reported)
+    begin_rubbing(v, memory.breakaway, phase, memory.reported)
     evaluate_equations(model, q, v, equations)
     locate(model, ground, equations.tree, phase, memory.contacts, memory.surface)
     code = meet_event(True, model, ground, memory, phase, record)
@@ -680,17 +701,41 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 @kernel
 def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
-    """Let the brakes that have been put on take hold, by an impact of all that touches."""
+    """Let the brakes that have been put on take hold, by an impact of all that touches.
+
+    Those that slip begin to, and end.
+    """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
-    take_hold(memory.loops)
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    for contact in range(phase.closed.shape[0]):
-        phase.hit[contact] = 0
-    if not strike(model, scene.ground, memory, phase, record):
-        phase.bridging = 1
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
+    begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
+    stops = take_hold(model, memory.loops)
+    # Of joints at rest there is no impact to solve: its data would be rounding.
+    if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+        for contact in range(phase.closed.shape[0]):
+            phase.hit[contact] = 0
+        if not strike(model, scene.ground, memory, phase, record):
+            phase.bridging = 1
     note_brakes(model, phase.time, 1.0, record, memory.loops)
+
+
+@kernel
+def contradicts_itself(phase: Phase) -> bool:
+    """Whether forces of the phase that begins are far beyond limits at once.
+
+    At a pole of the forces, before which they grow without bound, the modes of a moment later may
+    be none of now. An event function that is negative from the beginning would not end the phase.
+    """
+    if phase.deficient == 1:
+        return False
+    least = -CONTRADICTION * phase.weight
+    for contact in range(phase.watched):
+        if phase.carrier[contact] == 1 and phase.value[2 * contact] < least:
+            return True
+        if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < least:
+            return True
+    return False
 
 
 @kernel
@@ -704,7 +749,7 @@ def decide(
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops):
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, phase):
         brake(scene, control, memory, phase, record)
     phase.at_event = phase.undecided
     open_modes = phase.at_event == 1 or jumped
@@ -718,6 +763,11 @@ def decide(
     phase.forced = 0
     phase.jammed = 0
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    if open_modes and contradicts_itself(phase):
+        phase.bridging = 1
+        phase.at_event = 0
+        phase.undecided = 1
+        return DONE
     if phase.at_event == 1:
         show_forces(phase.force, phase, memory.contacts)
     return DONE
@@ -731,7 +781,7 @@ def report(
     every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
     last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
     if phase.at_event == 1 or last:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
 
 
 @kernel
@@ -770,6 +820,7 @@ def move_over(
     phase.burst = 0
     phase.allowance = EVENTS_A_BRIDGE
     phase.next_length = 1e-6
+    write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     meet_event(False, scene.model, scene.ground, memory, phase, record)
     show_state(scene.model, phase, memory)

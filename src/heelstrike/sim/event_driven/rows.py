@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
@@ -17,6 +18,7 @@ from heelstrike.sim.event_driven.dynamics import (
     is_in_place,
     project,
 )
+from heelstrike.sim.event_driven.location import TOGETHER
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
@@ -65,26 +67,32 @@ def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool
 
 @kernel
 def write_row(
-    scene: Scene, time: float, state: Floats, control: Control, memory: Memory, phase: Phase,
-    record: Record,
+    scene: Scene, time: float, state: Floats, lawful: bool, control: Control, memory: Memory,
+    phase: Phase, record: Record,
 ) -> None:  # fmt: skip
-    """Append a state, put on its constraints, with the certified contact forces in it."""
+    """Append a state, put on its constraints, with the certified contact forces in it.
+
+    Where no contact forces obey the laws there are none in the row.
+    """
     put_right(scene, state, memory, phase)
-    write_right(scene, time, control, memory, phase, record)
+    write_right(scene, time, lawful, control, memory, phase, record)
 
 
 @kernel
 def write_right(
-    scene: Scene, time: float, control: Control, memory: Memory, phase: Phase, record: Record
-) -> None:
-    """Append the state in ``phase.trial``, with the certified contact forces in it."""
+    scene: Scene, time: float, lawful: bool, control: Control, memory: Memory, phase: Phase,
+    record: Record,
+) -> None:  # fmt: skip
+    """Append the state in ``phase.trial``, as :func:`write_row` does."""
     model, contacts, assembly = scene.model, memory.contacts, memory.assembly
     trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
     count, loops = phase.closed_count, rows_of(memory.loops)
-    if count + loops > 0:
+    if not lawful:
+        count = 0
+    elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
         note_loops(model, count + loops, impulse, memory.loops)
@@ -92,7 +100,7 @@ def write_right(
     note_row(time, memory, record)
     note_state(model, row, trial, record)
     slide = phase.slide[phase.first_dry :]
-    dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
+    dry_force(phase.dry_joint, slide, phase.breakaway, friction_torque)
     deepest = memory.tally.penetration
     for contact in range(model.nc):
         if phase.passing[contact] == 0:
@@ -117,12 +125,23 @@ def write_right(
             _, record.slip_velocity[row, contact] = contact_velocity(
                 model, memory.equations.tree, contacts, contact
             )
+    share_friction(model, phase.breakaway, friction_torque, record.brake_torque[row])
     for second in range(phase.first_second, phase.watched):
         record_corner(row, second - phase.first_second, model, memory, phase, record)
     phase.last_row = time
     period = phase.output_period * phase.row_every
     if period > 0.0 and abs(phase.next_row * period - time) <= 1e-12:
         phase.next_row += 1
+
+
+@kernel
+def comes_down(contact: int, phase: Phase) -> bool:
+    """Whether an open contact reaches its limit at the end of the step, or is hit with others.
+
+    What the end looked like is kept: the rows of the step may be written in parts.
+    """
+    near = phase.end_value[2 * contact] <= 2.0 * TOGETHER and phase.end_rate[2 * contact] < 0.0
+    return bool(phase.fired[2 * contact] == 1 or near)
 
 
 @kernel
@@ -143,7 +162,7 @@ def write_rows_within(
     if phase.has_fired == 1:
         last -= 1e-12
         for contact in range(phase.watched):
-            touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+            touch = touch or (phase.closed[contact] == 0 and comes_down(contact, phase))
         for corner in range(2 * phase.watched, 2 * phase.watched + scene.model.nc):
             touch = touch or phase.fired[corner] == 1
     state = phase.slopes[SLOPES - 1]
@@ -171,4 +190,4 @@ def write_rows_within(
             phase.next_length = time - phase.time
             record.rows, phase.next_row, phase.last_row = first, next_row, last_row
             return TOO_FAR
-        write_right(scene, time, control, memory, phase, record)
+        write_right(scene, time, True, control, memory, phase, record)
