@@ -1,11 +1,11 @@
 """Random falls of every robot of the library, event-driven, each judged from its record.
 
-The robot is let go without a controller on flat ground and followed for 3 s, whatever becomes of it.
-Its start is drawn from ``default_rng([7, seed, robot])``, where the number of a robot is the CRC-32
-of its name, in this order: friction from 0.1 to 1; every joint anywhere in its range, one without a
-range within 1.5 rad of zero, and so the pitch; the lowest contact point up to 0.3 m above the ground,
-the others above it; velocities of normal distribution, of 1 m/s for the trunk, 1 rad/s for its pitch
-and 2 rad/s for the joints. Only contact points meet the ground: a trunk without any falls through
+The robot is let go without a controller on flat ground and followed for 3 s, whatever becomes of
+it. Its start is drawn from ``default_rng([7, seed, robot])``, where the number of a robot is the
+CRC-32 of its name, in this order: friction from 0.1 to 1; every joint anywhere in its range, one
+without a range within 1.5 rad of zero, and so the pitch; velocities of normal distribution, of 1
+m/s for the trunk, 1 rad/s for its pitch and 2 rad/s for the joints; the height of the lowest
+contact point, up to 0.3 m. Only contact points meet the ground: a trunk without any falls through
 it and swings below. Latches begin open.
 
 The judge reads numbers of robot and record alone; poses, speeds and energies come from
@@ -14,8 +14,10 @@ The judge reads numbers of robot and record alone; poses, speeds and energies co
 - the run does not complete;
 - at any row a contact point is deeper in the ground than 1e-10 m, or has a force and is not within
   1e-10 m of it, or a joint is beyond its range by more than 1e-10 rad;
+- the ground pulls, by more than 1e-9 of the weight;
 - a coordinate moves from one row to the next (1 ms, and at events) in another way than its speeds
-  there explain (if nothing else is wrong, a second look is taken with rows of 0.1 ms);
+  there explain (if nothing else is wrong, a second look is taken with rows of 0.1 ms), or time
+  does not go on;
 - the energy of a robot that nothing drives rises, by more than 1e-6 of what is in play, of which
   the integrator's tolerance (rtol 1e-8) explains a part; what bridges add is told apart;
 - bridges last longer than 1e-3 of the run.
@@ -120,6 +122,7 @@ def judge(run: hs.Run) -> Findings:
     if not len(run.time):
         return found
     rows = Rows(run, instants=True)
+    found.look("time goes back", -np.diff(at), 0.0, at[1:])
     above, force = heights(run.robot, q), run.contact_force[..., 0]
     found.look("in the ground", -above, PLACE, at, points)
     apart = np.where(force > 0.0, np.abs(above), 0.0)

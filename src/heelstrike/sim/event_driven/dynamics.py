@@ -447,11 +447,14 @@ def gather_sunk(
 ) -> int:
     """Append the open contacts that are beyond the ground, or their range, by rounding.
 
-    After those that are closed, and before the loops. Returns how many there are.
+    After those that are closed, and before the loops. What reaches the ground in this instant is
+    none of them: it is the instant that is corrected. Returns how many there are.
     """
     assembly, sunk = memory.assembly, 0
     for contact in range(phase.first_dry):
-        if phase.closed[contact] == 1 or (contact < model.nc and phase.passing[contact] == 1):
+        if phase.closed[contact] == 1 or phase.fired[2 * contact] == 1:
+            continue
+        if contact < model.nc and phase.passing[contact] == 1:
             continue
         if -DEEP < gap_now(contact, contacts, phase, state) < -SHALLOW:
             place = count + sunk

@@ -27,7 +27,6 @@ from heelstrike.sim.event_driven.dynamics import (
     EXPLAINED,
     evaluate,
     explained,
-    is_in_place,
     look,
     project,
 )
@@ -384,12 +383,8 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     end, before = phase.end, phase.trial
     for i in range(end.shape[0]):
         before[i] = end[i]
-    left, strayed, fastest = project(scene.model, scene.ground, memory, phase, end)
-    if left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase):
-        return True
-    for i in range(end.shape[0]):
-        end[i] = before[i]
-    return is_in_place(strayed, fastest)
+    left, _, _ = project(scene.model, scene.ground, memory, phase, end)
+    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
 
 
 @kernel

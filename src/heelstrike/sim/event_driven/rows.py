@@ -152,10 +152,12 @@ def write_rows_within(
 
     An event at its end has rows of its own, one before it if velocities or normals may jump. Where
     the dense output is too far from the constraints, as beside a singular pose, the step has to end
-    at the row: nothing but integration finds the state there.
+    at the row: nothing but integration finds the state there. Rows before it are taken back, since
+    the shorter step may meet an event that the longer one has passed.
     """
     period = phase.output_period * phase.row_every
     last = phase.time + phase.length
+    first, next_row, last_row = record.rows, phase.next_row, phase.last_row
     touch = False
     if phase.has_fired == 1:
         last -= 1e-12
@@ -183,7 +185,9 @@ def write_rows_within(
         else:  # the end has been put on its constraints, and on the event
             for i in range(state.shape[0]):
                 state[i] = phase.end[i]
-        if not put_right(scene, state, memory, phase) and part < AT_ITS_END:
+        fits = put_right(scene, state, memory, phase)
+        if not fits and part < AT_ITS_END and not last_row > phase.time:
             phase.next_length = time - phase.time
+            record.rows, phase.next_row, phase.last_row = first, next_row, last_row
             return TOO_FAR
         write_right(scene, time, True, control, memory, phase, record)
