@@ -68,6 +68,9 @@ TOGETHER = 5e-11
 """Gap (m) up to which a point takes part in an impact elsewhere."""
 ROW = 1e-3
 """What the known forces do in this time (s) is a velocity to reckon with, even at rest."""
+BRIEF = 1e-8
+"""What is left of bounces shorter than this (s) may be lost: of each that comes to rest, what the
+known forces do in it."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
 
@@ -316,8 +319,9 @@ class _Events:
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
             left -= self.couple(a, left, p)
-            unexplained = rows.metric_of(one).of_force(left[None]) / size
-            found.look("balance of an impact", unexplained, JUMP, time)
+            unexplained = rows.metric_of(one).of_force(left[None])
+            unexplained -= BRIEF * self.force_size[a] * self.resting(b)
+            found.look("balance of an impact", unexplained / size, JUMP, time)
             if k in self.bridges:
                 self.bridge_law(found, k, one, p, size)
                 continue
@@ -326,6 +330,14 @@ class _Events:
                 found.look("impact makes energy", np.array([gained / size**2]), GAIN, time)
             if most.get(k, 0) == 1 and b - a <= 1:
                 self.impact_law(found, one, p, s, before, after, size)
+
+    def resting(self, row: int) -> int:
+        """How many contact points and stops are at rest on their limits."""
+        rows, model = self.rows, self.rows.model
+        near = np.minimum(rows.q[row] - model.lower, model.upper - rows.q[row])
+        points = (rows.gap[row] <= TOGETHER) & (np.abs(rows.speed[row, :, 0]) <= RESTING)
+        stops = (near <= TOGETHER) & (np.abs(rows.v[row]) <= RESTING)
+        return int(points.sum() + stops.sum())
 
     def couple(self, row: int, left: Array, p: Array) -> Array:
         """Part of a generalised impulse that couples on discs in corners explain.
