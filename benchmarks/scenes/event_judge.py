@@ -456,7 +456,8 @@ class _Events:
             begin, end = self.instant[k], self.instant[k + 1]
             span = end - begin
             if k + 1 in self.jams:
-                self.jam(found, k, energy)
+                if k not in self.bridges:  # of a bridge that ends in one its own law asks that
+                    self.jam(found, k, energy)
                 continue
             if np.any((self.edges > begin - INSTANT) & (self.edges < end + INSTANT)):
                 left_out += 1
@@ -512,6 +513,9 @@ class _Events:
         )
         size += ROW * self.force_size[a]
         work = span * (abs(self.free_power[a]) + abs(self.free_power[b]))
+        # What is as near as that to the ground is put on it.
+        model = self.rows.model
+        work += float(np.sum(model.mass)) * float(np.linalg.norm(model.gravity)) * TOGETHER
         made = (energy[b] - energy[a] - work) / size**2
         found.look("jam makes energy", np.array([made]), GAIN, self.instant[k : k + 1])
 
