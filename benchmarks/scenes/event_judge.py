@@ -268,11 +268,14 @@ class _Events:
         joint: dict[int, Array] = {}
         most: dict[int, int] = {}
         gains: set[int] = set()
+        late: set[int] = set()
         seen: dict[tuple[int, int, int], int] = {}
         for event in self.rows.run.events:
             k = int(np.argmin(np.abs(self.instant - event.time)))
             if event.kind is EventKind.ENERGY_GAIN:
                 gains.add(k)
+            if event.kind is EventKind.BRIDGE:
+                late.add(k)
             stop = event.kind is EventKind.JOINT_STOP
             if event.impulse == (0.0, 0.0) or not (stop or event.kind in IMPULSIVE):
                 continue
@@ -287,10 +290,28 @@ class _Events:
                     side * event.impulse[0]
                 )
             else:
+                impulse = self.in_first_frame(
+                    k, event, event.kind is EventKind.PAINLEVE or k in late
+                )
                 contact.setdefault(k, np.zeros((len(self.rows.contacts), 2)))[event.contact] += (
-                    event.impulse
+                    impulse
                 )
         return contact, joint, most, gains
+
+    def in_first_frame(self, k: int, event: Any, late: bool) -> Array:
+        """Impulse of an event in the frame that the first row of its instant has.
+
+        A point that meets a second face does so in the frame of that one, which is that of the row
+        before; jams and bridges after it are in the frame of the row behind.
+        """
+        rows, low, high = self.rows, self.first[k], self.last[k]
+        same = np.flatnonzero(rows.time[low : high + 1] == event.time) + low
+        row = high if late else (same[0] if len(same) else low)
+        x, z = rows.normal[row, event.contact]
+        to_x, to_z = rows.normal[low, event.contact]
+        along, across = event.impulse
+        force = np.array([along * x + across * z, along * z - across * x])
+        return np.array([force @ (to_x, to_z), force @ (to_z, -to_x)])
 
     def impacts(self, found: Findings) -> None:
         """Jumps between rows of one time, and impulses that have no row before them."""
