@@ -73,6 +73,8 @@ BRIEF = 1e-8
 known forces do in it."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
+EDGE = 1e-12
+"""An event this near (s) to where a push begins or ends happens there."""
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.PAINLEVE)
 
@@ -92,11 +94,13 @@ def judge_events(run: Any, start: Any = None) -> Findings:
     rows.geometry(found)
     found.figures["penetration"] = float(max(np.max(-rows.gap, initial=0.0), 0.0))
     if len(rows.time):
-        _Events(rows, start).judge(found)
+        EventRows(rows, start).judge(found)
     return found
 
 
-class _Events:
+class EventRows:
+    """The rows of an event-driven run by instants, and the laws that hold at and between them."""
+
     def __init__(self, rows: Rows, start: Any) -> None:
         self.rows, self.start = rows, start
         time, run = rows.time, rows.run
@@ -557,10 +561,14 @@ class _Events:
         for k, (length, _) in self.bridges.items():
             changes |= np.abs(self.instant - self.instant[k] - length) <= INSTANT
         for event in self.rows.run.events:
+            if event.kind is EventKind.ZENO:  # says when the bounces would have ended: it rests
+                continue
             near = np.abs(self.instant - event.time) <= INSTANT
             if np.any(near):
                 changes |= near
-            else:  # it has no row of its own: nothing may be integrated across it
+            elif not np.any(np.abs(self.edges - event.time) <= EDGE):
+                # It has no row of its own, as at the edges of pushes: nothing may be integrated
+                # across it.
                 changes |= np.abs(self.instant - event.time) < 2e-3
         return changes
 

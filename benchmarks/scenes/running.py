@@ -40,7 +40,7 @@ def run_scene(method: str, seed: int, *, twins: bool = True) -> dict[str, Any]:
     found = setting.judge(method, run)
     quick = result["simulated_s"] < QUICK
     if method == "event_driven" and quick and BETWEEN_ROWS & set(found.broken()):
-        closer = setting.judge(method, setting.run(method, every_step=FINE))
+        closer = setting.judge(method, setting.run(method, rows=None, max_step=FINE))
         found.renew(BETWEEN_ROWS, closer)
         result["fine"] = True
     result |= found.as_dict()

@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from heelstrike.analysis.stability.largest import largest_slope as largest_slope
     from heelstrike.analysis.stability.monodromy import Monodromy as Monodromy
     from heelstrike.analysis.stability.monodromy import monodromy as monodromy
+    from heelstrike.analysis.stability.response import DisturbanceResponse as DisturbanceResponse
+    from heelstrike.analysis.stability.response import (
+        disturbance_response as disturbance_response,
+    )
     from heelstrike.analysis.stability.sensitivity import (
         gait_sensitivity_norm as gait_sensitivity_norm,
     )
@@ -141,6 +145,7 @@ _HOME = {
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
+    "DisturbanceResponse": "heelstrike.analysis.stability.response",
     "Encoder": "heelstrike.control",
     "Encoders": "heelstrike.control",
     "Estimated": "heelstrike.control",
@@ -199,6 +204,7 @@ _HOME = {
     "contact_inverse_dynamics": "heelstrike.contact",
     "contact_kinematics": "heelstrike.contact",
     "controller": "heelstrike.control",
+    "disturbance_response": "heelstrike.analysis.stability.response",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "floquet_multipliers": "heelstrike.analysis.stability.floquet",
     "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",

@@ -135,7 +135,7 @@ def leaning(q: np.ndarray) -> np.ndarray:
         (None, {"torque_weight": 0.0}, "torque_weight must be positive"),
         (None, {"position_weight": [1.0, 2.0]}, "position_weight must be one number"),
         (None, {"velocity_weight": -1.0}, "velocity_weight must be one number"),
-        (None, {"period": 0.0}, "period of a controller must be positive"),
+        (None, {"period": 0.0}, "period must be a positive number"),
     ],
 )
 def test_what_cannot_stand_is_refused(posture: Any, options: Any, said: str) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import RANK_TOLERANCE, derivative
 from heelstrike.analysis.stability.loop import ClosedLoop
+from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
@@ -37,6 +38,12 @@ CHANGE = 1e-5
 SHORT = 1e-3
 """Seconds after which a number of the memory shows whether it matters, without samples."""
 
+EARLY = 0.004
+"""A walk that is early by this part of a return stays so, or is driven by a clock."""
+
+INSTANT = 1e-5
+"""Seconds over which a rate is seen where no fixed step is the least."""
+
 STEADY = 1e-3
 """A number that varies by less has one as its unit."""
 
@@ -54,6 +61,8 @@ class Section:
         The first middle of a step.
     duration : float
         Of a return, in s.
+    size : float
+        Of the disturbances.
     memory : sequence of str, optional
         Numbers of the controller's memory; by default all that matter.
 
@@ -65,12 +74,15 @@ class Section:
         How many are the robot's.
     directions : (nq + nv, m) float
         These, m of them.
-    flow : (n,) float
-        The way of the walk itself, in the robot's coordinates.
     """
 
     def __init__(
-        self, loop: ClosedLoop, begin: Snapshot, duration: float, memory: Sequence[str] | None
+        self,
+        loop: ClosedLoop,
+        begin: Snapshot,
+        duration: float,
+        size: float,
+        memory: Sequence[str] | None,
     ) -> None:
         self._loop, self._begin, self._duration = loop, begin, duration
         self._nq = loop.robot.nq
@@ -78,11 +90,10 @@ class Section:
         self._scale = np.concatenate((np.ones(self._nq), np.full(loop.robot.nv, 0.25 * duration)))
         self._standing = self.standing(begin)
         self._frame()
-        self.words = Words(loop, begin, duration, memory)
+        self.words = Words(loop, begin, duration, size, memory)
         self.of_robot = self.directions.shape[1]
         robot = tuple(f"robot {i + 1}" for i in range(self.of_robot))
         self.names = robot + tuple(self.words.names)
-        self.flow = self._flow()
 
     def standing(self, at: Snapshot) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""
@@ -98,7 +109,11 @@ class Section:
 
     def feet(self, at: Snapshot) -> set[int]:
         """Which feet are on the ground, or next to it."""
-        seen = contact_kinematics(self._loop.robot, at.state.q, at.state.v, self._loop.ground)
+        return self.feet_of(at.state, self._loop.ground)
+
+    def feet_of(self, state: State, ground: Ground) -> set[int]:
+        """Which feet are on a ground, or next to it."""
+        seen = contact_kinematics(self._loop.robot, state.q, state.v, ground)
         lowest = float(seen.gap.min(initial=0.0))
         return {self._loop.foot(int(i)) for i in np.flatnonzero(seen.gap <= lowest + STANDS)}
 
@@ -165,13 +180,35 @@ class Section:
         state = simulation.state
         return np.concatenate((state.q, state.v)), self.words.read(simulation)
 
-    def _flow(self) -> Floats:
-        """Rate of the state, in coordinates."""
-        simulation, short = self._loop.simulation, self._loop.grid or SHORT
-        simulation.restore(self._begin)
-        self._loop.advanced(simulation, self._begin.time + short, "the walk does not go on")
-        rate = (self.read(simulation)[0] - _vector(self._begin)) / short
-        return np.concatenate((self.of(rate), np.zeros(len(self.words.names))))
+    def later(self, at: Snapshot, seconds: float) -> Floats:
+        """State (q, v) of the walk, so much later."""
+        simulation = self._loop.simulation
+        simulation.restore(at)
+        self._loop.advanced(simulation, at.time + seconds, "the walk does not go on")
+        return self.read(simulation)[0]
+
+    def rate(self, at: Snapshot) -> Floats:
+        """Rate of the state."""
+        short, here = self._loop.simulation.method.step_length or INSTANT, _vector(at)
+        one, two = (self.later(at, k * short) - here for k in (1, 2))
+        return (2.0 * one - 0.5 * two) / short  # but for the square of `short`
+
+    @property
+    def early(self) -> float:
+        """Seconds, a whole number of samples, of which is seen whether they stay."""
+        wanted, grid = EARLY * self._duration, self._loop.grid
+        return max(round(wanted / grid), 1) * grid if grid > 0.0 else wanted
+
+    def size(self, difference: Floats) -> float:
+        """Largest of the entries, those of velocities by the length they make in half a step."""
+        return float(np.abs(self._scale * difference).max())
+
+    def but_late(self, difference: Floats, rate: Floats) -> Floats:
+        """The difference of two states without what comes of being early or late."""
+        weight = self._scale**2
+        way = self.flat(rate)
+        left: Floats = difference - way * ((weight * way) @ difference) / ((weight * way) @ way)
+        return left
 
 
 class Words:
@@ -182,9 +219,14 @@ class Words:
     """
 
     def __init__(
-        self, loop: ClosedLoop, begin: Snapshot, duration: float, wanted: Sequence[str] | None
+        self,
+        loop: ClosedLoop,
+        begin: Snapshot,
+        duration: float,
+        size: float,
+        wanted: Sequence[str] | None,
     ) -> None:
-        self._loop, self._begin = loop, begin
+        self._loop, self._begin, self._size = loop, begin, size
         self._opaque = law_of(loop.controller) is None
         simulation = loop.simulation
         simulation.restore(begin)
@@ -251,7 +293,7 @@ class Words:
     def _that_matter(self) -> list[str]:
         """Those whose disturbance one call of the controller does not undo without a trace."""
         simulation, short = self._loop.simulation, self._loop.grid or SHORT
-        size = self._loop.usual_disturbance
+        size = self._size
 
         def after(names: list[str]) -> tuple[bytes, dict[str, float]]:
             simulation.restore(self._begin)

@@ -127,7 +127,7 @@ def consider(
     light, heavy = planning.foothold_weight, planning.capture_weight
     foothold = (light * plan.length + heavy * (end - plan.offset)) / (light + heavy)
     reach = planning.acceleration * remaining * remaining / 6.0
-    ahead = plan.swing + 2.0 / 3.0 * plan.speed * remaining
+    ahead = plan.swing + plan.speed * remaining
     foothold = min(max(foothold, ahead - reach), ahead + reach)
     foothold = min(max(foothold, planning.shortest), planning.longest)
     off = foothold - plan.length

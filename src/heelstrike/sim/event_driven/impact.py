@@ -37,6 +37,8 @@ ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 
 # Velocities (m/s) up to which a point on the ground is at rest.
 REST = 1e-9
+# Velocities (m/s, rad/s) along a loop up to which it has none.
+ROUNDING = 1e-13
 # Energy counts as made when it exceeds this part of the energy that went through the contacts.
 NOTICEABLE = 1e-9
 # Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
@@ -95,6 +97,9 @@ def collide(
     find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
+    for place in range(count, total):
+        if abs(free[2 * place]) <= ROUNDING:  # loops that say the same twice would not agree on it
+            free[2 * place] = 0.0
     assemble_delassus(model, total, equations, assembly)
     status = solve_velocities(count, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
@@ -123,7 +128,8 @@ def collide(
         made += work
         through += abs(work)
     for dry in range(phase.dry_joint.shape[0]):
-        phase.slide[phase.first_dry + dry] = heading(v[phase.dry_joint[dry]])
+        contact = phase.first_dry + dry
+        phase.slide[contact] = phase.closed[contact] * heading(v[phase.dry_joint[dry]])
     return status == SOLVED, made / through if through > 0.0 else 0.0
 
 

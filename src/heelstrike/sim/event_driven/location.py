@@ -7,6 +7,8 @@ limit of a sticking one.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
@@ -21,7 +23,14 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import EXPLAINED, evaluate, explained, look, project
+from heelstrike.sim.event_driven.dynamics import (
+    EXPLAINED,
+    evaluate,
+    explained,
+    is_in_place,
+    look,
+    project,
+)
 from heelstrike.sim.event_driven.faces import has_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
@@ -210,6 +219,28 @@ def may_dip(function: int, span: float, phase: Phase) -> bool:
 
 
 @kernel
+def lowest_place(before: float, rate: float, value: float, later_rate: float) -> float:
+    """Fraction of an interval at which the cubic through values and rates is lowest, if below zero.
+
+    Rates are per interval. Returns ``NO_EVENT`` where it stays above zero.
+    """
+    down = max(-rate, 0.0) + max(later_rate, 0.0)
+    if min(before, value) > 0.15 * down:  # 4/27 is the most that a rate takes away
+        return NO_EVENT
+    third = rate + later_rate - 2.0 * (value - before)
+    second = value - before - rate - third
+    root = second * second - 3.0 * third * rate
+    if not root > 0.0 or (second <= 0.0 and third <= 0.0):
+        return NO_EVENT
+    root = math.sqrt(root)
+    part = -rate / (second + root) if second > 0.0 else (root - second) / (3.0 * third)
+    if not 0.0 < part < 1.0:
+        return NO_EVENT
+    lowest = before + part * (rate + part * (second + part * third))
+    return part if lowest < -TOGETHER else NO_EVENT
+
+
+@kernel
 def crossing(
     scene: Scene, function: int, low: float, high: float, length: float, control: Control,
     memory: Memory, phase: Phase,
@@ -237,6 +268,14 @@ def crossing(
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
         least = phase.absolute + phase.relative
+    if is_gap and value >= -least:
+        # It may have been lower in between, and be on its way up at both ends.
+        span = (high - low) * length
+        dip = lowest_place(before, span * rate, value, span * later_rate)
+        if dip < NO_EVENT:
+            end = low + dip * (high - low)
+            evaluate_within(scene, end, length, False, control, memory, phase)
+            value = phase.value[function]
     # What is below zero from the beginning tells nothing new until it falls further.
     if not value < -least - max(-before, 0.0):
         return NO_EVENT
@@ -345,8 +384,12 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     end, before = phase.end, phase.trial
     for i in range(end.shape[0]):
         before[i] = end[i]
-    left = project(scene.model, scene.ground, memory, phase, end)
-    return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
+    left, strayed, fastest = project(scene.model, scene.ground, memory, phase, end)
+    if left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase):
+        return True
+    for i in range(end.shape[0]):
+        end[i] = before[i]
+    return is_in_place(strayed, fastest)
 
 
 @kernel

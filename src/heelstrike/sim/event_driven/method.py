@@ -26,7 +26,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, stops_any, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
@@ -35,7 +35,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
 from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
-from heelstrike.sim.event_driven.dynamics import evaluate, project
+from heelstrike.sim.event_driven.dynamics import evaluate, is_in_place, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
     is_at_second,
@@ -49,7 +49,13 @@ from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, h
 from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
-from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
+from heelstrike.sim.event_driven.rows import (
+    NO_ROOM,
+    ROWS_OF_AN_INSTANT,
+    TOO_FAR,
+    write_row,
+    write_rows_within,
+)
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
@@ -87,7 +93,7 @@ SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
 # How far the first projection of a phase may move coordinates and velocities (m, rad, m/s, rad/s;
-# of large ones, this part): at the start of a run, later, and how much further after a bridge, for
+# of large ones, this part): at the start of a run, later, and how much faster after a bridge, for
 # each second of its length, up to a longest. Impacts and events leave nothing to be projected.
 FITTING = 1e-4
 UNSEEN = 1e-6
@@ -368,20 +374,23 @@ def begin_phase(
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    phase.left = project(model, ground, memory, phase, begin)
+    phase.left, strayed, fastest = project(model, ground, memory, phase, begin)
     closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
+    quick = slip
     if phase.bridge_end == phase.time:
-        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
+        quick += BRIDGED * min(phase.length, LONG_BRIDGE)
     fits = phase.left <= closest
     for i in range(begin.shape[0]):
-        fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
+        most = slip if i < model.nq else quick
+        fits = fits and abs(begin[i] - before[i]) <= most * (1.0 + abs(before[i]))
+    if not fits:
+        for i in range(begin.shape[0]):
+            begin[i] = before[i]
+        fits = is_in_place(strayed, fastest)
     if fits:
         first = record.events
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
         react(model, first, begin[: model.nq], record, memory.loops)
-    else:
-        for i in range(begin.shape[0]):
-            begin[i] = before[i]
     return fits
 
 
@@ -448,13 +457,26 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
 
 
 @kernel
-def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
-    """Let joints with dry friction begin as they move."""
+def rubs_otherwise(breakaway: Floats, phase: Phase) -> bool:
+    """Whether a joint has other dry friction from now on."""
+    found = False
+    for joint in phase.dry_joint:
+        found = found or phase.breakaway[joint] != breakaway[joint]
+    return found
+
+
+@kernel
+def begin_rubbing(v: Floats, breakaway: Floats, phase: Phase, reported: Reported) -> None:
+    """Let joints with dry friction begin as they move, and those with none any more be free."""
     for dry in range(phase.dry_joint.shape[0]):
-        contact = phase.first_dry + dry
-        phase.slide[contact] = heading(v[phase.dry_joint[dry]])
-        reported.closed[contact] = 1
-        reported.slipping[contact] = phase.slide[contact]
+        contact, joint = phase.first_dry + dry, phase.dry_joint[dry]
+        phase.breakaway[joint] = breakaway[joint]
+        rubs = 1 if breakaway[joint] > 0.0 else 0
+        if phase.closed[contact] != rubs:
+            phase.closed[contact] = rubs
+            phase.slide[contact] = rubs * heading(v[joint])
+            reported.closed[contact] = rubs
+            reported.slipping[contact] = phase.slide[contact]
 
 
 @kernel
@@ -521,6 +543,8 @@ def find_what_happened(
                         phase.slide[other] = 0
             elif first or second:
                 forced = True
+            continue
+        if phase.first_dry <= contact < phase.first_second:
             continue
         gap = gap_now(contact, contacts, phase, phase.begin)
         normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
@@ -664,7 +688,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]
-    begin_dry_joints(v, phase, memory.reported)
+    begin_rubbing(v, memory.breakaway, phase, memory.reported)
     evaluate_equations(model, q, v, equations)
     locate(model, ground, equations.tree, phase, memory.contacts, memory.surface)
     code = meet_event(True, model, ground, memory, phase, record)
@@ -683,16 +707,22 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 @kernel
 def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
-    """Let the brakes that have been put on take hold, by an impact of all that touches."""
+    """Let the brakes that have been put on take hold, by an impact of all that touches.
+
+    Those that slip begin to, and end.
+    """
     model = scene.model
     if phase.last_row < phase.time:
         write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
-    take_hold(memory.loops)
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    for contact in range(phase.closed.shape[0]):
-        phase.hit[contact] = 0
-    if not strike(model, scene.ground, memory, phase, record):
-        phase.bridging = 1
+    begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
+    stops = take_hold(model, memory.loops)
+    # Of joints at rest there is no impact to solve: its data would be rounding.
+    if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+        for contact in range(phase.closed.shape[0]):
+            phase.hit[contact] = 0
+        if not strike(model, scene.ground, memory, phase, record):
+            phase.bridging = 1
     note_brakes(model, phase.time, 1.0, record, memory.loops)
 
 
@@ -725,7 +755,7 @@ def decide(
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops):
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, phase):
         brake(scene, control, memory, phase, record)
     phase.at_event = phase.undecided
     open_modes = phase.at_event == 1 or jumped
@@ -834,8 +864,12 @@ def move(
                 phase.bridging = 1
             phase.next_length = 1e-6
             return DONE
-    if not write_rows_within(scene, control, memory, phase, record):
+    written = write_rows_within(scene, control, memory, phase, record)
+    if written == NO_ROOM:
         return RECORD_FULL
+    if written == TOO_FAR:  # the step is taken again, to end there
+        phase.finished = 0
+        return DONE
     end_step(model, clock, memory, phase, record)
     clock.time = phase.time
     if phase.has_fired == 1:
