@@ -44,7 +44,7 @@ NOTICEABLE = 1e-9
 # Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
 # rest: what speed is left of them is less than anyone could see.
 SHORTEST_BOUNCE = 1e-6
-NO_BOUNCE = 2e-9
+NO_BOUNCE = 1e-8
 PLASTIC, AT_REST = 1, 2
 # Ratio of successive bounces beyond which there is no limit in sight.
 PERPETUAL = 0.999999

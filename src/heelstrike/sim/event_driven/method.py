@@ -500,6 +500,15 @@ def turns_over(
 
 
 @kernel
+def touches_at_start(model: Model, contact: int, gap: float, phase: Phase) -> bool:
+    """Whether an open contact is on its limit when the run begins, and may not pass below it."""
+    phase.group[contact] = contact
+    if contact < model.nc and gap < -ON_THE_GROUND:
+        phase.passing[contact] = phase.let_pass
+    return bool(gap <= ON_THE_GROUND and phase.passing[contact] == 0)
+
+
+@kernel
 def find_what_happened(
     starting: bool, direction: float, model: Model, ground: GroundModel, tree: Workspace,
     contacts: Contacts, surface: Surface, phase: Phase,
@@ -540,10 +549,7 @@ def find_what_happened(
         gap = gap_now(contact, contacts, phase, phase.begin)
         normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
         if starting:
-            phase.group[contact] = contact
-            if contact < model.nc and gap < -ON_THE_GROUND:
-                phase.passing[contact] = phase.let_pass
-            first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
+            first = touches_at_start(model, contact, gap, phase) and normal <= rest
         may_pass = first and not starting and contact < model.nc
         if turns:
             first = normal <= rest
