@@ -28,7 +28,7 @@ WEIGHTS = {
     "swing": 1.0,
     "pitch": 0.15,
     "angle": 0.05,
-    "posture": 1e-3,
+    "posture": 1.5e-4,
     "torque": 1e-7,
 }
 """How much the tasks count, of every robot."""
@@ -55,7 +55,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "longest": 0.65 * size,
         "earliest": 0.4 * duration,
         "latest": 1.29 * duration,
-        "soon": 0.12 * pace,
+        "soon": 0.1 * pace,
         "acceleration": 60.0,
         "hurry": 3.5,
         "foothold_weight": 1.0,
