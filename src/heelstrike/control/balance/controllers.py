@@ -28,7 +28,7 @@ WEIGHTS = {
     "swing": 1.0,
     "pitch": 0.15,
     "angle": 0.05,
-    "posture": 1.5e-4,
+    "posture": 3e-4,
     "torque": 1e-7,
 }
 """How much the tasks count, of every robot."""
@@ -89,7 +89,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "straight_knee": -0.25,
         "slow": 0.15 * pace,
         "fast": pace,
-        "haste": 0.1 * pace,
+        "haste": 0.08 * pace,
         "search": 0.1 * pace,
         "smoothing": 0.01 * pace,
         "hold": 0.75 * half,
