@@ -29,7 +29,7 @@ WEIGHTS = {
     "swing": 1.0,
     "pitch": 0.15,
     "angle": 0.05,
-    "posture": 1e-3,
+    "posture": 3e-4,
     "torque": 1e-7,
 }
 """How much the tasks count, of every robot."""
@@ -56,7 +56,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "longest": 0.65 * size,
         "earliest": 0.4 * duration,
         "latest": 1.29 * duration,
-        "soon": 0.12 * pace,
+        "soon": 0.1 * pace,
         "acceleration": 60.0,
         "hurry": 3.5,
         "foothold_weight": 1.0,
@@ -90,7 +90,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "straight_knee": -0.25,
         "slow": 0.15 * pace,
         "fast": pace,
-        "haste": 0.1 * pace,
+        "haste": 0.08 * pace,
         "search": 0.1 * pace,
         "smoothing": 0.01 * pace,
         "hold": 0.75 * half,
