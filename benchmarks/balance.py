@@ -14,8 +14,8 @@ way that its steps should take it. Seeds below 1000 were used while the controll
 three speeds and stops. `--robot` may be a file, of three dimensions with `--projected`.
 
 Run: python benchmarks/balance.py [price small multipliers push hard stand commands]
-     [--robot bravo7] [--projected] [--torque 150] [--phases 20] [--rise 5] [--seeds 100] [--first 1000]
-     [--method stepping]
+     [--robot bravo7] [--projected] [--torque 150] [--phases 20] [--rise 5]
+     [--seeds 100] [--first 1000] [--method stepping]
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import argparse
 import dataclasses
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -242,10 +243,7 @@ def small(walker: Walker) -> None:
         run = walker.walk(duration, record_every=1, **options)
         phase, capture = run.log["phase"].values, run.log["capture_point"].values
         begins = np.nonzero(np.diff(phase) < -0.5)[0] + 1
-        found = [
-            np.interp(0.1, phase[i:j], capture[i:j])
-            for i, j in zip(begins[:-1], begins[1:], strict=True)
-        ]
+        found = [np.interp(0.1, phase[i:j], capture[i:j]) for i, j in pairwise(begins)]
         return np.array(found)
 
     usual = steps()
@@ -255,7 +253,9 @@ def small(walker: Walker) -> None:
             found = steps(pushes=walker.push(pushed, phase))
             off = (found - usual[: len(found)]) / (pushed / (mass * rate))
             told = " ".join(f"{each:+.3f}" for each in off[2:6])
-            print(f"small push {impulse:+g} N s at {phase}: of the error is left {told}", flush=True)
+            print(
+                f"small push {impulse:+g} N s at {phase}: of the error is left {told}", flush=True
+            )
 
 
 def multipliers(walker: Walker) -> None:
