@@ -168,13 +168,14 @@ def write_rows_within(
     state = phase.slopes[SLOPES - 1]
     while True:
         time = phase.next_row * period
-        part = (time - phase.time) / phase.length
-        if not (period > 0.0 and time <= last):
+        part = 1.0
+        if period > 0.0 and time <= last:
+            part = (time - phase.time) / phase.length
+        else:  # the step may have no length at all
             if not touch:
                 return WRITTEN
             touch = False
             time = phase.time + phase.length
-            part = 1.0
             for second in range(phase.first_second, phase.watched):
                 meets = phase.closed[second] == 0 and phase.fired[2 * second] == 1
                 phase.meets[second - phase.first_second] = 1 if meets else 0
