@@ -18,7 +18,7 @@ from heelstrike.sim.event_driven.dynamics import (
     is_in_place,
     project,
 )
-from heelstrike.sim.event_driven.location import TOGETHER
+from heelstrike.sim.event_driven.location import TOGETHER, shortest_step
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
@@ -145,6 +145,12 @@ def comes_down(contact: int, phase: Phase) -> bool:
 
 
 @kernel
+def is_inside(time: float, begin: float, length: float) -> bool:
+    """Whether a row within a step is at neither of its ends, so that the step could end there."""
+    return bool(shortest_step(begin) <= time - begin < AT_ITS_END * length)
+
+
+@kernel
 def write_rows_within(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
 ) -> int:
@@ -187,7 +193,8 @@ def write_rows_within(
             for i in range(state.shape[0]):
                 state[i] = phase.end[i]
         fits = put_right(scene, state, memory, phase)
-        if not fits and part < AT_ITS_END and not last_row > phase.time:
+        inside = is_inside(time, phase.time, phase.length)
+        if not fits and inside and not last_row > phase.time:
             phase.next_length = time - phase.time
             record.rows, phase.next_row, phase.last_row = first, next_row, last_row
             return TOO_FAR
