@@ -203,7 +203,8 @@ def simulate_batch(
     record_every : int, optional
         Steps between two rows of the records; by default nothing is kept but how each run ended,
         so that memory does not grow with the duration. The runs are those of `simulate` with the
-        same `record_every`, or a huge one: writing an event-driven row may change a last digit.
+        same `record_every`, or a huge one: writing an event-driven row may change a last digit, or
+        end a step there.
     stop_when_fallen : bool, optional
         See :func:`~heelstrike.simulate`.
     latched : joints, or sequence of n of them or None, optional

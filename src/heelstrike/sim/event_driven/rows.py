@@ -72,7 +72,7 @@ def write_row(
 ) -> None:  # fmt: skip
     """Append a state, put on its constraints, with the certified contact forces in it.
 
-    Where no contact forces obey the laws there are none in the row.
+    Where no contact forces obey the laws there are none in the row, and none of loops.
     """
     put_right(scene, state, memory, phase)
     write_right(scene, time, lawful, control, memory, phase, record)
@@ -92,6 +92,9 @@ def write_right(
     count, loops = phase.closed_count, rows_of(memory.loops)
     if not lawful:
         count = 0
+        for place in range(loops):
+            impulse[2 * place] = 0.0
+        note_loops(model, loops, impulse, memory.loops)
     elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
