@@ -160,12 +160,7 @@ class ClosedLoop:
 
     def foot(self, contact: int) -> int:
         """What comes down as one: the points of a foot, or every spoke by itself."""
-        if is_wheel(self.robot):
-            return contact
-        for place, foot in enumerate(self.robot.feet):
-            if contact in foot.contacts:
-                return place
-        return len(self.robot.feet) + contact
+        return foot_of(self.robot, contact)
 
     def _landings(self, wanted: int, longest: float) -> list[tuple[float, int]]:
         """When which foot first touched the ground, of the first so many steps."""
@@ -198,3 +193,13 @@ class ClosedLoop:
             if time - (steps[-1][0] if steps else begin) > apart:
                 steps.append((time, foot))
         return steps
+
+
+def foot_of(robot: Robot, contact: int) -> int:
+    """Tell what comes down as one: the points of a foot, or every spoke by itself."""
+    if is_wheel(robot):
+        return contact
+    for place, foot in enumerate(robot.feet):
+        if contact in foot.contacts:
+            return place
+    return len(robot.feet) + contact

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk, foot_of
 from heelstrike.analysis.stability.returns import returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
@@ -45,7 +45,7 @@ Indicator = Callable[[Run], ArrayLike]
 
 
 def step_duration(run: Run) -> float:
-    """Seconds from the first touchdown of a return to the last, of a robot on two legs: a step.
+    """Seconds from the first touchdown of a return to the first of another foot: a step.
 
     Parameters
     ----------
@@ -60,12 +60,18 @@ def step_duration(run: Run) -> float:
     Raises
     ------
     LimitCycleError
-        If there are no two touchdowns.
+        If no two feet come down.
     """
-    down = [event.time for event in run.events if event.kind is EventKind.TOUCHDOWN]
-    if len(down) < 2:
+    landings = [
+        (event.time, foot_of(run.robot, event.contact))
+        for event in run.events
+        if event.kind is EventKind.TOUCHDOWN
+    ]
+    # Of a flat foot heel and toe come down, one after the other.
+    others = [time for time, foot in landings if foot != landings[0][1]]
+    if not others:
         raise LimitCycleError("a disturbed walk has not taken two steps in a return")
-    return down[-1] - down[0]
+    return others[0] - landings[0][0]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -164,7 +170,7 @@ def disturbance_response(
     indicator : callable
         Takes the :class:`~heelstrike.Run` of a return, with a row every ten steps of the method and
         all events, and returns one or more numbers, which must not depend on when it began; the
-        duration of a step by default.
+        duration of a step by default, for which `method` must not have a fixed step.
     ground : Ground
         Level or sloping ground; ``Ground()`` by default.
     method : Method
@@ -219,6 +225,12 @@ def disturbance_response(
         robot, controller, state, method=method, ground=ground, control_period=control_period,
         record_every=ROWS,
     )  # fmt: skip
+    if indicator is step_duration and loop.simulation.method.step_length is not None:
+        raise SimulationError(
+            "with a fixed step touchdowns fall on steps, and their times do not tell small "
+            "disturbances: simulate with method=hs.EventDriven(), or give an indicator= that "
+            "does not count steps"
+        )
     if disturbance is not None and not 0.0 < disturbance < 1.0:
         raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)
