@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.analysis.stability.loop import steps_of
 from heelstrike.analysis.stability.response import step_duration
 from heelstrike.experiments.passive import METHOD, passive_walk
 from heelstrike.sim.closed_sets import EventKind
@@ -129,16 +130,18 @@ def test_a_fixed_step_does_not_tell_durations() -> None:
 
 
 def test_a_step_is_from_foot_to_foot() -> None:
-    """Not from heel to toe: on flat feet both ends of either sole come down."""
+    """Both ends of soles come down, the rear foot rocks at an impact, and one late in its step."""
     robot = hs.load_robot("bravo7")
     (right, left), kind = robot.feet, EventKind.TOUCHDOWN
     down = [
-        (0.1, left.contacts[0]), (0.11, left.contacts[1]),
-        (0.8, right.contacts[1]), (0.82, right.contacts[0]),
+        (0.15, right.contacts[1]), (0.35, left.contacts[0]), (0.351, right.contacts[1]),
+        (0.36, left.contacts[1]), (0.75, left.contacts[1]), (1.05, right.contacts[1]),
+        (1.06, right.contacts[0]), (1.0601, left.contacts[0]),
     ]  # fmt: skip
     events = [SimpleNamespace(time=time, contact=contact, kind=kind) for time, contact in down]
-    run: Any = SimpleNamespace(robot=robot, events=events)
+    run: Any = SimpleNamespace(robot=robot, events=events, time=np.array([0.0, 1.4]))
     assert step_duration(run) == pytest.approx(0.7)
-    run.events = events[:2]
+    assert [foot for _, foot in steps_of(robot, events, 0.0)] == [0, 1, 0]
+    run.events = events[3:5]
     with pytest.raises(hs.LimitCycleError, match="two steps"):
         step_duration(run)

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk, foot_of
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk, steps_of
 from heelstrike.analysis.stability.returns import returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
@@ -28,7 +28,6 @@ from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.method import Method
 from heelstrike.sim.run import Run
@@ -45,7 +44,7 @@ Indicator = Callable[[Run], ArrayLike]
 
 
 def step_duration(run: Run) -> float:
-    """Seconds from the first touchdown of a return to the first of another foot: a step.
+    """Seconds from one foot's touchdown to the other's, the last of a return: a step.
 
     Parameters
     ----------
@@ -62,16 +61,10 @@ def step_duration(run: Run) -> float:
     LimitCycleError
         If no two feet come down.
     """
-    landings = [
-        (event.time, foot_of(run.robot, event.contact))
-        for event in run.events
-        if event.kind is EventKind.TOUCHDOWN
-    ]
-    # Of a flat foot heel and toe come down, one after the other.
-    others = [time for time, foot in landings if foot != landings[0][1]]
-    if not others:
+    steps = steps_of(run.robot, run.events, float(run.time[0]))
+    if len(steps) < 2:
         raise LimitCycleError("a disturbed walk has not taken two steps in a return")
-    return others[0] - landings[0][0]
+    return steps[-1][0] - steps[-2][0]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
