@@ -75,7 +75,7 @@ def test_a_stop_touched_and_left_between_two_samples_is_seen() -> None:
     """
     builder = hs.RobotBuilder("arm", gravity=0.0)
     builder.hinge(
-        "arm", None, mass=1.0, inertia=1.0, center_of_mass=(0.0, 0.0), torque=100.0,
+        "arm", None, mass=1.0, inertia=1.0, center_of_mass=(0.0, 0.0), torque=1e4,
         limits=(0.0, np.inf),
     )  # fmt: skip
 
