@@ -219,7 +219,8 @@ def disturbance_response(
         robot, controller, state, method=method, ground=ground, control_period=control_period,
         record_every=ROWS,
     )  # fmt: skip
-    if indicator is step_duration and loop.simulation.method.step_length is not None:
+    counts_steps = loop.simulation.method.step_length is not None
+    if counts_steps and indicator is step_duration:
         raise SimulationError(
             "with a fixed step touchdowns fall on steps, and their times do not tell small "
             "disturbances: simulate with method=hs.EventDriven(), or give an indicator= that "
