@@ -93,7 +93,7 @@ SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
 # How far the first projection of a phase may move coordinates and velocities (m, rad, m/s, rad/s;
-# of large ones, this part): at the start of a run, later, and how much faster after a bridge, for
+# of large ones, this part): at the start of a run, later, and how much further after a bridge, for
 # each second of its length, up to a longest. Impacts and events leave nothing to be projected.
 FITTING = 1e-4
 UNSEEN = 1e-6
@@ -376,13 +376,11 @@ def begin_phase(
         before[i] = begin[i]
     phase.left, strayed, fastest = project(model, ground, memory, phase, begin)
     closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
-    quick = slip
     if phase.bridge_end == phase.time:
-        quick += BRIDGED * min(phase.length, LONG_BRIDGE)
+        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
     fits = phase.left <= closest
     for i in range(begin.shape[0]):
-        most = slip if i < model.nq else quick
-        fits = fits and abs(begin[i] - before[i]) <= most * (1.0 + abs(before[i]))
+        fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
     if not fits:
         for i in range(begin.shape[0]):
             begin[i] = before[i]
