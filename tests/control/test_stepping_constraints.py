@@ -63,7 +63,8 @@ def in_the_air(state: hs.State) -> Contacts:
 
 def memory_with(draw: np.random.Generator) -> Memory:
     """Memory of a step on some slope, off the gait as it began."""
-    parts, f = Memory.allocate({"nu": 4, "terms": 25, "levels": 33, "axes": 2, "nv": 7}), family()
+    extents = {"nu": 4, "terms": 25, "levels": 33, "axes": 2, "nv": 7, "n": 4, "m": 19}
+    parts, f = Memory.allocate(extents), family()
     powers = [1.0, 0.4, 0.16]
     parts.coefficients[:] = np.tensordot(powers, f.coefficients, 1)
     parts.middle[:] = np.tensordot(powers, f.middle, 1)
@@ -144,6 +145,8 @@ def test_it_asks_no_more_of_the_ground_than_that_can_bear(swing: float) -> None:
         )
         normal, tangent = motion.contact_force[robot.feet[0].contacts[0]]
         room[type(law)] = min(0.6 * normal - abs(tangent), normal - 0.1 * robot.weight)
+        most = np.abs(torque).max()
+    assert most <= robot.model.torque_upper.max() * (1.0 + 1e-9)
     assert room[hs.VirtualConstraints] < -1.0
     assert room[hs.SteppingConstraints] > -1e-6 * robot.weight
 

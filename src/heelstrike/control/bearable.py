@@ -76,9 +76,7 @@ class Bearable(Bundle):
 
 
 @kernel
-def ground_rows(
-    robot: ControlledRobot, normal: Floats, friction: float, torque: Floats
-) -> Spatial:
+def ground_rows(robot: ControlledRobot, normal: Floats, friction: float, torque: Floats) -> Spatial:
     """Find the rows of the ground, and the torques, for a force in `robot.force`."""
     columns, rest, force = robot.columns, robot.unactuated, robot.force
     a, b, c = rest[0], rest[1], rest[2]

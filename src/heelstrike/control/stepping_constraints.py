@@ -43,7 +43,7 @@ LEAST_RATE = 0.3
 # Part of the robot's weight that the stance foot is pressed with at least.
 PRESSED = 0.1
 # Joints keep within the range that they have in the family, and this much beyond (rad).
-BEYOND_FAMILY = 0.1
+BEYOND_FAMILY = 0.2
 # A foot that is less than this above the ground (m) has just stood there.
 STOOD = 0.01
 
