@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 
 @cache
 def family() -> hs.StepFamily:
-    """Half a metre at 0.95 m/s, the knees always bent."""
+    """Half a metre in half a second, the knees always bent."""
     robot = hs.load_robot("rabbit_optimtraj")
     gait = hs.optimize_gait(
-        robot, step_length=0.5, step_duration=0.5 / 0.95, clearance=0.05, friction=0.35,
+        robot, step_length=0.5, step_duration=0.5, clearance=0.05, friction=0.5, starts=1,
         joint_ranges={"right_knee": (0.2, 2.6), "right_hip": (-0.8, 1.5)},
     )  # fmt: skip
     return hs.StepFamily.around(hs.PhasedGait.from_gait(robot, gait))

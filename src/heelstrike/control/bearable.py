@@ -106,10 +106,10 @@ def borne(
         free = bearable.wanted[i] + turning * bearable.slope[i] + 2.0 * NEARING * speed
         bound[row + 2] = NEARING**2 * (bounds.lower[i] - place) - free
         bound[row + 3] = NEARING**2 * (place - bounds.upper[i]) + free
+    worst = 0.0
     for row in range(bound.shape[0]):
-        if bound[row] > 0.0:
-            return False
-    return True
+        worst = max(worst, bound[row])
+    return worst <= 0.0
 
 
 @kernel
