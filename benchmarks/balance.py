@@ -9,12 +9,13 @@ the ground, the trunk within 0.6 rad of how the gait leans, and the robot comes 
 way that its steps should take it. Seeds below 1000 were used while the controller was made.
 
 `small` tells what is left, step by step, of the error of the capture point after a push of 3 N s;
+`multipliers` by what factor small errors shrink in a step (:func:`heelstrike.floquet_multipliers`);
 `stand` the largest pushes of a robot that stands; `commands` how often it starts, walks at
 three speeds and stops. `--robot` may be a file, of three dimensions with `--projected`.
 
-Run: python benchmarks/balance.py [price small push hard stand commands] [--robot bravo7]
-     [--projected] [--torque 150] [--phases 20] [--rise 5] [--seeds 100] [--first 1000]
-     [--method stepping]
+Run: python benchmarks/balance.py [price small multipliers push hard stand commands]
+     [--robot bravo7] [--projected] [--torque 150] [--phases 20] [--rise 5]
+     [--seeds 100] [--first 1000] [--method stepping]
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ import argparse
 import dataclasses
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -229,21 +231,42 @@ def hard(walker: Walker, seeds: range) -> None:
 
 
 def small(walker: Walker) -> None:
-    """Tell how far the capture point is off as feet land after a push of 3 N s."""
+    """Tell how far the capture point is off in the steps after a push of 3 N s.
+
+    From the foot that stands, a tenth of each step after its touchdown, as a part of what the push
+    shifted it by.
+    """
     duration = 10.0 * walker.gait.step_duration
+    mass, rate = walker.robot.model.mass.sum(), walker.law.parameters.reference.rate
 
-    def landings(**options: Any) -> np.ndarray:
+    def steps(**options: Any) -> np.ndarray:
         run = walker.walk(duration, record_every=1, **options)
-        ends = np.nonzero(np.diff(run.log["phase"].values) < -0.5)[0]
-        found: np.ndarray = 1e3 * run.log["capture_point"].values[ends - 1]
-        return found
+        phase, capture = run.log["phase"].values, run.log["capture_point"].values
+        begins = np.nonzero(np.diff(phase) < -0.5)[0] + 1
+        found = [np.interp(0.1, phase[i:j], capture[i:j]) for i, j in pairwise(begins)]
+        return np.array(found)
 
-    usual = landings()
+    usual = steps()
     for impulse in (3.0, -3.0):
         for phase in (0.1, 0.3, 0.5, 0.7):
-            found = landings(pushes=walker.push(impulse * walker.unit, phase))
-            told = " ".join(f"{off:.2f}" for off in (found - usual[: len(found)])[2:])
-            print(f"small push {impulse:+g} N s at {phase}: off by {told} mm", flush=True)
+            pushed = impulse * walker.unit
+            found = steps(pushes=walker.push(pushed, phase))
+            off = (found - usual[: len(found)]) / (pushed / (mass * rate))
+            told = " ".join(f"{each:+.3f}" for each in off[2:6])
+            print(
+                f"small push {impulse:+g} N s at {phase}: of the error is left {told}", flush=True
+            )
+
+
+def multipliers(walker: Walker) -> None:
+    """Tell how small errors of robot and memory die out, at three sizes of them."""
+    begin = walker.gait.initial_state
+    for size in (1e-6, 1e-5, 1e-4):
+        found = hs.floquet_multipliers(
+            walker.robot, begin, walker.law, settling=14, returns=2, disturbance=size,
+            **walker.method,
+        )  # fmt: skip
+        print(f"multipliers at {size:g}: {found}", flush=True)
 
 
 def stand(walker: Walker, rise: float) -> None:
@@ -314,7 +337,7 @@ def commands(walker: Walker, seeds: range) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    known = ("price", "small", "push", "hard", "stand", "commands")
+    known = ("price", "small", "multipliers", "push", "hard", "stand", "commands")
     parser.add_argument("what", nargs="*", default=list(known))
     parser.add_argument("--robot", default="bravo7")
     parser.add_argument("--projected", action="store_true", help="a file of three dimensions")
@@ -335,6 +358,8 @@ def main() -> None:
         price(walker)
     if "small" in asked.what:
         small(walker)
+    if "multipliers" in asked.what:
+        multipliers(walker)
     if "push" in asked.what:
         pushes(walker, asked.phases, asked.rise)
     if "hard" in asked.what:

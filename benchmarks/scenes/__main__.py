@@ -3,8 +3,11 @@
     python benchmarks/scenes run --out scenes.jsonl --methods event_driven --seeds 0:300
     python benchmarks/scenes page scenes.jsonl --out benchmarks/scenes/baseline.md
     python benchmarks/scenes show event_driven 38
+    python benchmarks/scenes energy --seeds 4000:4100
 
 `run` goes on where a file of results ends; `show` judges one scene and prints what is wrong.
+`energy`, `twins`, `orders` and `bridges` put one question each to many scenes (scenes/checks):
+a line of JSON a scene, then what they add up to; with --out FILE they go on where it ends, too.
 """
 
 from __future__ import annotations
@@ -12,12 +15,14 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
 from pathlib import Path
 
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
 from scenes.campaign import Task, campaign, results_in  # noqa: E402
+from scenes.checks.commands import CHECKS, check  # noqa: E402
 from scenes.methods import METHODS  # noqa: E402
 from scenes.running import prepare, run_scene  # noqa: E402
 from scenes.table import page  # noqa: E402
@@ -47,8 +52,17 @@ def main() -> None:
     show = commands.add_parser("show", help="run and judge one scene")
     show.add_argument("method", choices=METHODS)
     show.add_argument("seed", type=int)
+    for name, (_, words) in CHECKS.items():
+        asks = commands.add_parser(name, help=words)
+        asks.add_argument("--seeds", type=_seeds, default=range(100), help="FIRST:END or number")
+        asks.add_argument("--out", type=Path, help="file of results, one a line")
+        asks.add_argument("--workers", type=int, choices=(1, 2), default=1)
     options = parser.parse_args()
-    if options.command == "run":
+    if options.command in CHECKS:
+        with tempfile.TemporaryDirectory() as folder:
+            out = options.out or Path(folder) / "results.jsonl"
+            check(options.command, options.seeds, out, options.workers)
+    elif options.command == "run":
         twins = not options.without_twins
         for one in campaign(
             options.out,

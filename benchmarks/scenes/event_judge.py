@@ -68,8 +68,13 @@ TOGETHER = 5e-11
 """Gap (m) up to which a point takes part in an impact elsewhere."""
 ROW = 1e-3
 """What the known forces do in this time (s) is a velocity to reckon with, even at rest."""
+BRIEF = 1e-8
+"""What is left of bounces shorter than this (s) may be lost: of each that comes to rest, what the
+known forces do in it."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
+EDGE = 1e-12
+"""An event this near (s) to where a push begins or ends happens there."""
 
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.PAINLEVE)
 
@@ -89,23 +94,18 @@ def judge_events(run: Any, start: Any = None) -> Findings:
     rows.geometry(found)
     found.figures["penetration"] = float(max(np.max(-rows.gap, initial=0.0), 0.0))
     if len(rows.time):
-        _Events(rows, start).judge(found)
+        EventRows(rows, start).judge(found)
     return found
 
 
-class _Events:
+class EventRows:
+    """The rows of an event-driven run by instants, and the laws that hold at and between them."""
+
     def __init__(self, rows: Rows, start: Any) -> None:
         self.rows, self.start = rows, start
         time, run = rows.time, rows.run
         edges = [edge for one in run.pushes for edge in (one.start, one.end)]
         self.edges = np.array(sorted(edges))
-        acts = [(one.start < time) & (time <= one.end) for one in run.pushes]
-        share = np.stack(acts, axis=1) if acts else np.zeros((len(time), 0))
-        self.pushed = rows.push(share.astype(float))
-        self.known = rows.smooth + self.pushed
-        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
-        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
-        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -113,6 +113,24 @@ class _Events:
         self.instant = time[self.first]
         self.settled = np.isin(np.arange(len(time)), self.last)
         """Rows that show what follows their instant, not what went before."""
+        # Where a push begins or ends at the instant of an event, its last row shows what follows.
+        events = np.array([event.time for event in run.events])
+        met = np.abs(time[:, None] - events).min(axis=1, initial=np.inf) <= INSTANT
+        follows = (met & self.settled)[:, None]
+        # Without an event nobody knows which side of such an instant its row shows.
+        edge = np.abs(time[:, None] - self.edges).min(axis=1, initial=np.inf) <= INSTANT
+        self.settled &= met | ~edge
+        begins = np.array([one.start for one in run.pushes])
+        ends = np.array([one.end for one in run.pushes])
+        at = time[:, None]
+        acts = np.where(
+            follows, (begins <= at) & (at < ends), (begins < at) & (at <= ends)
+        )  # fmt: skip
+        self.pushed = rows.push(acts.astype(float))
+        self.known = rows.smooth + self.pushed
+        self.acceleration = rows.metric.accelerated(self.known + rows.contact_force())
+        self.force_size = np.maximum(rows.metric.of_force(self.known), 1e-300)
+        self.speed_size = rows.metric.of_velocity(rows.v) + ROW * self.force_size
         self.bridges: dict[int, tuple[float, float]] = {}
         """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
         for event in run.events:
@@ -254,11 +272,14 @@ class _Events:
         joint: dict[int, Array] = {}
         most: dict[int, int] = {}
         gains: set[int] = set()
+        late: set[int] = set()
         seen: dict[tuple[int, int, int], int] = {}
         for event in self.rows.run.events:
             k = int(np.argmin(np.abs(self.instant - event.time)))
             if event.kind is EventKind.ENERGY_GAIN:
                 gains.add(k)
+            if event.kind is EventKind.BRIDGE:
+                late.add(k)
             stop = event.kind is EventKind.JOINT_STOP
             if event.impulse == (0.0, 0.0) or not (stop or event.kind in IMPULSIVE):
                 continue
@@ -273,10 +294,28 @@ class _Events:
                     side * event.impulse[0]
                 )
             else:
+                impulse = self.in_first_frame(
+                    k, event, event.kind is EventKind.PAINLEVE or k in late
+                )
                 contact.setdefault(k, np.zeros((len(self.rows.contacts), 2)))[event.contact] += (
-                    event.impulse
+                    impulse
                 )
         return contact, joint, most, gains
+
+    def in_first_frame(self, k: int, event: Any, late: bool) -> Array:
+        """Impulse of an event in the frame that the first row of its instant has.
+
+        A point that meets a second face does so in the frame of that one, which is that of the row
+        before; jams and bridges after it are in the frame of the row behind.
+        """
+        rows, low, high = self.rows, self.first[k], self.last[k]
+        same = np.flatnonzero(rows.time[low : high + 1] == event.time) + low
+        row = high if late else (same[0] if len(same) else low)
+        x, z = rows.normal[row, event.contact]
+        to_x, to_z = rows.normal[low, event.contact]
+        along, across = event.impulse
+        force = np.array([along * x + across * z, along * z - across * x])
+        return np.array([force @ (to_x, to_z), force @ (to_z, -to_x)])
 
     def impacts(self, found: Findings) -> None:
         """Jumps between rows of one time, and impulses that have no row before them."""
@@ -305,8 +344,9 @@ class _Events:
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
             left -= self.couple(a, left, p)
-            unexplained = rows.metric_of(one).of_force(left[None]) / size
-            found.look("balance of an impact", unexplained, JUMP, time)
+            unexplained = rows.metric_of(one).of_force(left[None])
+            unexplained -= BRIEF * self.force_size[a] * self.resting(b)
+            found.look("balance of an impact", unexplained / size, JUMP, time)
             if k in self.bridges:
                 self.bridge_law(found, k, one, p, size)
                 continue
@@ -315,6 +355,14 @@ class _Events:
                 found.look("impact makes energy", np.array([gained / size**2]), GAIN, time)
             if most.get(k, 0) == 1 and b - a <= 1:
                 self.impact_law(found, one, p, s, before, after, size)
+
+    def resting(self, row: int) -> int:
+        """How many contact points and stops are at rest on their limits."""
+        rows, model = self.rows, self.rows.model
+        near = np.minimum(rows.q[row] - model.lower, model.upper - rows.q[row])
+        points = (rows.gap[row] <= TOGETHER) & (np.abs(rows.speed[row, :, 0]) <= RESTING)
+        stops = (near <= TOGETHER) & (np.abs(rows.v[row]) <= RESTING)
+        return int(points.sum() + stops.sum())
 
     def couple(self, row: int, left: Array, p: Array) -> Array:
         """Part of a generalised impulse that couples on discs in corners explain.
@@ -433,7 +481,8 @@ class _Events:
             begin, end = self.instant[k], self.instant[k + 1]
             span = end - begin
             if k + 1 in self.jams:
-                self.jam(found, k, energy)
+                if k not in self.bridges:  # of a bridge that ends in one its own law asks that
+                    self.jam(found, k, energy)
                 continue
             if np.any((self.edges > begin - INSTANT) & (self.edges < end + INSTANT)):
                 left_out += 1
@@ -460,6 +509,8 @@ class _Events:
             )
             leap = np.abs(rows.q[b] - rows.q[a] - span * rows.v[a] - bent)
             leap -= 2.0 * doubt_q + span * np.abs(change - integral[:n])
+            if k in self.bridges:
+                leap -= self.bridges[k][1]
             motion.append(np.maximum(leap, 0.0) / (1.0 + np.abs(rows.q[b])))
             after = rows.v[b] - jump
             gained = energy[b] - energy[a]
@@ -487,6 +538,9 @@ class _Events:
         )
         size += ROW * self.force_size[a]
         work = span * (abs(self.free_power[a]) + abs(self.free_power[b]))
+        # What is as near as that to the ground is put on it.
+        model = self.rows.model
+        work += float(np.sum(model.mass)) * float(np.linalg.norm(model.gravity)) * TOGETHER
         made = (energy[b] - energy[a] - work) / size**2
         found.look("jam makes energy", np.array([made]), GAIN, self.instant[k : k + 1])
 
@@ -507,10 +561,14 @@ class _Events:
         for k, (length, _) in self.bridges.items():
             changes |= np.abs(self.instant - self.instant[k] - length) <= INSTANT
         for event in self.rows.run.events:
+            if event.kind is EventKind.ZENO:  # says when the bounces would have ended: it rests
+                continue
             near = np.abs(self.instant - event.time) <= INSTANT
             if np.any(near):
                 changes |= near
-            else:  # it has no row of its own: nothing may be integrated across it
+            elif not np.any(np.abs(self.edges - event.time) <= EDGE):
+                # It has no row of its own, as at the edges of pushes: nothing may be integrated
+                # across it.
                 changes |= np.abs(self.instant - event.time) < 2e-3
         return changes
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -72,6 +73,12 @@ class Findings:
                 self.objections[i] = replace(worse, count=old.count + new.count)
                 return
         self.objections.append(new)
+
+    def renew(self, laws: Collection[str], other: Findings) -> None:
+        """Take what is said of some laws from another look at the same."""
+        kept = [one for one in self.objections if one.law not in laws]
+        self.objections = kept + [one for one in other.objections if one.law in laws]
+        self.worst |= {law: size for law, size in other.worst.items() if law in laws}
 
     def broken(self) -> tuple[str, ...]:
         """Names of the laws that were broken."""

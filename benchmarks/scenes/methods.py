@@ -22,15 +22,17 @@ METHODS = (*STEPPING, "event_driven", "hunt_crossley", "kelvin_voigt")
 """Names of the methods: the schemes of time stepping, event-driven contact, two compliant laws."""
 
 
-def method_of(name: str, scene: Scene, rows: float = STEP) -> Any:
+def method_of(name: str, scene: Scene, rows: float | None = STEP, **settings: float) -> Any:
     """Return a method; compliant ground is made as stiff as the weight of the scene wants it.
 
-    `rows` is the time between two rows of an event-driven run (s).
+    `rows` is the time between two rows (s): the step of time stepping, and what an event-driven run
+    takes from its dense output, or None for rows at its own steps. `settings` are others of the
+    latter: tolerances, the longest step.
     """
     if name in STEPPING:
-        return hs.TimeStepping(step=STEP, scheme=STEPPING[name])
+        return hs.TimeStepping(step=rows or STEP, scheme=STEPPING[name])
     if name == "event_driven":
-        return hs.EventDriven(output_period=rows)
+        return hs.EventDriven(output_period=rows, **settings)
     weight = 0.5 * GRAVITY * sum(link.mass for link in scene.links)
     if name == "hunt_crossley":
         law = hs.HuntCrossley.from_sink(weight=weight, sink=2e-4, restitution=0.5, speed=0.5)
@@ -62,7 +64,7 @@ class Setting:
 
     def run(
         self, name: str, *, state: hs.State | None = None, begin: float = 0.0,
-        duration: float = DURATION, rows: float = STEP,
+        duration: float = DURATION, rows: float | None = STEP, **settings: float,
     ) -> Run:  # fmt: skip
         """Simulate the scene, from its start or from another state at a time `begin`."""
         scene, robot = self.scene, self.robot
@@ -71,7 +73,7 @@ class Setting:
             scene.controller(robot),
             state=scene.state(robot) if state is None else state,
             duration=duration,
-            method=method_of(name, scene, rows),
+            method=method_of(name, scene, rows, **settings),
             ground=scene.ground(restitution=bounces(name)),
             pushes=scene.pushes(begin),
             stop_when_fallen=False,

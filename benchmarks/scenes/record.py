@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenes.findings import Findings
 from scenes.mechanics import Metric, Poses, Tree, generalised, rates
 from scenes.terrain import Terrain
+from scenes.wedge import excess_over_cones
 
 Array = NDArray[Any]
 
@@ -18,6 +19,8 @@ REACH = 0.2
 """
 SAME_PLACE = 1e-9
 """Places and gaps (m) agree within this, relative to where the robot is beyond a metre."""
+IN_CONES = 1e-6
+"""Forces of two faces agree with their friction within this, relative to their resultant."""
 
 
 class Rows:
@@ -136,7 +139,24 @@ class Rows:
         beyond = np.linalg.norm(self.center - self.run.contact_point, axis=-1)
         beyond -= self.model.contact_radius
         off = np.where(self.cornered, beyond, away) / size
+        for row, contact in np.argwhere(self.cornered & (off > SAME_PLACE)):
+            if self.is_of_two_faces(row, contact):
+                off[row, contact] = 0.0
         found.look("recorded place", off, SAME_PLACE, self.time, self.contacts)
+
+    def is_of_two_faces(self, row: int, contact: int) -> bool:
+        """Whether two faces could make a force on a disc in a corner that acts beside the disc."""
+        normal, radius = self.normal[row, contact], float(self.model.contact_radius[contact])
+        center = self.center[row, contact]
+        faces = self.terrain.faces(center)
+        if radius == 0.0 or len(faces) == 1:
+            return False
+        along, across = self.force[row, contact]
+        force = along * normal + across * np.array([normal[1], -normal[0]])
+        arm = self.run.contact_point[row, contact] - center
+        moment = float(arm[0] * force[1] - arm[1] * force[0])
+        normals, friction = self.terrain.normal[faces], self.terrain.friction[faces]
+        return excess_over_cones(force, moment, radius, normals, friction) <= IN_CONES
 
     def energy(self) -> tuple[Array, Array]:
         """Kinetic and potential energy (T,)."""

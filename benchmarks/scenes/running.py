@@ -13,13 +13,13 @@ from scenes.twins import compare_twins
 
 TWINS_EVERY = 3
 """Every so many seeds a scene is compared with its twins, which costs more than the scene."""
-FINE = 2e-5
-"""Time between rows (s) of the second look at a scene whose forces change too fast for the first:
-rows come from the dense output, and the run is the same."""
+FINE = 1e-4
+"""Longest step (s) of the second look at a scene whose forces change too fast for its rows: it has
+a row at every step of the integrator, and these crowd where forces grow without bound."""
 QUICK = 2.0
 """Processor time (s) of a scene that has time for that within the limit of a scene."""
 BETWEEN_ROWS = {"balance", "energy"}
-"""Laws of what happens between rows."""
+"""Laws of what happens between rows: these alone are what the second look is for."""
 WARM = 1_000_000
 """Seed of the scene with which a worker compiles a method before any clock runs."""
 
@@ -40,8 +40,8 @@ def run_scene(method: str, seed: int, *, twins: bool = True) -> dict[str, Any]:
     found = setting.judge(method, run)
     quick = result["simulated_s"] < QUICK
     if method == "event_driven" and quick and BETWEEN_ROWS & set(found.broken()):
-        run = setting.run(method, rows=FINE)
-        found = setting.judge(method, run)
+        closer = setting.judge(method, setting.run(method, rows=None, max_step=FINE))
+        found.renew(BETWEEN_ROWS, closer)
         result["fine"] = True
     result |= found.as_dict()
     if twins and run.completed and seed % TWINS_EVERY == 0:

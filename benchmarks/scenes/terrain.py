@@ -67,6 +67,13 @@ class Terrain:
         then = np.take_along_axis(np.concatenate((distance[1:], distance[-1:])), second, -1)[..., 0]
         return np.where(np.isfinite(now), then, np.inf)
 
+    def faces(self, point: Array) -> list[int]:
+        """Segment nearest to a point (2,), and one that makes a concave corner with it, if any."""
+        distance, _, _ = self._feet(point)
+        beside = self._beside(point, distance)
+        nearest, second = int(np.argmin(distance)), int(np.argmin(beside))
+        return [nearest, second] if np.isfinite(beside[second]) else [nearest]
+
     def _beside(self, point: Array, distance: Array) -> Array:
         """Distances (..., s) to what makes a concave corner with the nearest segment, or infinity.
 

@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from heelstrike.analysis.stability.largest import largest_slope as largest_slope
     from heelstrike.analysis.stability.monodromy import Monodromy as Monodromy
     from heelstrike.analysis.stability.monodromy import monodromy as monodromy
+    from heelstrike.analysis.stability.response import DisturbanceResponse as DisturbanceResponse
+    from heelstrike.analysis.stability.response import (
+        disturbance_response as disturbance_response,
+    )
     from heelstrike.analysis.stability.sensitivity import (
         gait_sensitivity_norm as gait_sensitivity_norm,
     )
@@ -69,6 +73,7 @@ if TYPE_CHECKING:
     from heelstrike.control import Encoders as Encoders
     from heelstrike.control import Estimated as Estimated
     from heelstrike.control import Feedforward as Feedforward
+    from heelstrike.control import FlatGaitLQR as FlatGaitLQR
     from heelstrike.control import FootSensors as FootSensors
     from heelstrike.control import FootstepFeedback as FootstepFeedback
     from heelstrike.control import GaitLQR as GaitLQR
@@ -141,12 +146,14 @@ _HOME = {
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
+    "DisturbanceResponse": "heelstrike.analysis.stability.response",
     "Encoder": "heelstrike.control",
     "Encoders": "heelstrike.control",
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
     "Floquet": "heelstrike.analysis.stability.floquet",
+    "FlatGaitLQR": "heelstrike.control",
     "FootSensors": "heelstrike.control",
     "FootstepFeedback": "heelstrike.control",
     "ForceDistribution": "heelstrike.contact",
@@ -199,6 +206,7 @@ _HOME = {
     "contact_inverse_dynamics": "heelstrike.contact",
     "contact_kinematics": "heelstrike.contact",
     "controller": "heelstrike.control",
+    "disturbance_response": "heelstrike.analysis.stability.response",
     "find_limit_cycle": "heelstrike.analysis.limit_cycle",
     "floquet_multipliers": "heelstrike.analysis.stability.floquet",
     "gait_sensitivity_norm": "heelstrike.analysis.stability.sensitivity",

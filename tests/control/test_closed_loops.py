@@ -16,19 +16,21 @@ from mechanisms import parallel_ankles
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.control.computed_torque import ComputedTorque
+from heelstrike.control.computed_torque import ComputedTorque, pitch_of
+from heelstrike.control.standing_lqr import linear_standing
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.request import Request
 from heelstrike.gait.transcription import Transcription
 from heelstrike.robot import Robot, RobotBuilder
 
 LIGHT = 1e-9
+NAMES = ("own", "lever")
 LEVER = 0.05
 
 
 def biped(ankle: str, *, weight: float = LIGHT, lever: float = LEVER, toe: bool = False) -> Robot:
     """Biped with its ankle motors in the ankles, on the shanks, or in both places."""
-    build = RobotBuilder("biped")
+    build = RobotBuilder("parallel_ankles")
     trunk = build.floating_base("trunk", (0, 0.85), mass=20, inertia=1, center_of_mass=(0, 0.2))
     for side in ("right", "left"):
         thigh = build.hinge(
@@ -260,10 +262,58 @@ def test_on_a_point_foot_what_no_motor_reaches_follows() -> None:
     np.testing.assert_allclose(found[robot.model.actuator_joint], asked, rtol=1e-8)
 
 
+@pytest.mark.parametrize("law", ["springs", "encoder", "sensors", "estimate"])
+def test_laws_that_read_motors_walk_on_parallel_ankles(gait: hs.Gait, law: str) -> None:
+    """What they are shown has closed loops: joints without a motor follow from the readings."""
+    robot = parallel_ankles()
+    read, torque = hs.Encoders(bits=16, noise=1e-5), ComputedTorque(robot, gait)
+    laws = {
+        "springs": lambda: hs.JointPD(robot, gait, kp=1000.0, kd=[20.0, 20.0, 2.0] * 2),
+        "encoder": lambda: ComputedTorque(robot, gait, encoder=hs.Encoder()),
+        "sensors": lambda: hs.Sensed(torque, encoders=hs.Encoders(noise=1e-5, cutoff=100.0)),
+        "estimate": lambda: hs.Sensed(hs.Estimated(torque), encoders=read),
+    }
+    run = hs.simulate(
+        robot, laws[law](), state=gait.initial_state, duration=1.2, ground=hs.Ground(friction=0.6)
+    )
+    assert run.completed
+    assert run.position[-1, 0] - run.position[0, 0] == pytest.approx(0.6, abs=1e-2)
+    assert abs(run.position[-1, 2] - run.position[0, 2]) < 0.02
+    for seen in ("measured", "estimated"):
+        if f"{seen}_position" not in run.log:
+            continue
+        ankle = robot.joint_index("right_ankle")
+        q, v = (run.log[f"{seen}_{what}"].values[::50] for what in ("position", "velocity"))
+        assert 0.0 < np.abs(q - run.position[::50])[:, ankle].max() < 1e-3
+        for position, velocity in zip(q, v, strict=True):
+            assert np.abs(dynamics.loop_displacement(robot, position)).max() < 1e-13
+            assert np.abs(dynamics.loop_jacobian(robot, position) @ velocity).max() < 1e-9
+
+
+def test_a_regulator_of_standing_finds_the_motions_of_motors_in_the_ankles() -> None:
+    """Light levers and rods change nothing: motions about the posture are the same."""
+    own, lever = (linear_standing(robot, robot.reference_state().q) for robot in map(biped, NAMES))
+    assert lever.A.shape == own.A.shape == (8, 8)
+    found = [np.sort_complex(np.linalg.eigvals(each.A)) for each in (lever, own)]
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6)
+    np.testing.assert_allclose(lever.torque, own.torque, rtol=1e-6, atol=1e-6)
+    robot = parallel_ankles()
+    law = hs.StandingLQR(robot)
+    assert law.poles.real.max() < -1.0
+    push = hs.Push("trunk", force=(100.0, 0.0), start=0.1, duration=0.1)
+    run = hs.simulate(robot, law, state=robot.reference_state(), duration=2.5, pushes=push)
+    assert np.ptp(run.position[:, 2]) > 0.01
+    np.testing.assert_allclose(run.position[-1], run.position[0], rtol=0, atol=1e-3)
+    torn = robot.state({"right_motor": 0.1}).q
+    with pytest.raises(ControllerError, match=r"is open by 0.0\d+: take robot.closed\(state\).q"):
+        hs.StandingLQR(robot, torn)
+
+
 def test_what_motors_do_not_reach_is_refused(gait: hs.Gait) -> None:
-    robot = biped("lever")
-    with pytest.raises(ControllerError, match="encoders of motors alone"):
-        ComputedTorque(robot, gait, encoder=hs.Encoder())
+    with pytest.raises(ControllerError, match="has loop right_rod-right_ankle"):
+        hs.ZeroMomentPointRegulation(parallel_ankles(), gait)
+    with pytest.raises(GaitError, match="has none at right_ankle, right_rod"):
+        hs.PhasedGait.from_gait(parallel_ankles(), gait)
     build = RobotBuilder("loose")
     trunk = build.floating_base("trunk", (0, 0.9), mass=10, inertia=0.5)
     for side in ("right", "left"):
@@ -275,7 +325,7 @@ def test_what_motors_do_not_reach_is_refused(gait: hs.Gait) -> None:
         assert arm
     loose = build.build()
     with pytest.raises(ControllerError, match="nothing drives right_ankle, left_ankle"):
-        ComputedTorque(loose, gait)
+        pitch_of(loose)
     with pytest.raises(GaitError, match="leave 2 of them free"):
         hs.optimize_gait(loose, step_length=0.2)
     with pytest.raises(GaitError, match="bind joints with motors to each other"):

@@ -47,6 +47,7 @@ def standing(make: Callable[..., Law]) -> tuple[hs.Robot, hs.State, Law]:
 LAWS: dict[str, Callable[[], tuple[hs.Robot, hs.State, Law]]] = {
     "ComputedTorque": lambda: on_flat_feet(hs.ComputedTorque),
     "FootstepFeedback": lambda: on_flat_feet(hs.FootstepFeedback),
+    "FlatGaitLQR": lambda: on_flat_feet(hs.FlatGaitLQR),
     "GaitLQR": lambda: on_points(hs.GaitLQR),
     "JointFeedback": lambda: standing(
         lambda robot: JointFeedback(robot, np.zeros(6), kp=3000.0, kd=30.0)

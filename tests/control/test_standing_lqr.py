@@ -130,12 +130,12 @@ def leaning(q: np.ndarray) -> np.ndarray:
     [
         (in_the_air, {}, "does not stand in this posture: .* 0.01 m above the ground"),
         (lambda q: in_the_air(q, -0.01), {}, "0.01 m below the ground"),
-        (lambda q: np.nan * q, {}, "a posture is of finite numbers"),
+        (lambda q: np.nan * q, {}, "a posture is of 9 finite numbers"),
         (leaning, {}, "cannot rest in this posture.*centre of mass over its feet"),
         (None, {"torque_weight": 0.0}, "torque_weight must be positive"),
         (None, {"position_weight": [1.0, 2.0]}, "position_weight must be one number"),
         (None, {"velocity_weight": -1.0}, "velocity_weight must be one number"),
-        (None, {"period": 0.0}, "period of a controller must be positive"),
+        (None, {"period": 0.0}, "period must be a positive number"),
     ],
 )
 def test_what_cannot_stand_is_refused(posture: Any, options: Any, said: str) -> None:

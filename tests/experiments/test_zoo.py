@@ -5,6 +5,7 @@ Most cells here are of disturbances that cost nothing, on a robot that stands on
 
 from __future__ import annotations
 
+import html
 import math
 import threading
 from collections.abc import Callable
@@ -35,7 +36,7 @@ from heelstrike.experiments.zoo.controllers import flat_feet, point_feet, two_fe
 from heelstrike.experiments.zoo.disturbances import chances
 from heelstrike.experiments.zoo.figure import draw_zoo
 from heelstrike.experiments.zoo.results import load_results
-from heelstrike.experiments.zoo.table import as_csv, as_page, digits, shown
+from heelstrike.experiments.zoo.table import as_csv, as_page, digits, escaped, shown
 from heelstrike.experiments.zoo.writing import Targets
 
 QUICK = campaign.QUICK
@@ -332,6 +333,9 @@ def test_wrong_questions_are_refused(tmp_path: Path) -> None:
     walks.bravo7().save(tmp_path / "mine.xml")
     loaded = campaign.loaded(f"rabbit,{tmp_path / 'mine.xml'}", {})
     assert list(loaded) == ["rabbit", "mine.xml"]
+    walks.bravo7().save(tmp_path / "mine, too.xml")
+    loaded = campaign.loaded(f'rabbit, "{tmp_path / "mine, too.xml"}"', {})
+    assert list(loaded) == ["rabbit", "mine, too.xml"]
 
 
 # How it is shown
@@ -396,6 +400,28 @@ def test_a_page_tells_what_made_it_and_why_cells_are_empty(tmp_path: Path) -> No
     rows = as_csv(results).splitlines()
     assert len(rows) == 1 + len(results.cells)
     assert rows[1] == "bravo7,ComputedTorque,push-forwards,N s,1,2,2,2,4,,"
+
+
+def test_names_of_files_stand_in_the_page_as_they_are(tmp_path: Path) -> None:
+    """Whatever Markdown makes of their characters; a name of the zoo's own is not changed."""
+    odd = "$\\frac$ a*b*_c_ | `d` <em> [e](f) & #g_h.xml"
+    results = Results(replace(QUICK, trials=1, method="m"))
+    results.meet(campaign.Animal(robot=odd, fingerprint="f", mass=75.0))
+    cell = Cell(robot=odd, controller="c|c", disturbance="free", withstood=(1.0,), failed=(2.0,))
+    results.put(replace(cell, disturbance="slope-up"))
+    text = as_page(
+        results, page=tmp_path / "zoo.md", figure=tmp_path / "my zoo (1).png", command="c"
+    )
+    assert (
+        "## $\\\\frac$ a\\*b\\*\\_c\\_ &#124; \\`d\\` &#60;em&#62; \\[e\\](f) &amp; \\#g_h.xml\n"
+        in text
+    )
+    assert "| c&#124;c | 1 |" in text
+    assert "](my%20zoo%20%281%29.png)" in text
+    draw_zoo(results).savefig(tmp_path / "drawn.svg")  # $ is no formula either
+    assert escaped("spring_flamingo: no gait (it's 5 m)") == "spring_flamingo: no gait (it's 5 m)"
+    markdown = pytest.importorskip("markdown")
+    assert html.unescape(markdown.markdown(escaped("<b>*_`x`|a&b"))) == "<p><b>*_`x`|a&b</p>"
 
 
 def test_the_figure_has_a_panel_a_disturbance_and_a_mark_a_cell(tmp_path: Path) -> None:

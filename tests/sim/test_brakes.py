@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from mechanisms import braked
+from scipy.optimize import brentq
 
 import heelstrike as hs
 from heelstrike.analysis import energy_balance
 from heelstrike.errors import RobotError, SimulationError
+from heelstrike.gait.gait import fingerprint
 from heelstrike.robot import Robot, RobotBuilder
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.files.robot_dataset import robot_to_dataset, stored_robot
 from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.time_stepping.impact import allocate_impact
 
@@ -105,6 +108,155 @@ def test_a_braked_simulation_is_taken_up_again(method: Any, tmp_path: Path) -> N
         assert other.state.v[0] == pytest.approx(0.0, abs=1e-12)
 
 
+LIMIT = 20.0  # N m: 4.8 more than the weight takes where the pendulum begins
+
+
+def slipping(limit: float = LIMIT, dry_friction: float = 0.0) -> Robot:
+    build = RobotBuilder("pendulum")
+    build.hinge(
+        "swing", None, mass=MASS, inertia=INERTIA, center_of_mass=(0.0, -LENGTH),
+        dry_friction=dry_friction,
+    )  # fmt: skip
+    build.brake("swing", limit=limit)
+    return build.build()
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_brake_that_slips_slows_down_and_holds_then(method: Any) -> None:
+    """It stops where ½ I ω² and the weight's work are τ Δθ, and holds it with m g l sin θ then.
+
+    Time stepping is of first order; smoothed friction creeps.
+    """
+    robot = slipping(dry_friction=5.0)
+    simulation = hs.Simulation(robot, state=robot.state({"swing": 1.2}), method=method)
+    simulation.advance(0.3)
+    angle, speed = float(simulation.state.q[0]), float(simulation.state.v[0])
+    simulation.braked = ["swing"]
+    simulation.advance(0.4)
+    put_off = simulation.snapshot()
+    simulation.advance(0.8)
+    run = simulation.record
+
+    def missing(q: float) -> float:
+        fallen = MASS * 9.81 * LENGTH * (np.cos(q) - np.cos(angle))
+        return 0.5 * ABOUT_PIVOT * speed**2 + fallen - (LIMIT + 5.0) * (angle - q)
+
+    rest = float(brentq(missing, angle - 3.0, angle - 1e-3))
+    error = 1e-3 * abs(speed) if isinstance(method, hs.TimeStepping) else 1e-8
+    error = 1e-4 if isinstance(method, hs.Compliant) else error
+    assert simulation.state.q[0] == pytest.approx(rest, abs=error)
+    slips = (run.time > 0.301) & (run.velocity[:, 0] < -0.1)
+    np.testing.assert_allclose(run.brake_torque[slips, 0], LIMIT, rtol=1e-4)
+    np.testing.assert_allclose(run.friction_torque[slips, 0], 5.0, rtol=1e-4)
+    weight = MASS * 9.81 * LENGTH * np.sin(simulation.state.q[0])
+    assert run.brake_torque[-1, 0] == pytest.approx(0.8 * weight, rel=1e-3)
+    assert run.brake_torque[-1, 0] == pytest.approx(4.0 * run.friction_torque[-1, 0])
+    assert not np.any(run.brake_torque[run.time < 0.299])
+    balance = energy_balance(run)
+    assert balance.brakes[-1] == pytest.approx(-LIMIT * (angle - rest), abs=50.0 * error + 1e-4)
+    (taken,) = (e for e in run.events if e.kind is EventKind.JOINT_BRAKE)
+    assert (taken.time, taken.impulse) == (pytest.approx(0.3, abs=1e-9), (0.0, 0.0))
+    other = hs.Simulation(robot, state=put_off, method=method)
+    other.advance(0.8)
+    assert other.braked == ("swing",)
+    assert np.array_equal(other.state.q, simulation.state.q)
+    simulation.braked = []
+    simulation.advance(0.81)
+    assert not simulation.record.brake_torque[-1].any()
+    assert simulation.record.friction_torque[-1, 0] == pytest.approx(5.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_a_brake_that_slips_holds_up_to_its_limit(method: Any) -> None:
+    """One per cent above the weight, and one below."""
+    weight = MASS * 9.81 * LENGTH * np.sin(0.7)
+    moved = []
+    for limit in (1.01 * weight, 0.99 * weight):
+        robot = slipping(limit)
+        run = hs.simulate(
+            robot, state=robot.state({"swing": 0.7}), duration=0.2, method=method, braked="swing"
+        )
+        assert run.completed
+        moved.append(0.7 - run.final_state.q[0])
+        bears = min(limit, weight)
+        assert run.brake_torque[-1, 0] == pytest.approx(bears, rel=1e-3)
+        assert not run.friction_torque.any()
+    creep = 8e-4 if isinstance(method, hs.Compliant) else 1e-12  # as any dry friction
+    assert moved[0] < creep
+    pulls = 0.01 * weight  # and the weight has less of a lever as it falls
+    stiffness = weight / np.tan(0.7)
+    falls = pulls / stiffness * (1.0 - np.cos(np.sqrt(stiffness / ABOUT_PIVOT) * 0.2))
+    assert moved[1] == pytest.approx(falls, rel=0.01, abs=max(creep, 1e-5))
+
+
+class Halting:
+    """Put a brake on at a position, and let it go a while later."""
+
+    def __init__(self) -> None:
+        self.braked: tuple[str, ...] = ()
+        self.since = np.inf
+
+    def torque(self, t: float, state: hs.State, contacts: Any) -> Any:
+        if np.isinf(self.since) and state.q[0] < 0.5:
+            self.braked, self.since = ("swing",), t
+        elif t > self.since + 0.1:
+            self.braked = ()
+        return np.zeros(0)
+
+
+@pytest.mark.parametrize("method", [hs.TimeStepping(), hs.EventDriven(), hs.Compliant()])
+def test_a_controller_in_python_brakes_where_it_likes(method: Any) -> None:
+    robot = pendulum()
+    run = hs.simulate(
+        robot, Halting(), state=robot.state({"swing": 1.2}), duration=0.6, method=method
+    )
+    assert run.completed, run.message
+    (taken,) = (e for e in run.events if e.kind is EventKind.JOINT_BRAKE)
+    assert run.position[np.searchsorted(run.time, taken.time - 1e-3 - 1e-9), 0] >= 0.5
+    held = (run.time > taken.time + 2e-3) & (run.time < taken.time + 0.099)
+    assert np.ptp(run.position[held, 0]) < 1e-12
+    assert 0.49 < run.position[held, 0].mean() < 0.5
+    assert not np.any(run.brake_torque[run.time > taken.time + 0.103])
+    assert run.velocity[-1, 0] < -0.5
+
+
+def test_a_controller_that_names_no_joint_ends_the_run() -> None:
+    class Wrong(Halting):
+        braked = ("swnig",)
+
+        def __init__(self) -> None:
+            self.since = np.inf
+
+    robot = pendulum()
+    run = hs.simulate(robot, Wrong(), state=robot.state({"swing": 1.2}), duration=0.1)
+    assert run.status is RunStatus.CONTROLLER_FAILED
+    assert "no joint 'swnig'. Did you mean 'swing'" in run.message
+
+
+def test_a_batch_begins_with_brakes_on() -> None:
+    robots = [slipping(), slipping(3.0), pendulum()]
+    for robot, joints in [(robots[:2], "swing"), (robots[:2], [["swing"], []]), (robots[2:], [0])]:
+        states = [each.state({"swing": 0.7}) for each in robot]
+        batch = hs.simulate_batch(robot, state=states, duration=0.05, braked=joints)
+        for i, each in enumerate(robot):
+            own = joints[i] if isinstance(joints[0], list) else joints
+            alone = hs.simulate(each, state=states[i], duration=0.05, braked=own)
+            np.testing.assert_array_equal(batch.position[i], alone.final_state.q)
+            assert (alone.final_state.q[0] == 0.7) == (own != [] and each is not robots[1])
+    for wrong, words in [
+        ([["swing"], "swing"], "mixes the two"),
+        ([[], ["swnig"]], "run 1: .*no joint 'swnig'"),
+        (3.0, "braked must be names of joints, got 3.0"),
+    ]:
+        with pytest.raises(hs.HeelstrikeError, match=words):
+            hs.simulate_batch(robots[0], state=robots[0].state(), duration=0.05, braked=wrong)  # type: ignore[arg-type]
+    with pytest.raises(SimulationError, match="joints, got"):
+        hs.simulate(robots[0], state=robots[0].state(), duration=0.05, braked=3.0)  # type: ignore[arg-type]
+    snapshot = hs.simulate(robots[0], state=robots[0].state(), duration=0.01).final
+    with pytest.raises(SimulationError, match=r"simulate\(state=snapshot\) goes on"):
+        hs.simulate_batch(robots[0], state=snapshot, duration=0.05)  # type: ignore[arg-type]
+
+
 def test_a_run_may_begin_with_a_brake_on(tmp_path: Path) -> None:
     robot = pendulum()
     run = hs.simulate(robot, state=robot.state({"swing": 0.4}), duration=0.01, braked=["swing"])
@@ -112,6 +264,24 @@ def test_a_run_may_begin_with_a_brake_on(tmp_path: Path) -> None:
     again = hs.load_run(run.save(tmp_path / "braked.nc"))
     np.testing.assert_array_equal(again.brake_torque, run.brake_torque)
     assert again.robot.brake_names == ("swing",)
+
+
+def contents_of(robot: Robot) -> dict[str, Any]:
+    """Return a robot as a run file has it."""
+    data = robot_to_dataset(robot)
+    found = {str(name): np.array(each.values) for name, each in data.variables.items()}
+    found |= {f"@{name}": np.array(value) for name, value in data.attrs.items()}
+    return {name: v.astype(str) if v.dtype.kind == "O" else v for name, v in found.items()}
+
+
+def test_left_and_right_brakes_that_slip_otherwise_are_told() -> None:
+    build = RobotBuilder("two")
+    trunk = build.floating_base("trunk", (0, 1), mass=5, inertia=0.1)
+    for side, limit in (("right", 3.0), ("left", 4.0)):
+        build.hinge(f"{side}_hip", trunk, mass=2.0, inertia=0.2)
+        build.brake(f"{side}_hip", limit=limit)
+    with pytest.warns(hs.RobotWarning, match=r"brakes of right_hip and left_hip \(3, 4\)"):
+        assert build.build().mirror is None
 
 
 def standing_leg() -> Robot:
@@ -184,19 +354,26 @@ def test_an_impact_has_room_for_all_that_can_touch_and_all_brakes() -> None:
         assert impact.problem.set.shape == candidates.shape
 
 
+def arm() -> RobotBuilder:
+    build = RobotBuilder("one")
+    build.hinge("arm", None, mass=1.0, inertia=0.1)
+    return build
+
+
 def test_brakes_are_named_where_there_are_none(tmp_path: Path) -> None:
     robot = standing_leg()
     with pytest.raises(
         SimulationError, match="'root_pitch' of robot 'leg' has no brake; knee, hip"
     ):
         hs.Simulation(robot, state=robot.reference_state(), braked=["root_pitch"])
-    build = RobotBuilder("one")
-    build.hinge("arm", None, mass=1.0, inertia=0.1)
+    build = arm()
     build.brake("arm")
     with pytest.raises(RobotError, match="joint 'arm' has a brake already"):
         build.brake("arm")
     with pytest.raises(RobotError, match="no joint 'leg' to brake"):
         build.brake("leg")
+    with pytest.raises(RobotError, match="brake of joint 'arm' must hold something, got 0"):
+        arm().brake("arm", limit=0)
 
 
 def test_a_brake_goes_through_files(tmp_path: Path) -> None:
@@ -206,6 +383,22 @@ def test_a_brake_goes_through_files(tmp_path: Path) -> None:
     assert "brake: knee" in hs.inspect_robot(robot).text()
     with pytest.warns(hs.RobotWarning, match="brakes of knee, hip"):
         robot.save(tmp_path / "leg.urdf")
+    slips = slipping(12.5)
+    assert fingerprint(slips) != fingerprint(slipping()) != fingerprint(pendulum())
+    assert "brake: swing, slips beyond 12.5 N m" in hs.inspect_robot(slips).text()
+    again = hs.load_robot(slips.save(tmp_path / "slips.xml"))
+    assert again.model.brake_limit == slips.model.brake_limit == [12.5]
+    (tmp_path / "slips.xml").write_text(
+        (tmp_path / "slips.xml").read_text().replace('data="1 12.5"', 'data="1 -2"')
+    )
+    with pytest.raises(RobotError, match=r"brake 'swing' in <custom> must hold something.*-2"):
+        hs.load_robot(tmp_path / "slips.xml")
+    held = contents_of(slips)
+    assert stored_robot(held).model.brake_limit == [12.5]
+    with pytest.raises(ValueError, match="brake_limit must be 0 or more"):
+        stored_robot({**held, "brake_limit": np.array([-1.0])})
+    del held["brake_limit"]  # files that are older
+    assert stored_robot(held).model.brake_limit == [np.inf]
     text = (tmp_path / "leg.xml").read_text().replace("brake:knee", "brake:neck")
     (tmp_path / "leg.xml").write_text(text)
     with pytest.raises(RobotError, match="brake 'neck' in <custom>"):

@@ -52,6 +52,24 @@ def test_a_stop_that_is_reached_holds(method: Any) -> None:
     assert run.completed
 
 
+@pytest.mark.parametrize("method", [hs.EventDriven(), hs.TimeStepping()], ids=str)
+def test_a_controller_in_python_lets_go_what_it_does_not_name(method: Any) -> None:
+    class Opens:
+        latched: tuple[str, ...] = ("hinge",)
+
+        def torque(self, t: float, state: hs.State, contacts: Any) -> Any:
+            self.latched = ("hinge",) if t < 0.05 else ()
+            return np.zeros(0)
+
+    robot = gate()
+    start = robot.state({"hinge": 0.3})
+    run = hs.simulate(robot, Opens(), state=start, duration=0.1, method=method)
+    assert run.completed, run.message
+    np.testing.assert_allclose(run.position[run.time <= 0.05, 0], 0.3, atol=1e-12)
+    fallen = 0.5 * 9.81 * 0.5 * np.sin(0.3) / (0.02 + 0.5**2) * 0.05**2
+    assert 0.3 - run.position[-1, 0] == pytest.approx(fallen, rel=0.05)
+
+
 def test_without_a_latch_it_falls_back() -> None:
     robot = gate()
     free = Robot(

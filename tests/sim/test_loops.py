@@ -11,7 +11,7 @@ from mechanisms import four_bar, geared, parallel_ankles
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.robot import Robot
+from heelstrike.robot import Robot, RobotBuilder
 from heelstrike.sim import memory
 from heelstrike.sim.closed_sets import EventKind
 
@@ -120,6 +120,33 @@ def test_redundant_loops_share_their_force_by_least_norm() -> None:
         each, both = runs[1].loop_force, runs[0].loop_force[:, 0]
         np.testing.assert_allclose(each[:, 0], 0.5 * both, rtol=1e-6, atol=1e-9)
         np.testing.assert_allclose(each[:, 1], 0.5 * both, rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("lean", [1e-6, 0.25])
+@pytest.mark.parametrize(
+    "method", [hs.TimeStepping(), hs.EventDriven(), hs.Compliant()], ids=lambda each: each.name
+)
+def test_a_loop_between_a_link_and_its_parent_locks_the_joint(lean: float, method: Any) -> None:
+    """Of its two rows one says what the other does, and next to nothing along the lever.
+
+    What spins with ω as one body and falls freely needs m ω² r to hold the arm, whose moment about
+    the joint, m ω² r_z l, the loop bears over its lever, at right angles to it.
+    """
+    build = RobotBuilder("locked")
+    trunk = build.floating_base("trunk", (0, 1), mass=3.0, inertia=0.2)
+    arm = build.hinge("arm", trunk, at=(0.1, 0.2), mass=1.0, inertia=0.02, center_of_mass=(0.2, 0))
+    build.loop(arm, trunk, at=(0.25, lean))
+    robot = build.build()
+    start = robot.state({"root_pitch": 0.3}, {"root_x": 0.4, "root_pitch": 2.0})
+    run = hs.simulate(robot, state=start, duration=0.2, method=method)
+    assert run.completed
+    np.testing.assert_allclose(run.position[:, 3], 0.0, atol=1e-13)
+    np.testing.assert_allclose(run.velocity[:, 2], 2.0, rtol=1e-9)
+    lever = np.hypot(0.25, lean)
+    force = run.loop_force[20]
+    assert np.linalg.norm(force) == pytest.approx(1.0 * 2.0**2 * 0.15 * 0.2 / lever, rel=1e-3)
+    angle = run.position[20, 2] - np.arctan2(lean, 0.25)
+    assert abs(force @ [np.cos(angle), -np.sin(angle)]) < 2e-2 * np.linalg.norm(force)
 
 
 METHODS = [hs.TimeStepping(), hs.EventDriven(), hs.Compliant()]

@@ -26,7 +26,11 @@ ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
 @reads_robots
 def zoo(
     robots: Annotated[
-        str, typer.Option(help="Built-in robots, and MJCF, URDF or SDF files, with commas between.")
+        str,
+        typer.Option(
+            help="Built-in robots, and MJCF, URDF or SDF files, with commas between; a file with a "
+            "comma in its name in double quotes."
+        ),
     ] = ROBOTS,
     controllers: Annotated[
         str | None, typer.Option(help="Controllers, with commas between.", show_default="all")

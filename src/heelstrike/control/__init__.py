@@ -4,6 +4,7 @@ from heelstrike.control.actuation import Actuated
 from heelstrike.control.balance.controllers import FootstepFeedback, WholeBody
 from heelstrike.control.computed_torque import ComputedTorque, Encoder
 from heelstrike.control.estimation import Estimated
+from heelstrike.control.gait_lqr.flat_law import FlatGaitLQR
 from heelstrike.control.gait_lqr.law import GaitLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
 from heelstrike.control.preview import PreviewControl, preview_control
@@ -28,6 +29,7 @@ __all__ = [
     "Encoders",
     "Estimated",
     "Feedforward",
+    "FlatGaitLQR",
     "FootSensors",
     "FootstepFeedback",
     "GaitLQR",

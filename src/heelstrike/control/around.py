@@ -31,7 +31,7 @@ from heelstrike.sim.controller.interface import ARGUMENTS, Contacts, Controller
 from heelstrike.sim.controller.law import ControllerFunction, Law, law_of
 from heelstrike.sim.controller.robot import ControlState, extents_of
 
-ROBOTS = frozenset(("nq", "nv", "nu", "nc", "nl", "nj", "nf", "axes", "components"))
+ROBOTS = frozenset(("nq", "nv", "nu", "nc", "nl", "nj", "nf", "axes", "components", "held"))
 """Extents that are the robot's."""
 
 PERIOD = 1e-3

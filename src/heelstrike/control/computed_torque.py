@@ -11,24 +11,26 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
+from heelstrike.control.arguments import check_gait, gains_of, must_be
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.queries.loops import loop_jacobian
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import ControllerError, GaitError
+from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.law import Law, controller, per_actuator
+from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import hold_still
+from heelstrike.sim.controller.tied import follow_positions
 
 # A point of the swing foot that comes down more slowly than this (m/s) has landed.
 LANDED_SPEED = 1e-3
@@ -263,6 +265,7 @@ def estimate_pose(
     for i in range(robot.nu):
         seen.joint_position[i] = memory.readings[0, i]
         seen.q[model.actuator_joint[i]] = memory.readings[0, i]
+    follow_positions(robot, seen)
     forward_kinematics(model, seen.q, seen.kinematics)
     link = robot.foot_link[memory.stance]
     seen.q[parameters.pitch] -= parameters.pitch_sign * seen.kinematics.angle[link]
@@ -372,24 +375,18 @@ class ComputedTorque(Law):
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
+        check_gait(robot, gait)
         refuse_loops(robot, "computed torque", ControllerError, loops=False)
         pitch = pitch_of(robot)
-        if encoder is not None and robot.model.loops + robot.model.couplings:
-            raise ControllerError(
-                "encoders of motors alone do not tell where joints are that follow by closed loops "
-                "or couplings; leave encoder out"
-            )
-        try:
-            gait.check_joints(robot)
-        except GaitError as error:
-            raise ControllerError(str(error)) from None
+        if encoder is not None:
+            must_be(Encoder, "encoder", encoder)
         if gait.point_feet:
             _check_points(robot, encoder)
         duration = gait.step_duration
         pieces, mirrored = gait.pieces, gait.mirrored_pieces()
         parameters = Parameters(
-            kp=_gains("kp", kp, robot),
-            kd=_gains("kd", kd, robot),
+            kp=gains_of("kp", kp, robot),
+            kd=gains_of("kd", kd, robot),
             breakpoints=gait.breakpoints,
             coefficients=np.array([mirrored, pieces] if gait.stance_foot else [pieces, mirrored]),
             earliest=0.5 * duration,
@@ -457,10 +454,3 @@ def _check_points(robot: Robot, encoder: Encoder | None) -> None:
             "on point feet the trunk's pitch does not follow from the joints, so joint "
             "encoders alone cannot measure the state; leave encoder out"
         )
-
-
-def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    gains = per_actuator(name, value, robot)
-    if np.any(gains < 0.0):
-        raise ControllerError(f"{name} must not be negative, got {value!r}")
-    return gains

@@ -34,12 +34,14 @@ from heelstrike.dynamics.kernels import (
     point_position,
     solve_factorized,
 )
+from heelstrike.dynamics.loops import find_rows as find_loop_rows
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts, Controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.tied import follow_positions, follow_speeds
 
 # Two points of a flat foot hold three coordinates by four equations: their matrix is singular, and
 # gets this part of its trace added. Velocities hardly depend on it.
@@ -100,10 +102,10 @@ class Memory(Shown):
     force: Floats = array("nv")
     passive: Floats = array("nv")
     point: Floats = array("nc", "axes")
-    rows: Floats = array("2 nc", "nv")
-    columns: Floats = array("2 nc", "nv")
-    small: Floats = array("2 nc", "2 nc")
-    right: Floats = array("2 nc")
+    rows: Floats = array("held", "nv")
+    columns: Floats = array("held", "nv")
+    small: Floats = array("held", "held")
+    right: Floats = array("held")
 
 
 class Log(Bundle):
@@ -130,7 +132,10 @@ def find_points(robot: ControlledRobot, parameters: Parameters, memory: Memory) 
 
 @kernel
 def find_rows(robot: ControlledRobot, parameters: Parameters, memory: Memory) -> int:
-    """Write what a change of velocity takes that stops the standing points; return its rows."""
+    """Write what a change of velocity takes that stops the standing points; return its rows.
+
+    After these come the rows of closed loops and couplings, at which nothing may tear either.
+    """
     model, work, count = robot.model, memory.state.kinematics, 0
     mass_matrix(model, work, memory.matrix)
     factorize(model, memory.matrix, memory.factor)
@@ -139,6 +144,12 @@ def find_rows(robot: ControlledRobot, parameters: Parameters, memory: Memory) ->
             link, at = model.contact_link[i], memory.point[i]
             write_point_rows(model, work, link, at, parameters.up, count, memory.rows)
             count += 2
+    if robot.loops.bias.shape[0] > 0:
+        find_loop_rows(model, memory.state.q, memory.state.v, work, robot.loops)
+    for row in range(robot.loops.bias.shape[0]):
+        for j in range(robot.nv):
+            memory.rows[count, j] = robot.loops.jacobian[row, j]
+        count += 1
     for row in range(count):
         for j in range(robot.nv):
             memory.columns[row, j] = memory.rows[row, j]
@@ -234,6 +245,7 @@ def correct(
         error = state.q[pitch] - seen.q[pitch]
         seen.q[pitch] += position * error
         change[pitch] = speed * error
+    follow_positions(robot, seen)
     robot.update(seen)
     find_points(robot, parameters, memory)
     x, z, count = 0.0, 0.0, 0
@@ -248,10 +260,12 @@ def correct(
         robot.update(seen)
         find_points(robot, parameters, memory)
     rows = find_rows(robot, parameters, memory)
-    if rows > 0 and pitch >= 0:
-        carry_trunk(robot, rows, memory, change)
+    if count > 0 and pitch >= 0:
+        carry_trunk(robot, 2 * count, memory, change)
     for j in range(robot.nv):
         seen.v[j] += change[j]
+    if robot.loops.bias.shape[0] > 0:
+        follow_speeds(robot, seen, 0)
     if rows > 0:
         stop_standing(robot, rows, memory, seen.v)
     robot.update(seen)

@@ -13,6 +13,7 @@ from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array
+from heelstrike.control.arguments import must_be, numbers_of
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -96,7 +97,8 @@ class JointFeedback(Law):
         kd: ArrayLike,
         begins: ArrayLike = (0.0,),
     ) -> None:
-        begins = np.atleast_1d(np.asarray(begins, dtype=np.float64))
+        must_be(Robot, "robot", robot)
+        begins = np.atleast_1d(numbers_of("begins", begins))
         kp, kd = per_actuator("kp", kp, robot), per_actuator("kd", kd, robot)
         pieces = (len(begins), robot.nu)
         reference = _polynomials("position", position, *pieces)
@@ -121,7 +123,7 @@ class JointFeedback(Law):
 
 
 def _polynomials(name: str, value: ArrayLike, pieces: int, nu: int) -> NDArray[np.float64]:
-    polynomials = np.asarray(value, dtype=np.float64)
+    polynomials = numbers_of(name, value)
     if polynomials.ndim < 3:
         polynomials = np.broadcast_to(polynomials[..., None], (pieces, nu, 1))
     if polynomials.shape[:2] != (pieces, nu):

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import array, number
+from heelstrike.control.arguments import check_gait
 from heelstrike.control.computed_torque import (
     Stance,
     StepTiming,
@@ -22,7 +23,7 @@ from heelstrike.control.computed_torque import (
     pitch_of,
     restart_at_touchdown,
 )
-from heelstrike.errors import ControllerError, GaitError
+from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
@@ -137,7 +138,8 @@ class JointPD(Law):
     Parameters
     ----------
     robot : Robot
-        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated.
+        A floating robot with two feet, mirror symmetric, all joints but the trunk's actuated, or
+        driven by such through closed loops and couplings.
     gait : Gait
         The gait to follow, on flat feet.
     kp, kd : float or (nu,) array
@@ -174,13 +176,11 @@ class JointPD(Law):
         kd: ArrayLike,
         feedforward: Feedforward | str = Feedforward.FULL,
     ) -> None:
-        refuse_loops(robot, "springs and dampers about a gait", ControllerError)
+        check_gait(robot, gait)
+        refuse_loops(robot, "springs and dampers about a gait", ControllerError, loops=False)
         pitch_of(robot)
         try:
-            gait.check_joints(robot)
             known = Feedforward(feedforward)
-        except GaitError as error:
-            raise ControllerError(str(error)) from None
         except ValueError:
             names = ", ".join(f"{each.value!r}" for each in Feedforward)
             raise ControllerError(

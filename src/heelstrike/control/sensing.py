@@ -326,11 +326,15 @@ def sense(
     row = max(memory.calls - parameters.late, 0) % memory.past_q.shape[0]
     for j in range(robot.nq):
         seen.q[j] = memory.past_q[row, j]
-        log.measured_position[j] = seen.q[j]
     for j in range(robot.nv):
         seen.v[j] = memory.past_v[row, j]
-        log.measured_velocity[j] = seen.v[j]
+    if parameters.encoder_every > 0:
+        robot.follow_motors(seen)
     robot.update(seen)
+    for j in range(robot.nq):
+        log.measured_position[j] = seen.q[j]
+    for j in range(robot.nv):
+        log.measured_velocity[j] = seen.v[j]
     for i in range(robot.nc):
         told.gap[i] = memory.past_gap[row, i]
         for k in range(2):
@@ -356,7 +360,8 @@ class Sensed(Around):
     """A controller that sees its robot by sensors: any controller, compiled or in Python.
 
     Positions, normals and gaps of contact points, and what no sensor measures of the state, are
-    true, but as late as the rest.
+    true, but as late as the rest. What follows by closed loops and couplings follows from what the
+    encoders read of the motors.
 
     Parameters
     ----------

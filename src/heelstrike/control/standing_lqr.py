@@ -1,8 +1,9 @@
 """The linear-quadratic regulator of a robot that stands.
 
-While the ground holds the feet, J δq = 0 leaves motions δq = N y, the columns of N an orthonormal
-basis of the null space of J, whose rank may be less than its rows: heel and toe of one foot hold
-three coordinates by four rows. About a posture at rest, with torques that bear the weight,
+While the ground holds the feet, and closed loops and couplings what they join, J δq = 0 leaves
+motions δq = N y, the columns of N an orthonormal basis of the null space of J, whose rank may be
+less than its rows: heel and toe of one foot hold three coordinates by four rows. About a posture at
+rest, with torques that bear the weight,
 
     d/dt (y, ẏ) = A (y, ẏ) + B δτ,
 
@@ -21,8 +22,8 @@ from scipy.signal import cont2discrete
 
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.contact import ContactInverseDynamics, contact_inverse_dynamics, contact_kinematics
-from heelstrike.control.weights import weights_of
-from heelstrike.dynamics import linearize
+from heelstrike.control.arguments import must_be, numbers_of, positive, weights_of
+from heelstrike.dynamics import linearize, loop_displacement, loop_jacobian
 from heelstrike.errors import ControllerError
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
@@ -72,12 +73,13 @@ def standing_lqr(
 
 @dataclass(frozen=True, eq=False)
 class LinearStanding:
-    """How a robot moves about a posture while the ground holds its feet.
+    """How a robot moves about a posture while the ground holds its feet, and its loops hold.
 
     Attributes
     ----------
     basis : (nv, k) float
-        N: motions of the coordinates that leave the feet where they are; orthonormal columns.
+        N: motions of the coordinates that leave the feet where they are, and loops closed;
+        orthonormal columns.
     A, B : (2 k, 2 k) and (2 k, nu) float
         d/dt (y, ẏ) = A (y, ẏ) + B δτ.
     torque : (nu,) float
@@ -114,12 +116,13 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
         If no contact point touches the ground, the posture cannot be held there, or nothing of the
         robot can move.
     """
-    refuse_loops(robot, "a regulator of standing", ControllerError)
+    refuse_loops(robot, "a regulator of standing", ControllerError, loops=False)
     if not robot.nu:
         raise ControllerError(f"robot {robot.name!r} has no motors to stand by")
-    q, rest = np.asarray(posture, dtype=np.float64), np.zeros(robot.nv)
-    if not np.all(np.isfinite(q)):
-        raise ControllerError(f"a posture is of finite numbers, got {q.tolist()}")
+    q, rest = numbers_of("posture", posture), np.zeros(robot.nv)
+    if q.shape != (robot.nq,) or not np.all(np.isfinite(q)):
+        raise ControllerError(f"a posture is of {robot.nq} finite numbers, got {q.tolist()}")
+    _refuse_what_is_open(robot, q)
     kinematics = contact_kinematics(robot, q, rest)
     touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < TOUCHING))
     if not touching and robot.floating:
@@ -127,7 +130,8 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
     held = contact_inverse_dynamics(robot, q, rest, rest, contacts=touching)
     _refuse_what_falls(robot, held)
     jacobian = kinematics.jacobian[list(touching)].reshape(-1, robot.nv)
-    basis = null_space(jacobian, rcond=HELD) if touching else np.eye(robot.nv)
+    jacobian = np.concatenate([jacobian, loop_jacobian(robot, q)])
+    basis = null_space(jacobian, rcond=HELD) if len(jacobian) else np.eye(robot.nv)
     if not basis.shape[1]:
         raise ControllerError(f"the ground holds all of robot {robot.name!r}: nothing can move")
     linear = linearize(robot, q, rest, held.torque, contacts=touching)
@@ -136,6 +140,15 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
     return LinearStanding(
         basis, both.T @ linear.A @ both, both.T @ linear.B[: 2 * n], held.torque, touching
     )
+
+
+def _refuse_what_is_open(robot: Robot, q: Floats) -> None:
+    open_by = float(np.abs(loop_displacement(robot, q)).max(initial=0.0))
+    if open_by > TOUCHING:
+        raise ControllerError(
+            f"in this posture a loop or coupling of robot {robot.name!r} is open by {open_by:.3g}: "
+            "take robot.closed(state).q"
+        )
 
 
 def _refuse_what_floats(robot: Robot, gap: Floats) -> None:
@@ -218,7 +231,10 @@ class StandingLQR(Law):
         torque_weight: ArrayLike = 1.0,
         period: float | None = 1e-3,
     ) -> None:
-        q = robot.reference_state().q if posture is None else np.asarray(posture, np.float64)
+        must_be(Robot, "robot", robot)
+        if period is not None:
+            positive("period", period)
+        q = robot.reference_state().q if posture is None else numbers_of("posture", posture)
         linear = linear_standing(robot, q)
         by_position = weights_of("position_weight", position_weight, robot.nv)
         by_velocity = weights_of("velocity_weight", velocity_weight, robot.nv)
@@ -249,8 +265,6 @@ def _regulator(
 ) -> tuple[Floats, NDArray[np.complex128]]:
     """Gains of the regulator and poles of the closed loop."""
     A, B = linear.A, linear.B
-    if period is not None and not 0.0 < period < np.inf:
-        raise ControllerError(f"the period of a controller must be positive, got {period}")
     try:
         if period is None:
             value = solve_continuous_are(A, B, cost, effort)

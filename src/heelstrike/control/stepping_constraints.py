@@ -23,9 +23,10 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
+from heelstrike.control.arguments import gains_of, must_be, number_of
 from heelstrike.control.bearable import GROUND_ROWS, JOINT_ROWS, Bearable, Bounds, bear
 from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
-from heelstrike.control.virtual_constraints import gains_of, series
+from heelstrike.control.virtual_constraints import series
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.family import StepFamily
 from heelstrike.robot.model import Floats
@@ -398,8 +399,11 @@ class SteppingConstraints(Law):
         trust: float = 0.5,
         friction: float = 0.6,
     ) -> None:
+        must_be(StepFamily, "family", family)
         gait = family.gait
         robot = gait.robot
+        for name, value in (("response", response), ("trust", trust), ("friction", friction)):
+            number_of(name, value)
         if not (0.0 <= response < np.inf and 0.0 <= trust <= 1.0):
             raise ControllerError(
                 "response must not be negative and trust lies from 0 to 1; got "

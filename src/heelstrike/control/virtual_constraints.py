@@ -17,6 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
+from heelstrike.control.arguments import (
+    gains_of,
+    must_be,
+    number_of,
+    numbers_of,
+    positive,
+)
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.places import point_columns
 from heelstrike.dynamics.spatial import Spatial, cross
@@ -25,7 +32,7 @@ from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.interface import Contacts
-from heelstrike.sim.controller.law import Law, controller, per_actuator
+from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 from heelstrike.sim.controller.stance import complete, force_wanted, joint_torques
 
@@ -280,7 +287,11 @@ class VirtualConstraints(Law):
         exponent: float = 0.9,
         outputs: ArrayLike | None = None,
     ) -> None:
+        must_be(PhasedGait, "gait", gait)
         robot = gait.robot
+        if finite_time is not None:
+            positive("finite_time", finite_time)
+        number_of("exponent", exponent)
         if finite_time is not None and not 0.0 < finite_time < np.inf:
             raise ControllerError(f"finite_time must be a positive time in s, got {finite_time!r}")
         if not 0.0 < exponent < 1.0:
@@ -310,16 +321,8 @@ class VirtualConstraints(Law):
         self.gait = gait
 
 
-def gains_of(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    """Return gains of each actuator, (nu,), that are not negative."""
-    gains = per_actuator(name, value, robot)
-    if np.any(gains < 0.0):
-        raise ControllerError(f"{name} must not be negative, got {value!r}")
-    return gains
-
-
 def _outputs(robot: Robot, outputs: ArrayLike | None) -> NDArray[np.float64]:
-    matrix = np.eye(robot.nu) if outputs is None else np.asarray(outputs, dtype=np.float64)
+    matrix = np.eye(robot.nu) if outputs is None else numbers_of("outputs", outputs)
     if matrix.shape != (robot.nu, robot.nu) or not np.all(np.isfinite(matrix)):
         raise ControllerError(
             f"outputs must be a matrix of finite numbers of shape ({robot.nu}, {robot.nu}), a row "

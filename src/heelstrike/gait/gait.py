@@ -465,7 +465,7 @@ YOUNGER = frozenset(
         "stall_torque", "no_load_speed", "winding_resistance",
         "loop_link", "loop_position", "coupling_joint", "coupling_polynomial",
         "latch_joint", "latch_side", "latch_release", "friction_scale", "restitution_scale",
-        "brake_joint",
+        "brake_joint", "brake_limit",
     }
 )  # fmt: skip
 """Numbers of a robot that are younger than the first gaits in files."""

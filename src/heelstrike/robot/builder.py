@@ -73,7 +73,7 @@ class RobotBuilder:
         self._loops: list[tuple[tuple[int, int], tuple[Pair, Pair]]] = []
         self._couplings: list[tuple[tuple[int, int], tuple[float, ...]]] = []
         self._latches: list[tuple[int, int, int]] = []
-        self._brakes: list[int] = []
+        self._brakes: dict[int, float] = {}
 
     def floating_base(
         self, link: str, at: Pair = (0.0, 0.0), **properties: Unpack[JointProperties]
@@ -359,26 +359,31 @@ class RobotBuilder:
         by = -1 if release is None else self._index(release, f"the latch of {joint!r} lets go by")
         self._latches.append((place, 1 if end == "upper" else -1, by))
 
-    def brake(self, joint: str) -> None:
+    def brake(self, joint: str, *, limit: float = math.inf) -> None:
         """Give a joint a brake, which holds it wherever it is while it is on.
 
-        It is off until :attr:`Simulation.braked` says otherwise. What it takes to hold the joint is
-        recorded as ``Run.brake_torque``; it does not slip.
+        It is off until :attr:`Simulation.braked` says otherwise. What it does to the joint is
+        recorded as ``Run.brake_torque``.
 
         Parameters
         ----------
         joint : str
             The joint.
+        limit : float
+            The most that it holds (N m, N): beyond that it slips, and a joint that moves is slowed
+            down by as much. By default it holds whatever comes, and stops the joint at once.
 
         Raises
         ------
         RobotError
-            If there is no such joint, or it has a brake already.
+            If there is no such joint, it has a brake already, or the limit is not positive.
         """
         place = self._joint(joint, "brake")
         if place in self._brakes:
             raise self._error(f"joint {joint!r} has a brake already.")
-        self._brakes.append(place)
+        if not limit > 0.0:
+            raise self._error(f"the brake of joint {joint!r} must hold something, got {limit!r}.")
+        self._brakes[place] = float(limit)
 
     def build(self) -> Robot:
         """Return the robot. The builder may go on and build others.
@@ -414,7 +419,8 @@ class RobotBuilder:
             latch_joint=[joint for joint, _, _ in self._latches],
             latch_side=[side for _, side, _ in self._latches],
             latch_release=[link for _, _, link in self._latches],
-            brake_joint=self._brakes,
+            brake_joint=list(self._brakes),
+            brake_limit=list(self._brakes.values()),
             pivot=next((i for i, link in enumerate(links) if link.numbers["axis"][0]), 0),
         )
         return assembled(

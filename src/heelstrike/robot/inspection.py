@@ -297,10 +297,20 @@ def _description(robot: Robot) -> str:
     lines += [f"closed loop: {name}" for name in robot.loop_names]
     lines += [f"coupled: {coupling_words(robot, k)}" for k in range(robot.model.couplings)]
     lines += [f"latch: {latch_words(robot, k)}" for k in range(robot.model.latches)]
-    lines += [f"brake: {name}" for name in robot.brake_names]
+    lines += [f"brake: {words}" for words in _brake_words(robot)]
     if robot.locked:
         lines += ["", "locked joints of the file", *_of_locked(robot)]
     return "\n".join(lines)
+
+
+def _brake_words(robot: Robot) -> Iterator[str]:
+    """The joints with a brake, and beyond what it slips."""
+    model = robot.model
+    for name, joint, limit in zip(
+        robot.brake_names, model.brake_joint, model.brake_limit, strict=True
+    ):
+        unit = "N m" if model.axis[joint, 0] else "N"
+        yield name + (f", slips beyond {limit:g} {unit}" if math.isfinite(limit) else "")
 
 
 def _scale_words(robot: Robot, contact: int) -> str:
@@ -459,5 +469,6 @@ def facts(inspection: Inspection) -> dict[str, Any]:
         "couplings": [coupling_words(robot, k) for k in range(robot.model.couplings)],
         "latches": [latch_words(robot, k) for k in range(robot.model.latches)],
         "brakes": list(robot.brake_names),
+        "brake_limits": [x if math.isfinite(x) else None for x in model.brake_limit.tolist()],
         **of_joints,
     }

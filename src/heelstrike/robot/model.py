@@ -169,6 +169,9 @@ class Model(Bundle):
         Link whose touchdown makes it let go; -1 if none does.
     brake_joint : (brakes,) int
         Joint that each brake holds wherever it is, while it is on.
+    brake_limit : (brakes,) float
+        Torque (N m) or force (N) beyond which it slips, and goes on rubbing with; infinite for one
+        that does not slip.
     pivot : int
         Link whose origin serves as the reference point of spatial vectors, so that a robot far
         from the world origin loses no digits.
@@ -227,6 +230,7 @@ class Model(Bundle):
     latch_side: Integers = of("latches", kind=int, least=-1, **_LATER)
     latch_release: Integers = of("latches", kind=int, points="nl", least=-1, **_LATER)
     brake_joint: Integers = of("brakes", kind=int, points="nv", least=0, **_LATER)
+    brake_limit: Floats = of("brakes", unit="N m, N", least=0.0, later=True, **_LIMIT | _UNKNOWN)
     pivot: int = of(kind=int, points="nl", least=0)
 
     @classmethod

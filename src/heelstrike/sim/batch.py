@@ -6,7 +6,7 @@ import os
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from copy import deepcopy
@@ -19,12 +19,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.errors import ControllerError, RobotError, SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.contacts.latches import several
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.frame import compiled_loop
@@ -40,9 +41,12 @@ from heelstrike.sim.simulation import (
     checked_method,
     simulation_to_the_end,
 )
+from heelstrike.sim.snapshot import Snapshot
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+
+Joints = str | int | Iterable[str | int]
 
 NO_ROWS = 2**62
 """Steps between two rows of runs that are not recorded: more than any run has."""
@@ -162,6 +166,8 @@ def simulate_batch(
     control_period: float | None = None,
     record_every: int | None = None,
     stop_when_fallen: bool | None = None,
+    latched: Joints | Sequence[Joints | None] | None = None,
+    braked: Joints | Sequence[Joints] = (),
     threads: int | None = None,
     progress: Callable[[int, int], None] | bool | None = None,
 ) -> Batch:
@@ -200,6 +206,12 @@ def simulate_batch(
         same `record_every`, or a huge one: writing an event-driven row may change a last digit.
     stop_when_fallen : bool, optional
         See :func:`~heelstrike.simulate`.
+    latched : joints, or sequence of n of them or None, optional
+        Joints that their latches hold as a run begins: a name or index, or several. Those of a
+        plain sequence are held in every run. By default they follow from the state of each run; see
+        :class:`~heelstrike.Simulation`.
+    braked : joints, or sequence of n of them
+        Joints that their brakes hold as a run begins, where they are; likewise.
     threads : int, optional
         Threads to work with; by default one a processor.
     progress : callable or bool, optional
@@ -241,6 +253,8 @@ def simulate_batch(
         parameters=_parameters(parameters),
         pushes=_pushes(pushes),
         ground=_listed(ground),
+        latched=[None] if latched is None else _joints("latched", latched),
+        braked=_joints("braked", braked),
     )
     _check_robots([each["robot"] for each in asked])
     method = checked_method(method)
@@ -320,6 +334,11 @@ def _listed(value: Any) -> Sequence[Any]:
 
 
 def _states(state: State | Sequence[State]) -> Sequence[State]:
+    if any(isinstance(each, Snapshot) for each in _listed(state)):
+        raise SimulationError(
+            "a batch begins anew, from states: simulate(state=snapshot) goes on where a snapshot "
+            "was taken"
+        )
     if isinstance(state, Sequence):
         return state
     if not isinstance(state, State):
@@ -386,9 +405,23 @@ def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
     )
 
 
+def _joints(name: str, joints: Any) -> Sequence[Any]:
+    """Joints run by run: those of a plain sequence are for all."""
+    listed = list(several(name, joints))
+    single = [hasattr(each, "__index__") or isinstance(each, str) for each in listed]
+    if all(single):
+        return [tuple(listed)]
+    if any(single):
+        raise SimulationError(
+            f"{name} are either joints for all runs, or several such lists, one a run; this mixes "
+            "the two. The list of a run with one joint has one entry, that of a run without is []"
+        )
+    return [each if each is None else tuple(several(name, each)) for each in listed]
+
+
 _ALIKE = {
     "nv": "coordinates", "nu": "actuators", "nc": "contact points", "loops": "closed loops",
-    "couplings": "coupled joints", "brakes": "brakes",
+    "couplings": "coupled joints", "latches": "latches", "brakes": "brakes",
 }  # fmt: skip
 
 
@@ -422,10 +455,10 @@ def _naming(index: int, count: int) -> Iterator[None]:
     """Tell which of several runs an error is about."""
     try:
         yield
-    except SimulationError as error:
+    except (RobotError, SimulationError) as error:
         if count == 1:
             raise
-        raise SimulationError(f"run {index}: {error}") from error
+        raise type(error)(f"run {index}: {error}") from error
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactW
 from heelstrike.dynamics.articulated import ArticulatedBodies
 from heelstrike.dynamics.loops import LoopRows, most_rows
 from heelstrike.dynamics.workspace import Workspace
+from heelstrike.robot.model import Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.straight_line import straight_line_programs, usual_points
 from heelstrike.sim.controller.guard import guarded
@@ -206,6 +207,9 @@ class Loops(Bundle):
     loop_force : (loops, axes) float
     coupling_force : (couplings,) float
         Forces of the last solve.
+    lean : (loops, axes) float
+        What a row of each loop is of the other, where both say the same; see
+        :func:`heelstrike.sim.contacts.loops.leave_one`.
     held : (latches,) int
         Whether each latch is engaged.
     latch_stop : (latches,) int
@@ -225,6 +229,7 @@ class Loops(Bundle):
     order: Integers = array("loop_rows", of=int)
     loop_force: Floats = array("loops", "axes")
     coupling_force: Floats = array("couplings")
+    lean: Floats = array("loops", "axes")
     held: Integers = array("latches", of=int)
     latch_stop: Integers = array("latches", of=int)
     braked: Integers = array("brakes", of=int)
@@ -270,7 +275,9 @@ class Memory(Bundle):
         Gains of joint springs, dampers and controller that an implicit scheme takes at the end of
         the step (N m, N m s).
     dry_joint : (nd,) int
-        Joints with dry friction.
+        Joints that may have dry friction, of their own or of a brake that slips.
+    breakaway : (nv,) float
+        The most that it is of each joint now (N m, N).
     equations : Equations
         Equations of motion of the state now.
     contacts : Contacts
@@ -301,6 +308,7 @@ class Memory(Bundle):
     stiffness: Floats = array("nv")
     damping: Floats = array("nv")
     dry_joint: Integers = array("nd", of=int)
+    breakaway: Floats = array("nv")
     equations: Equations = part(Equations, flat=True)
     contacts: Contacts = part(Contacts)
     surface: Surface = part(Surface, flat=True)
@@ -316,7 +324,7 @@ class Memory(Bundle):
 def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     """Allocate the memory of a simulation of `robot`."""
     nc, model = robot.nc, robot.model
-    dry = np.flatnonzero(model.dry_friction > 0.0)
+    dry = dry_joints(model)
     capacity = contact_capacity(robot)
     points = usual_points(robot)
     place = np.full(nc, -1)
@@ -338,7 +346,8 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
     return Memory.allocate(
         extents,
         command=guarded(np.zeros(robot.nu)),
-        dry_joint=dry.astype(np.int64),
+        dry_joint=dry,
+        breakaway=model.dry_friction.copy(),
         equations=Equations.allocate(extents, programs=programs),
         surface=Surface.allocate(
             extents, friction=np.repeat([0.0, 1.0, 0.0], [capacity - len(dry), len(dry), nc])
@@ -365,7 +374,13 @@ def allocate_memory(robot: Robot, pushes: Sequence[Push] = ()) -> Memory:
 
 
 def contact_capacity(robot: Robot) -> int:
-    """Return how many contacts there may be: points, joint stops and joints with dry friction."""
+    """Return how many contacts there may be: points, joint stops and joints that may be dry."""
     model = robot.model
     stops = np.isfinite(model.lower).sum() + np.isfinite(model.upper).sum()
-    return robot.nc + int(stops) + int((model.dry_friction > 0.0).sum())
+    return robot.nc + int(stops) + len(dry_joints(model))
+
+
+def dry_joints(model: Model) -> Integers:
+    """Return the joints that may have dry friction, of their own or of a brake that slips."""
+    slipping = model.brake_joint[np.isfinite(model.brake_limit)]
+    return np.union1d(np.flatnonzero(model.dry_friction > 0.0), slipping).astype(np.int64)

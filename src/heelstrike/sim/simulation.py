@@ -21,8 +21,8 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
-from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, put_on
-from heelstrike.sim.contacts.latches import latches_at
+from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
+from heelstrike.sim.contacts.latches import latches_at, several
 from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
@@ -93,7 +93,8 @@ class Simulation:
         Joints that their latches hold as it begins. By default those at rest at their latched end,
         unless the link whose touchdown lets go stands on the ground.
     braked : iterable of str or int
-        Joints that their brakes hold as it begins, where they are.
+        Joints that their brakes hold as it begins, where they are. A controller in Python that has
+        an attribute `braked`, or `latched`, says so itself at every call.
     checked : bool
         Run a compiled controller in Python, some hundred times slower, and look at every index: one
         that reads or writes beyond its arrays, or writes where it may not, ends the run with a
@@ -201,7 +202,7 @@ class Simulation:
         self._memory.q[:] = setting.state.q
         self._memory.v[:] = setting.state.v
         self._memory.loops.held[:] = setting.held
-        put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory.loops)
+        put_on(self.robot, setting.braked, setting.state, HOLDS, self._memory)
         self._work = method.new_work(self.robot)
         rows, events = method.room(self.robot)
         self._clock = Clock(
@@ -292,7 +293,7 @@ class Simulation:
     @braked.setter
     def braked(self, joints: Iterable[str | int]) -> None:
         wanted = brakes_of(self.robot, joints)
-        put_on(self.robot, wanted, self.state, PUT_ON, self._memory.loops)
+        put_on(self.robot, wanted, self.state, PUT_ON, self._memory)
         self.method.reconsider(self._work)
 
     @property
@@ -503,10 +504,23 @@ class Simulation:
             )
         self._memory.command[:] = torque
         self._clock.answered = 1
+        self._obey()
         told = self._numbers.log if isinstance(self._python, AskedLaw) else self._python_log
         if told is not None:
             self._logs.log.become(told)
         return ""
+
+    def _obey(self) -> None:
+        """Let the brakes and latches hold that a controller in Python names, and no others."""
+        python = self._python.partner if isinstance(self._python, AskedLaw) else self._python
+        braked, latched = getattr(python, "braked", None), getattr(python, "latched", None)
+        if braked is not None and brakes_of(self.robot, braked) != brakes_on(self._memory.loops):
+            self.braked = braked
+        if latched is not None:
+            named = {self.robot.joint_index(joint) for joint in several("latched", latched)}
+            kept = [joint for joint in self.latched if self.robot.joint_index(joint) in named]
+            if len(kept) < len(self.latched):
+                self.latched = kept
 
     @property
     def _now(self) -> str:

@@ -21,7 +21,7 @@ from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
-_FORMAT = 2
+_FORMAT = 3
 # What reading an archive raises when its bytes are others.
 _DAMAGED = (ValueError, KeyError, AttributeError, TypeError, EOFError, RuntimeError, OverflowError)
 

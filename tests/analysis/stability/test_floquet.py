@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.analysis.stability.floquet import _with_consequence
+from heelstrike.analysis.stability.across import _with_consequence
 from heelstrike.experiments.passive import METHOD, passive_walk
 
 RAMP = hs.Ground(friction=3.0, slope=-0.05)
@@ -70,10 +70,29 @@ def test_the_same_law_called_every_millisecond() -> None:
         robot, zero.initial_state, law, method=hs.EventDriven(), control_period=1e-3, settling=4,
         returns=3,
     )  # fmt: skip
-    assert found.residual > 1e-4
+    assert found.repeats  # but for being late
     assert found.along == pytest.approx(1.0, abs=0.05)
     assert found.largest == pytest.approx(zero.contraction, abs=0.02)
     assert found.error < 0.02
+
+
+def test_a_walk_whose_returns_take_different_numbers_of_steps() -> None:
+    """Time stepping at 1 ms: 1160 to 1173 steps a return, and an uneven map.
+
+    The contraction is measured to a tenth or so, by disturbances of 0.01 and eight returns. Those
+    of 1e-5 find 5, of the unevenness and of being late.
+    """
+    robot, law, zero = rabbit()
+    found = hs.floquet_multipliers(
+        robot, zero.initial_state, law, method=hs.TimeStepping(step=1e-3), settling=6, returns=8
+    )
+    assert found.disturbance == pytest.approx(0.01)
+    assert found.repeats
+    assert found.along == pytest.approx(1.0, abs=0.3)
+    assert found.largest == pytest.approx(zero.contraction, abs=0.12)
+    assert 0.0 < found.error < 0.12
+    assert "stable" in repr(found)
+    assert len(found.multipliers) == len(found.coordinates) - 1
 
 
 class Filtered(hs.Bundle):

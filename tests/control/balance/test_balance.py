@@ -80,6 +80,18 @@ def test_a_small_push_is_answered_within_a_step_and_alarms_nobody(phase: float) 
     assert run.log["alarm"].values[run.time > 3.5 * step].max() == 0.0
 
 
+def test_small_errors_die_out_from_step_to_step() -> None:
+    """Those of the robot, of the slope that is believed and of the clock, by a fifth and less.
+
+    A slope that is estimated from a foot still in the air confirms itself: 0.5 a step.
+    """
+    found = hs.floquet_multipliers(
+        walking.bravo7(), walking.gait().initial_state, law(), settling=10, returns=1,
+        memory=["slope", "phase", "start"],
+    )  # fmt: skip
+    assert found.largest < 0.2
+
+
 def test_an_alarm_ends() -> None:
     """Also that of a large push, after which the gait itself goes on."""
     step = walking.gait().step_duration

@@ -202,7 +202,7 @@ def test_snapshots_take_the_clock_along() -> None:
         ({"bandwidth": 0.0}, "a positive frequency"),
         ({"kp": -1.0}, "kp must not be negative"),
         ({"kd": [1.0, 2.0]}, "one finite number or 6"),
-        ({"period": 0.0}, "period of a controller must be positive"),
+        ({"period": 0.0}, "period of a controller must be a positive number"),
     ],
 )
 def test_wrong_numbers_are_named(options: dict[str, Any], said: str) -> None:

@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 
 import heelstrike as hs
 from heelstrike.sim import EventKind
+from heelstrike.sim.event_driven.location import NO_EVENT, lowest_place
 
 GRAVITY, STIFFNESS = 9.81, 1e4
 
@@ -42,3 +43,50 @@ def test_a_foot_that_leaves_comes_back_and_leaves_within_a_quarter_of_a_step_is_
     assert [event.kind for event in run.events][-1] is EventKind.LIFTOFF
     # The spring lengthened by 2e-6 m/s for 8 µs less, which is 2e-10 s of its way.
     assert run.events[-1].time == pytest.approx(lifts, abs=1e-9)
+
+
+def test_the_lowest_place_of_a_cubic_is_found_where_it_is_below_zero() -> None:
+    """Of cubics through random ends with random rates, against their values on a fine grid."""
+    draw = np.random.default_rng(3)
+    part = np.linspace(0.0, 1.0, 20001)
+    below = 0
+    for _ in range(300):
+        before, value = draw.uniform(0.0, 0.3, size=2) * draw.integers(0, 2, size=2)
+        rate, later = draw.normal(size=2)
+        rise = value - before
+        cubic = before + part * (rate + part * (3.0 * rise - 2.0 * rate - later))
+        cubic += part**3 * (rate + later - 2.0 * rise)
+        place = int(np.argmin(cubic))
+        found = lowest_place(before, rate, value, later)
+        if cubic[place] < -1e-6:
+            below += 1
+            assert found == pytest.approx(part[place], abs=1e-4)
+        elif cubic[place] > 0.0:
+            assert found == NO_EVENT
+    assert below > 50
+
+
+def test_a_stop_touched_and_left_between_two_samples_is_seen() -> None:
+    """An arm rises from its stop, falls back on it and is pulled away again, all within a step.
+
+    Its torque is that of the motion c t (t - 2.9 ms) (t - 3.4 ms), which is 1e-6 rad beyond the
+    stop in between. The second step is of 10 ms and begins at 1 ms, when the arm still rises; the
+    first sample in it is at 3.5 ms, when it does again.
+    """
+    builder = hs.RobotBuilder("arm", gravity=0.0)
+    builder.hinge(
+        "arm", None, mass=1.0, inertia=1.0, center_of_mass=(0.0, 0.0), torque=1e4,
+        limits=(0.0, np.inf),
+    )  # fmt: skip
+
+    @hs.controller
+    def pull(t, state, contacts, robot, torque):  # type: ignore[no-untyped-def]
+        torque[0] = 5e3 * (6.0 * t - 2.0 * 6.3e-3)
+
+    run = hs.simulate(
+        builder.build(), pull(), state=hs.State([0.0], [5e3 * 2.9e-3 * 3.4e-3]), duration=0.05,
+        method=hs.EventDriven(), stop_when_fallen=False,
+    )  # fmt: skip
+    touches = [event.time for event in run.events if event.kind is EventKind.JOINT_STOP]
+    assert touches == pytest.approx([2.9e-3], abs=1e-9)
+    assert run.position[:, 0].min() >= -1e-10

@@ -217,6 +217,19 @@ def test_a_bone_between_links_knows_both() -> None:
     assert all(len(shape["corners"]) == 4 for shape in found["shapes"])
 
 
+def test_brakes_are_shown_with_what_they_hold_at_most(tmp_path: Path) -> None:
+    build = hs.RobotBuilder("crane")
+    build.hinge("boom", None, mass=2.0, inertia=0.05, center_of_mass=(0, -0.8))
+    build.brake("boom", limit=20.0)
+    crane = build.build()
+    start = crane.state({"boom": 0.5}, {"boom": 1.0})
+    run = hs.simulate(crane, state=start, duration=0.01, braked="boom")
+    _, data = read(save_html(run, tmp_path / "crane.html"))
+    (panel,) = (each for each in data["plots"] if each["title"] == "boom brake")
+    assert panel["unit"] == "N m"
+    assert [limit["level"] for limit in panel["limits"]] == [-20.0, 20.0]
+
+
 def test_bad_requests(tmp_path: Path) -> None:
     run = make_run(box(), [0.0, 0.1])
     with pytest.raises(ViewError, match=r"ends in \.html"):

@@ -10,17 +10,18 @@ so that a period that is no whole number of samples does no harm, and no leg has
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.analysis.stability.loop import ClosedLoop, Walk
-from heelstrike.analysis.stability.returns import Disturbed, returned
+from heelstrike.analysis.stability.across import Across
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
+from heelstrike.analysis.stability.returns import Disturbed, returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import SimulationError
+from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -29,14 +30,11 @@ from heelstrike.sim.snapshot import Snapshot
 
 Floats = NDArray[np.float64]
 
-ALIGNED = 0.9
-"""Cosine beyond which an error is one along the walk."""
+LESS = 0.25
+"""Part of a disturbance that is tried where a walk that nobody chose it for falls."""
 
-ALONG = 0.3
-"""A multiplier farther from one than this is not that of the walk itself."""
-
-NEUTRAL = 1e-6
-"""What of an error that is still there, and of its effects on others, is nothing."""
+SURE = 2.0
+"""A factor is told from one by so many standard errors."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -59,14 +57,15 @@ class Floquet:
         Steps of a return: two, of a robot with two legs.
     period, step_length : float
         Mean duration and length of a step in s and m.
-    along : complex or None
-        The multiplier of a return that is the walk's own: being early or late stays as it is, and
-        this is one but for the error of the differences. None of a walk that a clock drives.
+    along : float or None
+        What the returns leave of being early by a 250th of one: all, but for errors of samples and
+        of integration, of a walk that no clock drives. None of one that a clock drives.
     multipliers : (n,) complex
-        The others, of a return, largest first.
+        Those of a return, largest first, without the one that is one.
     disturbance, residual : float
-        Size of the disturbances, and the largest difference of position and velocity between two
-        returns of the walk itself (m, rad, m/s, rad/s).
+        Size of the disturbances, and the largest difference between two returns of the walk itself,
+        but for being early or late if no clock drives it (m, rad, velocities by the length they
+        make in half a step).
     neutral, one_sided, switched : tuple of str
         Numbers of the memory whose errors do nothing, which are left out; coordinates whose errors
         of either sign do different things, of which the mean counts: there the loop has a kink, and
@@ -81,7 +80,7 @@ class Floquet:
     steps: int
     period: float
     step_length: float
-    along: complex | None
+    along: float | None
     multipliers: NDArray[np.complex128]
     disturbance: float
     residual: float
@@ -100,11 +99,7 @@ class Floquet:
         count = len(self.each)
         if count < 2:
             return float("nan")
-        left_out = [
-            _largest(np.mean([*self.each[:k], *self.each[k + 1 :]], axis=0), self._flow)
-            ** (1.0 / self.steps)
-            for k in range(count)
-        ]
+        left_out = [self._errors.largest(k) ** (1.0 / self.steps) for k in range(count)]
         return float(np.sqrt((count - 1) * np.var(left_out)))
 
     @property
@@ -123,18 +118,18 @@ class Floquet:
     @property
     def slowest(self) -> dict[str, float]:
         """What the slowest error is made of: shares of the coordinates, largest first."""
-        values, vectors = np.linalg.eig(self.matrix)
-        wanted = self.multipliers[0] if len(self.multipliers) else 0.0
-        vector = np.abs(vectors[:, int(np.argmin(np.abs(values - wanted)))])
+        vector = self._errors.slowest
         order = np.argsort(-vector)
         return {self.coordinates[i]: float(vector[i] / vector.max()) for i in order}
 
-    _flow: Floats | None = None
+    _errors: Across
 
     def __repr__(self) -> str:
         verdict = "stable" if self.stable else "unstable"
         if not self.repeats:
             verdict = f"undecided, returns differ by {self.residual:.2g}"
+        elif abs(self.largest - 1.0) <= SURE * self.error:
+            verdict = "undecided, it may be one"
         return (
             f"Floquet(largest factor {self.largest:.4g} ± {self.error:.1g} a step of "
             f"{self.period:.6g} s, {len(self.coordinates)} coordinates: "
@@ -185,7 +180,8 @@ def floquet_multipliers(
         Size of the disturbances (m, rad, and times 1/s those of velocities; of what is remembered,
         a part of how much it varies). By default 1e-5; twice the seconds between two samples if
         an event-driven simulation calls the controller only then, as touchdowns are felt up to a
-        sample late, and the map is uneven at the scale of what moves meanwhile.
+        sample late, and the map is uneven at the scale of what moves meanwhile; ten times the
+        time step if steps of the integration fall otherwise in every return.
     memory : sequence of str, optional
         Numbers of the controller's memory that are disturbed; by default all that matter.
     longest_step : float
@@ -204,9 +200,10 @@ def floquet_multipliers(
 
     Notes
     -----
-    Time stepping moves impacts to its steps: small errors are then those of the stepped map, whose
-    multipliers are sharp if every return takes the same number of steps, and mean little if not, as
-    `error` tells. ``EventDriven`` with a `control_period` is the better instrument.
+    Time stepping moves impacts to its steps. If every return takes the same steps, small errors are
+    those of the stepped map, whose multipliers are sharp. If not, that map is uneven at the scale
+    of what moves in a step; larger disturbances and the mean over returns tell multipliers to a few
+    hundredths then, as `error` says: more returns and shorter steps make it less.
 
     Two things are known beforehand and left out: where along the ground the robot is, which is
     nobody's affair, and being early or late (`along`). A controller that acts on where in the world
@@ -231,89 +228,47 @@ def floquet_multipliers(
     loop = ClosedLoop(
         robot, controller, state, method=method, ground=ground, control_period=control_period
     )
-    size = loop.usual_disturbance if disturbance is None else float(disturbance)
-    if not 0.0 < size < 1.0:
+    if disturbance is not None and not 0.0 < disturbance < 1.0:
         raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)
-    section = Section(loop, walk.begins[0], walk.duration, memory)
-    found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    return _combined(walk, section, size, found)
+    size = loop.usual_disturbance(walk) if disturbance is None else float(disturbance)
+    section = Section(loop, walk, size, memory)
+    try:
+        found = [returned(loop, section, walk, k, size) for k in range(returns)]
+    except LimitCycleError:
+        if disturbance is not None or loop.even(walk):
+            raise
+        size *= LESS  # what steps make uneven is large for it, and it falls
+        found = [returned(loop, section, walk, k, size) for k in range(returns)]
+    errors = Across.of(
+        found, stays_early(loop, section, walk), section.of_robot, smooth=size <= SMOOTH
+    )
+    return _combined(walk, section, size, found, errors)
 
 
-def _combined(walk: Walk, section: Section, size: float, found: list[Disturbed]) -> Floquet:
-    """Put returns together; leave out what stays without doing anything."""
-    matrices = [each.matrix for each in found]
-    mean = np.mean(matrices, axis=0)
-    kept, inert = _with_consequence(matrices, section.of_robot)
-    square = np.ix_(kept, kept)
-    matrices = [matrix[square] for matrix in matrices]
-    flow = section.flow[kept] if section.flow is not None else None
-    mean = np.mean(matrices, axis=0)
-    along, others = _without(mean, flow)
+def _combined(
+    walk: Walk, section: Section, size: float, found: list[Disturbed], errors: Across
+) -> Floquet:
+    """Put returns together."""
+    driven = errors.along is None
     names = section.names
     one_sided = {name for each in found for name in each.one_sided}
     switched = {name for each in found for name in each.switched}
-    made = Floquet(
-        matrix=mean,
-        each=tuple(matrices),
-        coordinates=tuple(names[i] for i in kept),
+    missed = [each.residual if driven else each.residual_but_late for each in found]
+    return Floquet(
+        matrix=np.mean(errors.matrices, axis=0),
+        each=errors.matrices,
+        coordinates=tuple(names[i] for i in errors.kept),
         directions=section.directions,
         steps=walk.steps,
         period=walk.duration / walk.steps,
         step_length=walk.length / walk.steps,
-        along=along,
-        multipliers=others,
+        along=errors.along,
+        multipliers=errors.multipliers,
         disturbance=size,
-        residual=max(each.residual for each in found),
-        neutral=tuple(names[i] for i in inert),
-        one_sided=tuple(names[i] for i in kept if names[i] in one_sided),
+        residual=max(missed),
+        neutral=tuple(names[i] for i in errors.inert),
+        one_sided=tuple(names[i] for i in errors.kept if names[i] in one_sided),
         switched=tuple(sorted(switched)),
+        _errors=errors,
     )
-    return replace(made, _flow=flow)
-
-
-def _with_consequence(matrices: list[Floats], of_robot: int) -> tuple[list[int], list[int]]:
-    """Tell coordinates on which something hangs from those that nothing but they themselves feel.
-
-    The latter's own multipliers are one, of what stays as it is, and zero, of what is written anew.
-    """
-    kept = list(range(len(matrices[0])))
-    while True:
-        alone = [
-            i
-            for i in kept
-            if i >= of_robot
-            and all(_is_alone(matrix[kept, i], kept.index(i)) for matrix in matrices)
-        ]
-        if not alone:
-            return kept, sorted(set(range(len(matrices[0]))) - set(kept))
-        kept = [i for i in kept if i not in alone]
-
-
-def _is_alone(column: Floats, place: int) -> bool:
-    own, others = column[place], np.delete(column, place)
-    stays = min(abs(own), abs(own - 1.0)) <= NEUTRAL
-    return bool(stays and np.abs(others).max(initial=0.0) <= NEUTRAL)
-
-
-def _without(matrix: Floats, flow: Floats | None) -> tuple[complex | None, NDArray[np.complex128]]:
-    """Return the multiplier along the walk, if there is one, and the others, largest first."""
-    values, vectors = np.linalg.eig(matrix)
-    along = None
-    others = values.astype(np.complex128)
-    if flow is not None and len(values):
-        there = np.flatnonzero(flow)
-        parts, way = vectors[there], flow[there]
-        cosine = np.abs(way @ parts) / (
-            np.linalg.norm(way) * np.maximum(np.linalg.norm(parts, axis=0), 1e-300)
-        )
-        cosine = np.where(np.abs(values - 1.0) < ALONG, cosine, 0.0)
-        if cosine.max() > ALIGNED:
-            place = int(np.argmax(cosine))
-            along = complex(values[place])
-            others = np.delete(others, place)
-    return along, others[np.argsort(-np.abs(others), kind="stable")]
-
-
-def _largest(matrix: Floats, flow: Floats | None) -> float:
-    return float(np.abs(_without(matrix, flow)[1]).max(initial=0.0))

@@ -28,6 +28,9 @@ LATE = 2.0
 """Disturbances (m, rad) are this many times the seconds between two calls, as a touchdown falls
 somewhere between them and is felt at the end."""
 
+UNEVEN = 10.0
+"""The same, of a fixed step, where steps fall otherwise in every return."""
+
 SMOOTH, ROUGH = 1e-5, 0.05
 """Least and largest disturbance that is chosen so."""
 
@@ -65,7 +68,7 @@ class ClosedLoop:
     robot : Robot
     controller : object with ``torque(t, state, contacts)``, or None
     state : State or Snapshot
-    method, ground, control_period
+    method, ground, control_period, record_every
         As of :class:`~heelstrike.Simulation`.
 
     Raises
@@ -77,10 +80,12 @@ class ClosedLoop:
     def __init__(
         self, robot: Robot, controller: Controller | None, state: State | Snapshot, *,
         method: Method | None, ground: Ground | None, control_period: float | None,
+        record_every: int = FEW_ROWS,
     ) -> None:  # fmt: skip
         self.robot, self.controller, self.ground = robot, controller, ground or Ground()
         self._setup: dict[str, Any] = {
             "state": state, "method": method, "ground": ground, "control_period": control_period,
+            "record_every": record_every,
         }  # fmt: skip
         if len(self.ground.model().friction) > 1:
             raise SimulationError("steps repeat on level or sloping ground only")
@@ -94,13 +99,23 @@ class ClosedLoop:
 
     def fresh(self) -> Simulation:
         """Return a simulation at the beginning of the walk."""
-        return Simulation(self.robot, self.controller, record_every=FEW_ROWS, **self._setup)
+        return Simulation(self.robot, self.controller, **self._setup)
 
-    @property
-    def usual_disturbance(self) -> float:
+    def usual_disturbance(self, walk: Walk) -> float:
         """How large disturbances are if nobody says."""
+        step = self.simulation.method.step_length
+        if step is None:
+            return float(np.clip(LATE * self.grid, SMOOTH, ROUGH))
+        return SMOOTH if self.even(walk) else float(np.clip(UNEVEN * step, SMOOTH, ROUGH))
+
+    def even(self, walk: Walk) -> bool:
+        """Whether steps of the integration fall alike in every return."""
+        # On another one the walk is as far on as it moves in one, much more than this.
+        first = walk.begins[0].state.v
         fixed = self.simulation.method.step_length is not None
-        return SMOOTH if fixed else float(np.clip(LATE * self.grid, SMOOTH, ROUGH))
+        return not fixed or all(
+            np.abs(each.state.v - first).max() <= SMOOTH for each in walk.begins
+        )
 
     @property
     def along(self) -> Floats:

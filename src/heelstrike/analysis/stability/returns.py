@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.analysis.stability.loop import ClosedLoop, Walk
 from heelstrike.analysis.stability.section import Section
 from heelstrike.errors import LimitCycleError
+from heelstrike.sim.run import Run
 from heelstrike.sim.snapshot import Snapshot
+from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
 
@@ -27,29 +30,44 @@ class Disturbed:
     ----------
     matrix : (n, n) float
         Columns by coordinate disturbed.
-    residual : float
-        How far the undisturbed walk is from where it was one return before.
+    seen : (l, n) float
+        The same of indicators.
+    residual, residual_but_late : float
+        How far the undisturbed walk is from where it was one return before (m, rad, velocities by
+        the length they make in half a step), and apart from being early or late.
+    begins, ends : (n,) float
+        Rates of the walk at its beginning and end.
     one_sided, switched : frozenset of str
         Coordinates whose errors of either sign do different things; whole numbers of the memory
         that came out otherwise.
     """
 
     matrix: Floats
+    seen: Floats
     residual: float
+    residual_but_late: float
+    begins: Floats
+    ends: Floats
     one_sided: frozenset[str]
     switched: frozenset[str]
 
 
-def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: float) -> Disturbed:
-    """Disturb a walk in every coordinate, both ways, and see what is left one return later."""
+def returned(
+    loop: ClosedLoop, section: Section, walk: Walk, place: int, size: float,
+    indicator: Callable[[Run], ArrayLike] | None = None,
+) -> Disturbed:  # fmt: skip
+    """Disturb a walk in every coordinate, both ways, and see what is left one return later.
+
+    And what an indicator of the return makes of it.
+    """
     begin, end = walk.begins[place], walk.begins[place + 1]
     simulation = loop.simulation
     simulation.restore(end)
     state, words = section.read(simulation)
     counts = section.words.counts(simulation)
-    columns, one_sided, switched = [], set(), set()
+    columns, told, one_sided, switched = [], [], set(), set()
     for coordinate, name in enumerate(section.names):
-        sides = []
+        sides, seen = [], []
         for sign in (1.0, -1.0):
             section.disturb(simulation, begin, coordinate, sign * size)
             loop.advanced(simulation, end.time, f"a disturbance of {name} by {sign * size:.3g}")
@@ -57,6 +75,8 @@ def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: f
             there, numbers = section.read(simulation)
             error = np.concatenate((section.of(there - state), numbers - words))
             sides.append(error / (sign * size))
+            if indicator is not None:
+                seen.append(np.atleast_1d(np.asarray(indicator(whole(simulation.record)))))
             now = section.words.counts(simulation)
             switched |= {each for each in now if not np.array_equal(now[each], counts[each])}
         sizes = [float(np.linalg.norm(side)) for side in sides]
@@ -64,9 +84,39 @@ def returned(loop: ClosedLoop, section: Section, walk: Walk, place: int, size: f
         if apart > max(DIFFERENT * max(sizes), NOTICEABLE):
             one_sided.add(name)
         columns.append(0.5 * (sides[0] + sides[1]))
-    before = np.concatenate((begin.state.q, begin.state.v))
-    residual = float(np.abs(section.flat(state - before)).max())
-    return Disturbed(np.array(columns).T, residual, frozenset(one_sided), frozenset(switched))
+        told.append((seen[0] - seen[1]) / (2.0 * size) if seen else np.zeros(0))
+    missed = section.flat(state - np.concatenate((begin.state.q, begin.state.v)))
+    return Disturbed(
+        matrix=np.array(columns).T,
+        seen=np.array(told).T,
+        residual=section.size(missed),
+        residual_but_late=section.size(section.but_late(missed, section.rate(begin))),
+        begins=section.way(begin),
+        ends=section.way(end),
+        one_sided=frozenset(one_sided),
+        switched=frozenset(switched),
+    )
+
+
+def stays_early(loop: ClosedLoop, section: Section, walk: Walk) -> float:
+    """Begin as the walk is a little later; say how much of that is left in the end.
+
+    What this makes of a controller is not known to the last: a first return takes that away, if
+    there are more, and what stays is being early alone. Zero if it does not go on so.
+    """
+    simulation, seconds = loop.fresh(), section.early
+    section.put_early(simulation, walk.begins[0], seconds)
+    by = [1.0]
+    for end in walk.begins[1:]:
+        try:
+            loop.advanced(simulation, end.time, "a walk that is early")
+        except LimitCycleError:
+            return 0.0
+        here = np.concatenate((end.state.q, end.state.v))
+        way = section.of(section.later(end, seconds)[0] - here)
+        by.append(float(way @ section.of(section.read(simulation)[0] - here) / (way @ way)))
+    first = by[1] if len(by) > 2 else by[0]
+    return by[-1] / first if first != 0.0 else 0.0
 
 
 def _same_feet(

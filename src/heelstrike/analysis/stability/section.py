@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import RANK_TOLERANCE, derivative
-from heelstrike.analysis.stability.loop import ClosedLoop
+from heelstrike.analysis.stability.loop import ClosedLoop, Walk
+from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import loop_displacement, loop_jacobian
 from heelstrike.errors import LimitCycleError, SimulationError
@@ -37,6 +38,15 @@ CHANGE = 1e-5
 SHORT = 1e-3
 """Seconds after which a number of the memory shows whether it matters, without samples."""
 
+EARLY = 0.004
+"""A walk that is early by this part of a return stays so, or is driven by a clock."""
+
+INSTANT = 1e-5
+"""Seconds over which a rate is seen where no fixed step is the least."""
+
+INSTANTS = 0.1
+"""Numbers that grow by what a return lasts, to this part of it, are instants."""
+
 STEADY = 1e-3
 """A number that varies by less has one as its unit."""
 
@@ -50,10 +60,10 @@ class Section:
     Parameters
     ----------
     loop : ClosedLoop
-    begin : Snapshot
-        The first middle of a step.
-    duration : float
-        Of a return, in s.
+    walk : Walk
+        The walk, undisturbed.
+    size : float
+        Of the disturbances.
     memory : sequence of str, optional
         Numbers of the controller's memory; by default all that matter.
 
@@ -65,24 +75,26 @@ class Section:
         How many are the robot's.
     directions : (nq + nv, m) float
         These, m of them.
-    flow : (n,) float
-        The way of the walk itself, in the robot's coordinates.
     """
 
     def __init__(
-        self, loop: ClosedLoop, begin: Snapshot, duration: float, memory: Sequence[str] | None
+        self,
+        loop: ClosedLoop,
+        walk: Walk,
+        size: float,
+        memory: Sequence[str] | None,
     ) -> None:
+        begin, duration = walk.begins[0], walk.duration
         self._loop, self._begin, self._duration = loop, begin, duration
         self._nq = loop.robot.nq
         # Velocities count by the length they make in half a step or so.
         self._scale = np.concatenate((np.ones(self._nq), np.full(loop.robot.nv, 0.25 * duration)))
         self._standing = self.standing(begin)
         self._frame()
-        self.words = Words(loop, begin, duration, memory)
+        self.words = Words(loop, walk, size, memory)
         self.of_robot = self.directions.shape[1]
         robot = tuple(f"robot {i + 1}" for i in range(self.of_robot))
         self.names = robot + tuple(self.words.names)
-        self.flow = self._flow()
 
     def standing(self, at: Snapshot) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which points are on the ground, (nc,), and along which directions at rest, (nc, 2)."""
@@ -98,7 +110,11 @@ class Section:
 
     def feet(self, at: Snapshot) -> set[int]:
         """Which feet are on the ground, or next to it."""
-        seen = contact_kinematics(self._loop.robot, at.state.q, at.state.v, self._loop.ground)
+        return self.feet_of(at.state, self._loop.ground)
+
+    def feet_of(self, state: State, ground: Ground) -> set[int]:
+        """Which feet are on a ground, or next to it."""
+        seen = contact_kinematics(self._loop.robot, state.q, state.v, ground)
         lowest = float(seen.gap.min(initial=0.0))
         return {self._loop.foot(int(i)) for i in np.flatnonzero(seen.gap <= lowest + STANDS)}
 
@@ -165,26 +181,69 @@ class Section:
         state = simulation.state
         return np.concatenate((state.q, state.v)), self.words.read(simulation)
 
-    def _flow(self) -> Floats:
-        """Rate of the state, in coordinates."""
-        simulation, short = self._loop.simulation, self._loop.grid or SHORT
-        simulation.restore(self._begin)
-        self._loop.advanced(simulation, self._begin.time + short, "the walk does not go on")
-        rate = (self.read(simulation)[0] - _vector(self._begin)) / short
-        return np.concatenate((self.of(rate), np.zeros(len(self.words.names))))
+    def later(self, at: Snapshot, seconds: float) -> tuple[Floats, Floats]:
+        """State (q, v) of the walk so much later, and the numbers; instants are that much less."""
+        simulation = self._loop.simulation
+        simulation.restore(at)
+        self._loop.advanced(simulation, at.time + seconds, "the walk does not go on")
+        state, numbers = self.read(simulation)
+        return state, numbers - seconds * self.words.instants / self.words.unit
+
+    def rate(self, at: Snapshot) -> Floats:
+        """Rate of the state."""
+        short, here = self._loop.simulation.method.step_length or INSTANT, _vector(at)
+        one, two = (self.later(at, k * short)[0] - here for k in (1, 2))
+        return (2.0 * one - 0.5 * two) / short  # but for the square of `short`
+
+    def way(self, at: Snapshot) -> Floats:
+        """Rate of the walk, in coordinates: what being early by a second would be."""
+        short = self._loop.grid or INSTANT  # numbers change from sample to sample
+        numbers = [self.later(at, k * short)[1] for k in range(3)]
+        rate = (2.0 * (numbers[1] - numbers[0]) - 0.5 * (numbers[2] - numbers[0])) / short
+        return np.concatenate((self.of(self.rate(at)), rate))
+
+    def put_early(self, simulation: Simulation, begin: Snapshot, seconds: float) -> None:
+        """Take up a walk as it is a little later, but at its time."""
+        (moved, ahead), (_, numbers) = self.later(begin, seconds), self.later(begin, 0.0)
+        simulation.restore(begin.moved(State(moved[: self._nq], moved[self._nq :])))
+        for place, change in enumerate(ahead - numbers):
+            self.words.add(simulation, place, change)
+
+    @property
+    def early(self) -> float:
+        """Seconds, a whole number of samples, of which is seen whether they stay."""
+        wanted, grid = EARLY * self._duration, self._loop.grid
+        return max(round(wanted / grid), 1) * grid if grid > 0.0 else wanted
+
+    def size(self, difference: Floats) -> float:
+        """Largest of the entries, those of velocities by the length they make in half a step."""
+        return float(np.abs(self._scale * difference).max())
+
+    def but_late(self, difference: Floats, rate: Floats) -> Floats:
+        """The difference of two states without what comes of being early or late."""
+        weight = self._scale**2
+        way = self.flat(rate)
+        left: Floats = difference - way * ((weight * way) @ difference) / ((weight * way) @ way)
+        return left
 
 
 class Words:
     """Numbers that a controller remembers, of those on which it hangs how it goes on.
 
     A number that one call of the controller makes what it would have been anyway is scratch, and
-    none of them. Units are how much each varies in a return; of one that does not, one.
+    none of them. Units are how much each varies in a return; of one that does not, one. Those that
+    grow by what a return lasts are instants.
     """
 
     def __init__(
-        self, loop: ClosedLoop, begin: Snapshot, duration: float, wanted: Sequence[str] | None
+        self,
+        loop: ClosedLoop,
+        walk: Walk,
+        size: float,
+        wanted: Sequence[str] | None,
     ) -> None:
-        self._loop, self._begin = loop, begin
+        begin = walk.begins[0]
+        self._loop, self._begin, self._size = loop, begin, size
         self._opaque = law_of(loop.controller) is None
         simulation = loop.simulation
         simulation.restore(begin)
@@ -198,12 +257,13 @@ class Words:
                 )
             found = {k: v for k, v in found.items() if any(_is(k, name) for name in wanted)}
         self.names = list(found)
-        self._units = self._varying(duration)
+        self._units = self._varying(walk.duration)
         if self._opaque:  # of numbers without names, those that are always whole count something
             self.names = [name for name in self.names if name not in self._whole]
         if wanted is None:
             self.names = self._that_matter()
         self.unit = np.array([self._units[name] for name in self.names])
+        self.instants = self._instants(walk)
 
     def _all(self, simulation: Simulation) -> dict[str, float]:
         """All numbers that are no counts, by name."""
@@ -248,10 +308,20 @@ class Words:
         good = np.isfinite(spread) & (spread > STEADY)
         return dict(zip(every, np.where(good, spread, 1.0).tolist(), strict=True))
 
+    def _instants(self, walk: Walk) -> Floats:
+        """One for numbers that are instants: when a step began, say. They grow as time does."""
+        simulation, seen = self._loop.simulation, []
+        for each in walk.begins:
+            simulation.restore(each)
+            seen.append(self.read(simulation) * self.unit)
+        lasted = np.diff([each.time for each in walk.begins])[:, None]
+        grown = np.diff(seen, axis=0)
+        return np.asarray(np.all(np.abs(grown - lasted) <= INSTANTS * lasted, axis=0), float)
+
     def _that_matter(self) -> list[str]:
         """Those whose disturbance one call of the controller does not undo without a trace."""
         simulation, short = self._loop.simulation, self._loop.grid or SHORT
-        size = self._loop.usual_disturbance
+        size = self._size
 
         def after(names: list[str]) -> tuple[bytes, dict[str, float]]:
             simulation.restore(self._begin)

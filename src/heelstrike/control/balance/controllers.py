@@ -7,12 +7,13 @@ from math import sqrt
 
 import numpy as np
 
+from heelstrike.control.arguments import check_gait, must_be, number_of
 from heelstrike.control.balance.footsteps import Planning
 from heelstrike.control.balance.law import keep_balance
 from heelstrike.control.balance.numbers import Legs, Parameters, Weights
 from heelstrike.control.balance.reference import reference_of
 from heelstrike.control.balance.tasks import CONTACT_ROWS
-from heelstrike.errors import ControllerError, GaitError
+from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.sole import Sole, leg, sole, standing_height
 from heelstrike.robot.loops import refuse_loops
@@ -28,7 +29,7 @@ WEIGHTS = {
     "swing": 1.0,
     "pitch": 0.15,
     "angle": 0.05,
-    "posture": 1e-3,
+    "posture": 3e-4,
     "torque": 1e-7,
 }
 """How much the tasks count, of every robot."""
@@ -55,7 +56,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "longest": 0.65 * size,
         "earliest": 0.4 * duration,
         "latest": 1.29 * duration,
-        "soon": 0.12 * pace,
+        "soon": 0.1 * pace,
         "acceleration": 60.0,
         "hurry": 3.5,
         "foothold_weight": 1.0,
@@ -89,7 +90,7 @@ def _numbers(robot: Robot, gait: Gait, feet: list[Sole]) -> tuple[dict[str, floa
         "straight_knee": -0.25,
         "slow": 0.15 * pace,
         "fast": pace,
-        "haste": 0.1 * pace,
+        "haste": 0.08 * pace,
         "search": 0.1 * pace,
         "smoothing": 0.01 * pace,
         "hold": 0.75 * half,
@@ -154,6 +155,8 @@ class WholeBody(Law):
     ) -> None:
         feet = _feet(robot, gait)
         groups = _numbers(robot, gait, feet)
+        if numbers is not None:
+            must_be(Mapping, "numbers", numbers)
         given = {"friction": friction, **(numbers or {})}
         if speed is not None:
             given["speed"] = speed
@@ -162,7 +165,7 @@ class WholeBody(Law):
             if group is None:
                 known = ", ".join(sorted(set().union(*groups)))
                 raise ControllerError(f"there is no number {name!r}; there are {known}")
-            if not np.isfinite(value):
+            if not np.isfinite(number_of(name, value)):
                 raise ControllerError(f"{name} must be a finite number, got {value}")
             group[name] = float(value)
         if friction <= 0.0:
@@ -235,11 +238,8 @@ class FootstepFeedback(WholeBody):
 
 def _feet(robot: Robot, gait: Gait) -> list[Sole]:
     """Return the soles, or refuse what the law cannot control."""
+    check_gait(robot, gait)
     refuse_loops(robot, "whole-body control", ControllerError)
-    try:
-        gait.check_joints(robot)
-    except GaitError as error:
-        raise ControllerError(str(error)) from None
     free = robot.nv - robot.nu
     if not robot.floating or len(robot.feet) != 2 or free != 3:
         raise ControllerError(

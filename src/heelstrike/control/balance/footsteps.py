@@ -22,6 +22,9 @@ COMMITTED = 0.06
 TIMES = 25
 """Remaining times that a plan is chosen from, besides the gait's own."""
 
+NEAR = 0.03
+"""How far, in lengths of a step, a foot is placed beside the gait's foothold as it flies there."""
+
 
 class Planning(Bundle):
     """What plans are made by.
@@ -127,8 +130,11 @@ def consider(
     light, heavy = planning.foothold_weight, planning.capture_weight
     foothold = (light * plan.length + heavy * (end - plan.offset)) / (light + heavy)
     reach = planning.acceleration * remaining * remaining / 6.0
+    # It comes to rest there with the least effort, or flies on as the gait's foot does.
     ahead = plan.swing + 2.0 / 3.0 * plan.speed * remaining
-    foothold = min(max(foothold, ahead - reach), ahead + reach)
+    flies = min(plan.swing + plan.speed * remaining, plan.length)
+    near = min(reach, NEAR * reference.length)
+    foothold = min(max(foothold, ahead - reach), max(ahead + reach, flies + near))
     foothold = min(max(foothold, planning.shortest), planning.longest)
     off = foothold - plan.length
     late = plan.elapsed + remaining - reference.duration

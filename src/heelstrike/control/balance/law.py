@@ -51,6 +51,7 @@ STEEPEST = 0.35
 def begin_step(t: float, reference: Reference, memory: Memory) -> None:
     """Set the reference to the beginning of a step."""
     memory.start = t
+    memory.time = t
     memory.phase = 0.0
     memory.late = 0.0
     memory.raised = 0.0
@@ -89,17 +90,30 @@ def exchange_at_touchdown(
         return
     swing = 1 - memory.stance
     if memory.lifting == 0 and touched(contacts, robot, swing):
-        length = memory.swing[0] - memory.sole[0]
-        rise = memory.swing[1] - memory.sole[1]
-        if abs(length) > 0.1 * parameters.reference.length:
-            slope = min(max(rise / length, -STEEPEST), STEEPEST)
-            off = slope - memory.slope
-            doubt = (1.0 - parameters.believed) * min(abs(off) / BUMP, 1.0)
-            memory.slope += (1.0 - doubt) * off
+        # Where it stood: by now the impact may have lifted it.
+        memory.rear[0], memory.rear[1] = memory.sole[0], memory.sole[1]
         memory.stance = swing
         memory.landed = 0
         memory.steps += 1
-        begin_step(t, parameters.reference, memory)
+        # Some time since the last call; half of it is wrong by no more than half of it. A walk
+        # then keeps step with the calls, its touchdowns midway between two.
+        begin_step(0.5 * (memory.time + t), parameters.reference, memory)
+
+
+@kernel
+def learn_slope(parameters: Parameters, memory: Memory) -> None:
+    """Estimate the slope, from the foot that stands and the one that stood before it.
+
+    Both lie on the ground. Where a foot is as it touches hangs on how it is moved, and that on
+    the slope that is believed: an error of the estimate would confirm itself.
+    """
+    length = memory.sole[0] - memory.rear[0]
+    if abs(length) > 0.1 * parameters.reference.length:
+        rise = memory.sole[1] - memory.rear[1]
+        slope = min(max(rise / length, -STEEPEST), STEEPEST)
+        off = slope - memory.slope
+        doubt = (1.0 - parameters.believed) * min(abs(off) / BUMP, 1.0)
+        memory.slope += (1.0 - doubt) * off
 
 
 @kernel
@@ -442,7 +456,10 @@ def keep_balance(
     exchange_at_touchdown(t, contacts, robot, parameters, memory)
     locate(state, robot, parameters, memory)
     lift_over(t, contacts, robot, parameters, memory)
+    comes_down = memory.landed == 0
     landed = has_landed(t, state, contacts, robot, parameters, memory)
+    if comes_down and landed:
+        learn_slope(parameters, memory)
     stand_or_walk(t, parameters, memory)
     if memory.stands == 1:
         stay(t, parameters, memory)

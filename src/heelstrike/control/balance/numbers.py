@@ -188,6 +188,8 @@ class Memory(Stance):
         Middle of the stance and of the swing sole, and centre of mass (m).
     speed : (2,) float
         Velocity of the swing sole (m/s).
+    rear : (2,) float
+        Where the sole was that stood before (m).
     plan : Plan
     on : Constrained
     program : Program
@@ -213,6 +215,7 @@ class Memory(Stance):
     swing: Floats = array(2)
     mass: Floats = array(2)
     speed: Floats = array(2)
+    rear: Floats = array(2)
     plan: Plan = part(Plan)
     on: Constrained = part(Constrained)
     program: Program = part(Program)

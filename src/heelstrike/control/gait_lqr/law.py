@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
+from heelstrike.control.arguments import weights_of
 from heelstrike.control.gait_lqr.orbit import NODES, Course, nodes, orbit_of
 from heelstrike.control.gait_lqr.transverse import FINE, Transverse, multipliers_of
-from heelstrike.control.weights import weights_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.robot.model import Floats, Integers

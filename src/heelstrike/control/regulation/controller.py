@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from heelstrike.control.arguments import check_gait, gains_of, number_of, positive
 from heelstrike.control.computed_torque import pitch_of
 from heelstrike.control.regulation.law import regulate_zero_moment_point
 from heelstrike.control.regulation.numbers import PERIOD, Parameters
 from heelstrike.dynamics.inverse_kinematics import leg_joints
-from heelstrike.errors import ControllerError, GaitError
+from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Footing, Gait
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.robot import Foot, Robot
 from heelstrike.robot.sole import sole
-from heelstrike.sim.controller.law import Law, per_actuator
+from heelstrike.sim.controller.law import Law
 
 
 class ZeroMomentPointRegulation(Law):
@@ -96,8 +97,8 @@ class ZeroMomentPointRegulation(Law):
             sides.reverse()
         duration = gait.step_duration
         parameters = Parameters(
-            kp=_gains("kp", kp, robot),
-            kd=_gains("kd", kd, robot),
+            kp=gains_of("kp", kp, robot),
+            kd=gains_of("kd", kd, robot),
             breakpoints=gait.breakpoints,
             coefficients=np.array(sides),
             ankle=np.array(_ankles(robot)),
@@ -120,12 +121,9 @@ class ZeroMomentPointRegulation(Law):
 
 def _check(robot: Robot, gait: Gait) -> None:
     """Refuse what the law cannot control."""
+    check_gait(robot, gait)
     refuse_loops(robot, "regulation of the zero moment point", ControllerError)
     pitch_of(robot)
-    try:
-        gait.check_joints(robot)
-    except GaitError as error:
-        raise ControllerError(str(error)) from None
     flat = [phase.contacts == {gait.stance_foot: Footing.FLAT} for phase in gait.phases]
     if not all(flat) or min(_length(robot, foot) for foot in robot.feet) == 0.0:
         raise ControllerError(
@@ -142,9 +140,13 @@ def _check(robot: Robot, gait: Gait) -> None:
 
 def _check_numbers(
     robot: Robot, margin: float, least_force: float, rates: tuple[float, float],
-    positive: Mapping[str, float], bandwidth: float | None,
+    chosen: Mapping[str, float], bandwidth: float | None,
 ) -> None:  # fmt: skip
     """Refuse numbers that make no law."""
+    given = {"margin": margin, "least_force": least_force}
+    given |= {"slowest": rates[0], "fastest": rates[1]}
+    for name, value in given.items():
+        number_of(name, value)
     half = 0.5 * min(_length(robot, foot) for foot in robot.feet)
     if not 0.0 <= margin < half:
         raise ControllerError(
@@ -156,14 +158,13 @@ def _check_numbers(
             f"the clock's rate is 1 as it begins, and the clock never goes back; slowest and "
             f"fastest must lie about 1, from 0 on, got {rates[0]!r} and {rates[1]!r}"
         )
-    for name, value in positive.items():
-        if not 0.0 < value < np.inf:
-            raise ControllerError(f"{name} must be a positive number, got {value!r}")
+    for name, value in chosen.items():
+        positive(name, value)
     if not 0.0 <= least_force < 1.0:
         raise ControllerError(
             f"least_force must be a part of the weight from 0 to less than 1, got {least_force!r}"
         )
-    if bandwidth is not None and not bandwidth > 0.0:
+    if bandwidth is not None and not number_of("bandwidth", bandwidth) > 0.0:
         raise ControllerError(f"bandwidth must be a positive frequency in Hz, got {bandwidth}")
 
 
@@ -177,10 +178,3 @@ def _length(robot: Robot, foot: Foot) -> float:
 def _ankles(robot: Robot) -> list[int]:
     actuators = robot.model.actuator_joint.tolist()
     return [actuators.index(foot.link) for foot in robot.feet]
-
-
-def _gains(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
-    gains = per_actuator(name, value, robot)
-    if np.any(gains < 0.0):
-        raise ControllerError(f"{name} must not be negative, got {value!r}")
-    return gains

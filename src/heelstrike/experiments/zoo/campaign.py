@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import difflib
 import os
 import threading
@@ -152,6 +153,8 @@ def in_words(method: Method) -> str:
 def loaded(words: str, how: LoadOptions) -> dict[str, Robot]:
     """Load robots by their names and files, with commas between; `how` is for files.
 
+    A file whose name has a comma stands in double quotes.
+
     Raises
     ------
     RobotError
@@ -207,7 +210,9 @@ def _named(kind: str, words: str | None, known: Sequence[Named]) -> tuple[Named,
 
 
 def _words(words: str) -> list[str]:
-    return [word.strip() for word in words.split(",") if word.strip()]
+    """Words between commas; one that has a comma itself stands in double quotes."""
+    read = csv.reader([words], skipinitialspace=True)
+    return [word.strip() for row in read for word in row if word.strip()]
 
 
 def _begun(folder: Path | None, settings: Settings, *, afresh: bool) -> Results:

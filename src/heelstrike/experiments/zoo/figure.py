@@ -106,8 +106,9 @@ def _panel(
         if cell is not None:
             _mark(axes, cell, y, disturbance, looks[controller])
     axes.set_yticks(
-        [0.5 * (begin + end) for _, begin, end in bands], [robot for robot, _, _ in bands]
-    )
+        [0.5 * (begin + end) for _, begin, end in bands], [robot for robot, _, _ in bands],
+        parse_math=False,  # names of files are no formulas
+    )  # fmt: skip
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(bands[-1][2], bands[0][1])
     axes.grid(visible=False, axis="y")

@@ -6,8 +6,10 @@ import csv
 import io
 import math
 import os
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Group, RenderableType
@@ -44,6 +46,18 @@ def digits(value: float) -> str:
     if abs(value) < 1e-6:
         return "0"
     return f"{value:.0f}" if abs(value) >= 9.95 else f"{value:.2g}"
+
+
+def escaped(text: str) -> str:
+    """Write a text so that it is shown in Markdown as it is, in a table, too.
+
+    An underscore within a word is nothing but itself.
+    """
+    line = " ".join(text.split())
+    line = re.sub(r"([\\`*\[\]{}#]|(?<![^\W_])_|_(?![^\W_]))", r"\\\1", line)
+    for character in "&<>|~":  # not all that read Markdown know a backslash before these
+        line = line.replace(character, f"&#{ord(character)};" if character != "&" else "&amp;")
+    return line
 
 
 def columns(results: Results) -> list[Disturbance]:
@@ -133,7 +147,7 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
     """
     settings = results.settings
     there = columns(results)
-    link = Path(os.path.relpath(figure, page.parent)).as_posix()
+    link = quote(Path(os.path.relpath(figure, page.parent)).as_posix())
     share = (1.0 - SURE) ** (1.0 / settings.trials)
     lines = [
         "# Zoo of controllers",
@@ -153,16 +167,18 @@ def as_page(results: Results, *, page: Path, figure: Path, command: str) -> str:
         "",
     ]
     for animal, rows in results.robots():
-        lines += [f"## {animal.robot}", "", _gait(animal), ""]
+        lines += [f"## {escaped(animal.robot)}", "", _gait(animal), ""]
         filled = {controller: row for controller, row in rows.items() if not empty(row)}
         if filled:
             heads = [f"{each.heading}<br>{each.unit}" for each in there]
             lines += [_line("controller", *heads), _line("---", *["--:"] * len(there))]
             for controller, row in filled.items():
-                lines.append(_line(controller, *(shown(row.get(d.name), d) for d in there)))
+                lines.append(
+                    _line(escaped(controller), *(shown(row.get(d.name), d) for d in there))
+                )
             lines.append("")
         said = [
-            f"- {names}: {word}{f' ({reason})' if reason else ''}"
+            f"- {escaped(names)}: {word}{f' ({escaped(reason)})' if reason else ''}"
             for word, names, reason in notes(rows)
         ]
         lines += [*said, ""] if said else []

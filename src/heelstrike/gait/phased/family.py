@@ -168,7 +168,13 @@ class StepFamily:
             If numbers are not positive, the gait does not repeat, or the robot's legs do not allow
             for as much.
         """
-        if not (0.0 < slope < 1.0 and 0.0 < shift < np.inf):
+        if not isinstance(gait, PhasedGait):
+            raise GaitError(
+                f"a family is one around a PhasedGait, got {type(gait).__name__}; "
+                "hs.PhasedGait.from_gait(robot, gait) makes one"
+            )
+        numbers = all(isinstance(x, (int, float, np.floating)) for x in (slope, shift))
+        if not (numbers and 0.0 < slope < 1.0 and 0.0 < shift < np.inf):
             raise GaitError(
                 "a family needs a steepest slope between 0 and 1 and a positive largest shift; got "
                 f"slope={slope!r}, shift={shift!r}"

@@ -183,6 +183,12 @@ class PhasedGait:
         GaitError
             If the gait is on flat feet or of another robot, or the phase does not rise throughout.
         """
+        for name, given, kind in (("robot", robot, Robot), ("gait", gait, Gait)):
+            if not isinstance(given, kind):
+                raise GaitError(
+                    f"{name} must be a {kind.__name__}, got {type(given).__name__}: "
+                    "from_gait(robot, gait)"
+                )
         check_robot(robot)
         gait.check_joints(robot)
         if not gait.point_feet:
@@ -190,8 +196,11 @@ class PhasedGait:
                 "virtual constraints are for gaits on point feet: on a flat foot nothing is left "
                 "without a motor, and ComputedTorque follows the gait"
             )
-        if degree < 3:
-            raise GaitError(f"degree must be 3 or more to meet both ends of a step, got {degree}")
+        if not (isinstance(degree, (int, np.integer)) and degree >= 3):
+            raise GaitError(
+                f"degree must be a whole number, 3 or more to meet both ends of a step; got "
+                f"{degree!r}"
+            )
         factors = phase_of(robot, gait.stance_foot, phase)
         time = np.linspace(0.0, gait.step_duration, INSTANTS * (degree + 1) + 1)
         driven = robot.model.actuator_joint
@@ -383,6 +392,13 @@ def phase_of(robot: Robot, stance_foot: int, factors: Mapping[str, float] | None
     check_robot(robot)
     _check_foot(stance_foot)
     if factors is not None:
+        if not isinstance(factors, Mapping) or not all(
+            isinstance(each, (int, float, np.integer, np.floating)) for each in factors.values()
+        ):
+            raise GaitError(
+                f"a phase is factors by the names of coordinates, {{'hip': 1.0, ...}}; got "
+                f"{factors!r}"
+            )
         unknown = set(factors) - set(robot.joint_names)
         if unknown:
             raise GaitError(

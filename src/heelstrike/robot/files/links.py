@@ -6,6 +6,7 @@ URDF's ``mimic``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -139,6 +140,7 @@ def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
         loops.setdefault((*ends, *rounded.tolist()), (ends, places))
     couplings = list(_couplings(file))
     latches = list(_latches(file, links))
+    brakes = list(_brakes(file))
     return {
         "loop_link": [ends for ends, _ in loops.values()],
         "loop_position": [places for _, places in loops.values()],
@@ -147,7 +149,8 @@ def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
         "latch_joint": [joint for joint, _, _ in latches],
         "latch_side": [side for _, side, _ in latches],
         "latch_release": [link for _, _, link in latches],
-        "brake_joint": list(_brakes(file)),
+        "brake_joint": [joint for joint, _ in brakes],
+        "brake_limit": [limit for _, limit in brakes],
     }
 
 
@@ -244,13 +247,15 @@ def _latches(file: MujocoFile, links: Links) -> Iterator[tuple[int, int, int]]:
         yield place[joint], int(side), int(links.of_body[bodies[0]]) if bodies else -1
 
 
-def _brakes(file: MujocoFile) -> Iterator[int]:
-    """Joints with a brake, custom data called ``brake:JOINT``.
+def _brakes(file: MujocoFile) -> Iterator[tuple[int, float]]:
+    """Joints with a brake, and the most that it holds: custom data called ``brake:JOINT``.
+
+    The first number is 1, the second is that limit; without a second there is none.
 
     Raises
     ------
     RobotError
-        If there is no such joint.
+        If there is no such joint, or the brake would hold nothing.
     """
     place = {one.name: i for i, one in enumerate(file.coordinates)}
     for numeric in range(file.model.nnumeric):
@@ -262,4 +267,11 @@ def _brakes(file: MujocoFile) -> Iterator[int]:
                 f"the brake {joint!r} in <custom> is called brake:JOINT after a joint: there is no "
                 "such joint."
             )
-        yield place[joint]
+        first, size = file.model.numeric_adr[numeric], file.model.numeric_size[numeric]
+        limit = float(file.model.numeric_data[first + 1]) if size > 1 else math.inf
+        if not limit > 0.0:
+            raise file.error(
+                f"the brake {joint!r} in <custom> must hold something: its data are 1, and perhaps "
+                f"the torque beyond which it slips, which is {limit:g}."
+            )
+        yield place[joint], limit

@@ -322,10 +322,16 @@ def _differing_latches(model: Model, mirror: Mirror, names: Sequence[str]) -> It
 
 
 def _differing_brakes(model: Model, mirror: Mirror, names: Sequence[str]) -> Iterator[str]:
-    braked = set(model.brake_joint.tolist())
-    for joint in sorted(braked):
-        if int(mirror.joint[joint]) not in braked:
-            yield f"{names[joint]} has a brake, {names[int(mirror.joint[joint])]} has none"
+    limits = dict(zip(model.brake_joint.tolist(), model.brake_limit.tolist(), strict=True))
+    for joint in sorted(limits):
+        its = int(mirror.joint[joint])
+        if its not in limits:
+            yield f"{names[joint]} has a brake, {names[its]} has none"
+        elif joint < its and not same(limits[joint], limits[its]):
+            yield (
+                f"limits of the brakes of {names[joint]} and {names[its]} ({limits[joint]:g}, "
+                f"{limits[its]:g})"
+            )
 
 
 def _unequal(compared: Iterable[tuple[Any, ...]], pair: str) -> Iterator[str]:

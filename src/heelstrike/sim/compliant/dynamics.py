@@ -335,7 +335,7 @@ def evaluate(
     now = work.now
     push_contacts(model, memory, work)
     push_stops(model, work.laws, memory, now)
-    rub_joints(model, work.laws.joint_speed, memory, now)
+    rub_joints(work.laws.joint_speed, memory, now)
     if control.continuous == 1 and how != HELD:
         if how == ACCEPTED:
             show_forces(model, work.force, work.corners, memory.contacts)
@@ -466,11 +466,11 @@ def pull_back(model: Model, latch: int, memory: Memory, stop: NormalForces) -> N
 
 
 @kernel
-def rub_joints(model: Model, scale: float, memory: Memory, now: Rates) -> None:
+def rub_joints(scale: float, memory: Memory, now: Rates) -> None:
     """Dry friction of the joints, smoothed around zero speed."""
     for place in range(memory.dry_joint.shape[0]):
         j = memory.dry_joint[place]
-        limit = model.dry_friction[j]
+        limit = memory.breakaway[j]
         size = sqrt(memory.v[j] * memory.v[j] + scale * scale)
         now.dry_force[j] = -limit * memory.v[j] / size
         now.dry_by_speed[j] = -limit * (scale / size) ** 2 / size

@@ -47,7 +47,7 @@ from heelstrike.sim.compliant.dynamics import (
 )
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
 from heelstrike.sim.compliant.rosenbrock import ORDER
-from heelstrike.sim.contacts.brakes import note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, share_friction, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import observe
 from heelstrike.sim.contacts.latches import react
@@ -362,10 +362,11 @@ def brake(
 ) -> None:
     """Let the brakes that have been put on stop their joints, by impulses."""
     loops = memory.loops
-    steady_loops(model, memory.q, memory.equations, loops, memory.v)
-    for row in range(rows_of(loops)):
-        work.loop_impulse[row] = loops.unknown[row]
-        note_loop(model, row, loops.unknown[row], loops)
+    if take_hold(model, loops):
+        steady_loops(model, memory.q, memory.equations, loops, memory.v)
+        for row in range(rows_of(loops)):
+            work.loop_impulse[row] = loops.unknown[row]
+            note_loop(model, row, loops.unknown[row], loops)
     note_brakes(model, time, 1.0, record, loops)
 
 
@@ -421,8 +422,9 @@ def note_events(
 
 @kernel
 def note_forces(
-    row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory, record: Record
-) -> None:
+    model: Model, row: int, force: Floats, stop_force: Floats, dry_force: Floats, memory: Memory,
+    record: Record,
+) -> None:  # fmt: skip
     """Write the forces of contacts, joints and loops, the slip and the residual of a row."""
     for joint in range(stop_force.shape[0]):
         record.stop_torque[row, joint] = stop_force[joint]
@@ -438,6 +440,7 @@ def note_forces(
         record.coupling_force[row, coupling] = memory.loops.coupling_force[coupling]
     for joint in range(record.brake_torque.shape[1]):
         record.brake_torque[row, joint] = memory.loops.brake_force[joint]
+    share_friction(model, memory.breakaway, record.friction_torque[row], record.brake_torque[row])
     record.residual[row, 1] = memory.assembly.answer.residual[1]
 
 
@@ -496,7 +499,9 @@ def report(
     work.row = note_row_when_due(memory, clock, record)
     if work.row >= 0:
         now = work.now
-        note_forces(work.row, work.force, now.stop_force, now.dry_force, memory, record)
+        note_forces(
+            scene.model, work.row, work.force, now.stop_force, now.dry_force, memory, record
+        )
         force, place = record.contact_force[work.row], record.contact_point[work.row]
         begin_joining(scene.model, memory.contacts, work.corners)
         join(scene.model, 2.0, work.force, memory.contacts, work.corners)
@@ -511,7 +516,7 @@ def move(
     """Move on to the next sample, and note what happened on the way."""
     model = scene.model
     begin_sample(model, memory, work)
-    if take_hold(memory.loops):
+    if awaits_hold(memory.loops):
         brake(model, clock.time, memory, work, record)
         evaluate(scene.controller, control, model, scene.ground, HELD, clock.time, memory, work)
     code = sample(scene.controller, control, model, scene.ground, clock.time, memory, work)
@@ -525,7 +530,7 @@ def move(
         # What acted until the next sample takes the place of what acted at the first instant.
         reaction = memory.reaction
         note_forces(
-            work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
+            model, work.row, memory.contacts.force, reaction.stop_torque, reaction.friction_torque,
             memory, record,
         )  # fmt: skip
         for contact in range(work.corners.sides - model.nc):

@@ -1,8 +1,13 @@
 """Brakes: joints that are held wherever they are, while a command says so.
 
-An engaged brake is one more row of the loops (:mod:`heelstrike.sim.contacts.loops`): its force, a
-torque of the joint, may be anything, and what it keeps at zero is the joint's motion. It takes hold
-at the instant at which it is put on, of a joint that moves by an impact of all that touches.
+A brake that does not slip is one more row of the loops (:mod:`heelstrike.sim.contacts.loops`)
+while it is on: its force, a torque of the joint, may be anything, and what it keeps at zero is the
+joint's motion. It takes hold at the instant at which it is put on, of a joint that moves by an
+impact of all that touches.
+
+One that slips is dry friction of its joint (:mod:`heelstrike.sim.contacts.dry_friction`): while it
+is on it adds what it holds at most to that of the joint itself. What there is of both is shared in
+the ratio of what there may be.
 """
 
 from __future__ import annotations
@@ -11,15 +16,15 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
-from heelstrike.robot.model import Integers, Model
+from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.latches import several
-from heelstrike.sim.contacts.loops import HOLDS, OFF, PUT_ON, TAKES_HOLD
-from heelstrike.sim.memory import Loops
+from heelstrike.sim.contacts.loops import BEGINS_TO_RUB, HOLDS, OFF, PUT_ON, RUBS, TAKES_HOLD
+from heelstrike.sim.memory import Loops, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import log_event
 
@@ -36,24 +41,56 @@ def awaits_hold(loops: Loops) -> bool:
 
 
 @kernel
-def take_hold(loops: Loops) -> bool:
-    """Let the brakes hold that have been put on; return whether any takes hold."""
+def take_hold(model: Model, loops: Loops) -> bool:
+    """Let the brakes hold that have been put on; return whether any takes hold without slipping."""
     found = False
     for brake in range(loops.braked.shape[0]):
         if loops.braked[brake] == PUT_ON:
-            loops.braked[brake] = TAKES_HOLD
+            slips = model.brake_limit[brake] < np.inf
+            loops.braked[brake] = BEGINS_TO_RUB if slips else TAKES_HOLD
         found = found or loops.braked[brake] == TAKES_HOLD
     return found
 
 
 @kernel
+def stops_any(model: Model, v: Floats, rest: float, loops: Loops) -> bool:
+    """Whether any of the brakes that take hold stops a joint that is faster than `rest`."""
+    found = False
+    for brake in range(loops.braked.shape[0]):
+        moves = abs(v[model.brake_joint[brake]]) > rest
+        found = found or (loops.braked[brake] == TAKES_HOLD and moves)
+    return found
+
+
+@kernel
 def note_brakes(model: Model, time: float, span: float, record: Record, loops: Loops) -> None:
-    """Tell of the brakes that take hold, with their impulses over a span of time."""
+    """Tell of the brakes that take hold, with their impulses over a span of time.
+
+    One that slips gives none in an instant.
+    """
     for brake in range(loops.braked.shape[0]):
         if loops.braked[brake] == TAKES_HOLD:
             loops.braked[brake] = HOLDS
             impulse = span * loops.brake_force[brake]
             log_event(time, JOINT_BRAKE, model.brake_joint[brake], impulse, 0.0, record)
+        elif loops.braked[brake] == BEGINS_TO_RUB:
+            loops.braked[brake] = RUBS
+            log_event(time, JOINT_BRAKE, model.brake_joint[brake], 0.0, 0.0, record)
+
+
+@dissolved_kernel
+def share_friction(
+    model: Model, breakaway: Floats, friction_torque: Floats, brake_torque: Floats
+) -> None:
+    """Tell the torques of brakes that slip from the dry friction that their joints have anyway."""
+    for brake in range(brake_torque.shape[0]):
+        joint = model.brake_joint[brake]
+        if model.brake_limit[brake] < np.inf:
+            brake_torque[brake] = 0.0
+            if breakaway[joint] > 0.0:
+                part = 1.0 - model.dry_friction[joint] / breakaway[joint]
+                brake_torque[brake] = part * friction_torque[joint]
+                friction_torque[joint] -= brake_torque[brake]
 
 
 def brakes_of(robot: Robot, joints: Iterable[str | int] | str | int) -> tuple[bool, ...]:
@@ -64,7 +101,7 @@ def brakes_of(robot: Robot, joints: Iterable[str | int] | str | int) -> tuple[bo
     SimulationError
         If a joint has no brake.
     """
-    chosen = [robot.joint_index(joint) for joint in several(joints)]
+    chosen = [robot.joint_index(joint) for joint in several("braked", joints)]
     for joint in chosen:
         if joint not in robot.model.brake_joint:
             raise SimulationError(
@@ -74,19 +111,33 @@ def brakes_of(robot: Robot, joints: Iterable[str | int] | str | int) -> tuple[bo
     return tuple(np.isin(robot.model.brake_joint, chosen).tolist())
 
 
-def put_on(robot: Robot, wanted: Sequence[bool], state: State, how: int, loops: Loops) -> None:
+def put_on(robot: Robot, wanted: Sequence[bool], state: State, how: int, memory: Memory) -> None:
     """Put some brakes on where their joints are, and let the others go; what is on stays.
 
     As a simulation begins, velocities are made to fit loops and brakes (`how` is ``HOLDS``); later
     that is an impact (``PUT_ON``).
     """
-    for brake, joint in enumerate(robot.model.brake_joint):
+    model, loops = robot.model, memory.loops
+    for brake, joint in enumerate(model.brake_joint):
+        slips = model.brake_limit[brake] < np.inf
         if not wanted[brake]:
             loops.braked[brake] = OFF
             loops.brake_force[brake] = 0.0
         elif loops.braked[brake] == OFF:
-            loops.braked[brake] = how
+            loops.braked[brake] = RUBS if slips and how == HOLDS else how
             loops.brake_position[brake] = state.q[joint]
+        if slips:
+            added = model.brake_limit[brake] if wanted[brake] else 0.0
+            memory.breakaway[joint] = model.dry_friction[joint] + added
+            if memory.breakaway[joint] == 0.0:
+                memory.reaction.friction_torque[joint] = 0.0
+    rubbing = memory.breakaway[memory.dry_joint] > 0.0
+    memory.reported.resting[~rubbing] = -1  # as one that begins at rest, or in motion
+
+
+def brakes_on(loops: Loops) -> tuple[bool, ...]:
+    """Tell which brakes are on."""
+    return tuple((loops.braked != OFF).tolist())
 
 
 def braked_joints(robot: Robot, braked: Integers) -> tuple[str, ...]:

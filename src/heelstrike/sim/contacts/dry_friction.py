@@ -18,23 +18,26 @@ from heelstrike.sim.memory import Assembly
 
 @kernel
 def select_dry_joints(
-    model: Model, step: float, count: int, dry_joint: Integers, guess: Integers, v: Floats,
-    assembly: Assembly,
+    model: Model, step: float, count: int, dry_joint: Integers, breakaway: Floats, guess: Integers,
+    v: Floats, assembly: Assembly,
 ) -> int:  # fmt: skip
     """Append the joints with dry friction to the candidates of a step; return how many there are.
 
-    They are numbered on from the joint stops and the second faces of corners, one a contact point;
-    `guess` holds their contact modes.
+    Those whose brake is off, and that have none of their own, are left out. They are numbered on
+    from the joint stops and the second faces of corners, one a contact point; `guess` holds their
+    contact modes.
     """
     first = 2 * model.nc + 2 * model.nv
     problem = assembly.problem
     for place in range(dry_joint.shape[0]):
         joint = dry_joint[place]
+        if breakaway[joint] == 0.0:
+            continue
         write_unit_row(joint, 2 * count + 1, 1.0, assembly)
         problem.free[2 * count + 1] = v[joint]
         problem.set[count] = INTERVAL
         problem.friction[count] = 1.0
-        problem.bound[count] = step * model.dry_friction[joint]
+        problem.bound[count] = step * breakaway[joint]
         assembly.answer.mode[count] = guess[place]
         assembly.candidate[count] = first + place
         count += 1

@@ -9,6 +9,7 @@ then. What a latch does follows from the events of the run, under every method.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -121,7 +122,7 @@ def latches_at(
         stands = (np.abs(at.gap) <= AT_THE_END) & (np.abs(at.velocity[:, 0]) <= AT_THE_END)
         standing = model.contact_link[stands]
         return tuple((rests & ~np.isin(model.latch_release, standing)).tolist())
-    chosen = [robot.joint_index(joint) for joint in several(latched)]
+    chosen = [robot.joint_index(joint) for joint in several("latched", latched)]
     for joint in chosen:
         of_joint = model.latch_joint == joint
         if not np.any(of_joint):
@@ -137,6 +138,16 @@ def latches_at(
     return tuple((np.isin(model.latch_joint, chosen) & there).tolist())
 
 
-def several(joints: Iterable[str | int] | str | int) -> Iterable[str | int]:
-    """Return joints of which one may be given by itself."""
-    return (joints,) if isinstance(joints, str | int) else joints
+def several(name: str, joints: Any) -> Iterable[Any]:
+    """Return joints of which one may be given by itself.
+
+    Raises
+    ------
+    SimulationError
+        If they are none; `name` is what is asked for.
+    """
+    if isinstance(joints, str) or hasattr(joints, "__index__"):
+        return (joints,)
+    if not isinstance(joints, Iterable):
+        raise SimulationError(f"{name} must be names of joints, got {joints!r}")
+    return joints

@@ -36,6 +36,12 @@ ROUNDING = 1e-11
 OFF, PUT_ON, TAKES_HOLD, HOLDS = 0, 1, 2, 3
 """A brake is off; shall hold from this instant on; does, as it could not before; holds."""
 
+BEGINS_TO_RUB, RUBS = -2, -1
+"""One that slips, since this instant and since an earlier one: no row, but dry friction."""
+
+SAME = 1e-11
+"""Two rows of a loop are multiples of each other if no more of the longer is missing."""
+
 ATTEMPTS = 20
 """Newton's method takes three steps from where a simulation is."""
 
@@ -54,6 +60,8 @@ def rows_of(loops: Loops) -> int:
 def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops) -> None:
     """Write displacements, Jacobian and bias of a state whose kinematics and velocities are in."""
     find_rows(model, q, v, tree, loops.rows)
+    for loop in range(model.loops):
+        leave_one(loop, loops)
     row = 2 * model.loops + model.couplings
     for brake in range(loops.braked.shape[0]):
         if loops.braked[brake] >= TAKES_HOLD:
@@ -61,6 +69,35 @@ def find_loops(model: Model, q: Floats, v: Floats, tree: Workspace, loops: Loops
             loops.rows.displacement[row] = q[joint] - loops.brake_position[brake]
             loops.rows.jacobian[row, joint] = 1.0
             row += 1
+
+
+@kernel
+def leave_one(loop: int, loops: Loops) -> None:
+    """Where one row of a loop is a multiple of the other, take the shorter away.
+
+    So it is of a loop between a link and its parent, which locks the joint. The shorter row may be
+    next to nothing, and would ask for more than there are digits.
+    """
+    jacobian = loops.rows.jacobian
+    loops.lean[loop, 0] = loops.lean[loop, 1] = 0.0
+    along_x, along_z, product = 0.0, 0.0, 0.0
+    for j in range(jacobian.shape[1]):
+        x, z = jacobian[2 * loop, j], jacobian[2 * loop + 1, j]
+        along_x += x * x
+        along_z += z * z
+        product += x * z
+    shorter = 0 if along_x < along_z else 1
+    row, other, square = 2 * loop + shorter, 2 * loop + 1 - shorter, max(along_x, along_z)
+    part = product / square if square > 0.0 else 0.0
+    away = 0.0
+    for j in range(jacobian.shape[1]):
+        away = max(away, abs(jacobian[row, j] - part * jacobian[other, j]))
+    if away * away <= SAME * SAME * square:
+        loops.lean[loop, shorter] = part
+        loops.rows.displacement[row] = 0.0
+        loops.rows.bias[row] = 0.0
+        for j in range(jacobian.shape[1]):
+            jacobian[row, j] = 0.0
 
 
 @dissolved_kernel
@@ -122,7 +159,12 @@ def note_loops(model: Model, count: int, impulse: Floats, loops: Loops) -> None:
 def note_loop(model: Model, row: int, force: float, loops: Loops) -> None:
     """Keep the force of a row."""
     if row < 2 * model.loops:
-        loops.loop_force[row // 2, row % 2] = force
+        force_now, lean = loops.loop_force[row // 2], loops.lean[row // 2]
+        force_now[row % 2] = force
+        for axis in range(2 if row % 2 == 1 else 0):  # of forces that do the same the least
+            if lean[axis] != 0.0:
+                force_now[1 - axis] /= 1.0 + lean[axis] * lean[axis]
+                force_now[axis] = lean[axis] * force_now[1 - axis]
     elif row < 2 * model.loops + model.couplings:
         loops.coupling_force[row - 2 * model.loops] = force
     else:

@@ -30,6 +30,11 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState, exten
 CONTROLLER_SIGNATURE = types.void(types.float64, *[types.int64] * 6, types.float64[::1])
 CONTROLLER_TYPE = types.FunctionType(CONTROLLER_SIGNATURE)
 
+REAL = "biuf"
+"""Kinds of arrays of real numbers."""
+
+REAL_NUMBER = (int, float, np.integer, np.floating)
+
 
 class ControllerFunction:
     """What :func:`controller` makes of a function: called with parameters, it returns a law.
@@ -223,7 +228,11 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
 
 def per_actuator(name: str, value: ArrayLike, robot: Robot) -> NDArray[np.float64]:
     """Return one number for each actuator, (nu,), of one for all or for each."""
-    gains = np.asarray(value, dtype=np.float64)
+    try:
+        gains = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        gains = np.asarray(None)
+    gains = gains.astype(np.float64) if gains.dtype.kind in REAL else np.full(1, np.nan)
     if gains.ndim > 1 or gains.size not in (1, robot.nu) or not np.all(np.isfinite(gains)):
         raise ControllerError(
             f"{name} must be one finite number or {robot.nu} (one an actuator), got {value!r}"
@@ -278,8 +287,10 @@ class Law:
         self.memory = dict(memory or {})
         strange = self.memory.keys() - function.memory.declared - function.memory.extent_names
         strange -= function.log.extent_names
-        if period is not None and not 0.0 < period < np.inf:
-            raise ControllerError(f"the period of a controller must be positive, got {period}")
+        if period is not None and not (isinstance(period, REAL_NUMBER) and 0.0 < period < np.inf):
+            raise ControllerError(
+                f"the period of a controller must be a positive number of seconds, got {period!r}"
+            )
         if strange:
             raise ControllerError(
                 f"the memory of controller {function.name!r} has no {', '.join(sorted(strange))}"

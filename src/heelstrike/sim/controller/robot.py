@@ -38,6 +38,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import sole
 from heelstrike.sim.controller import stance
+from heelstrike.sim.controller import tied as following
 from heelstrike.sim.controller.interface import Contacts
 
 
@@ -341,13 +342,15 @@ class ControlledRobot(Bundle):
         """Centroidal momentum matrix (3, nv): times v it is :meth:`momentum`."""
         momentum_matrix(self.model, state.kinematics, matrix)
 
+    follow_motors = following.follow_motors
     flat_foot_torque = stance.flat_foot_torque
     point_foot_torque = stance.point_foot_torque
 
 
 def extents_of(robot: Robot) -> dict[str, int]:
     """Sizes of a robot by the names under which arrays of controllers are declared."""
-    return {**robot.model.extents, "components": 2}
+    held = 2 * robot.nc + count_rows(robot.model)  # rows of all that ground and loops can hold
+    return {**robot.model.extents, "components": 2, "held": held}
 
 
 def controlled_robot(robot: Robot) -> ControlledRobot:

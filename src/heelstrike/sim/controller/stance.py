@@ -32,7 +32,7 @@ from heelstrike.dynamics.spatial import (
     spatial,
 )
 from heelstrike.robot.model import Floats
-from heelstrike.sim.controller.tied import tied_torque
+from heelstrike.sim.controller.tied import follow_speeds, tied_torque
 
 if TYPE_CHECKING:
     from heelstrike.sim.controller.interface import Contacts
@@ -71,6 +71,11 @@ def hold_still(robot: ControlledRobot, state: ControlState, foot: int) -> None:
     """Write velocities `v` that go with those of the joints while a flat foot rests (eq. 29)."""
     link = robot.foot_link[foot]
     point_columns(robot.model, state.kinematics, link, state.kinematics.origin[link], robot.columns)
+    if robot.loops.bias.shape[0] > 0:
+        for i in range(robot.nu):
+            state.v[robot.model.actuator_joint[i]] = state.joint_velocity[i]
+        follow_speeds(robot, state, 3)
+        return
     complete(robot, (0.0, 0.0, 0.0), state.joint_velocity, state.v)
 
 

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 FREE = -1
 """What stands for the row of a coordinate that is independent."""
 
+ATTEMPTS = 4
+"""Newton's method squares errors: noise of encoders of 0.01 rad is gone by then."""
+
 
 @kernel
 def reduce_rows(rows: int, motor: Integers, tied: Floats, row_of: Integers) -> None:
@@ -120,6 +123,55 @@ def write_ties(robot: ControlledRobot, state: ControlState, held: int) -> None:
         for j in range(nv):
             tied[held + row, j] = rows.jacobian[row, j]
         tied[held + row, nv] = -rows.bias[row]
+
+
+@kernel
+def follow_positions(robot: ControlledRobot, state: ControlState) -> None:
+    """Put what follows by loops and couplings where motors and trunk, as they are, want it.
+
+    Newton's method, from where `state` has it. Of trees nothing follows.
+    """
+    tied, row_of, rows, nv = robot.tied, robot.tied_row, robot.loops, robot.nv
+    count = rows.bias.shape[0]
+    for _ in range(ATTEMPTS if count > 0 else 0):
+        robot.update(state)
+        write_ties(robot, state, 0)
+        for row in range(count):
+            tied[row, nv] = -rows.displacement[row]
+        reduce_rows(count, robot.motor, tied, row_of)
+        for j in range(nv):
+            if row_of[j] != FREE and robot.motor[j] < 0:
+                state.q[j] += tied[row_of[j], nv]
+
+
+@kernel
+def follow_speeds(robot: ControlledRobot, state: ControlState, held: int) -> None:
+    """Give what has no motor the speed that loops, and a foot that rests, make of the motors'.
+
+    Kinematics of the state are there, and the Jacobian of the foot as :func:`tied_torque` wants it.
+    """
+    tied, row_of, v = robot.tied, robot.tied_row, state.v
+    write_ties(robot, state, held)
+    count = held + robot.loops.bias.shape[0]
+    for row in range(count):
+        tied[row, robot.nv] = 0.0
+    reduce_rows(count, robot.motor, tied, row_of)
+    for i in range(robot.nv):
+        if row_of[i] != FREE and robot.motor[i] < 0:
+            v[i] = 0.0
+            for j in range(robot.nv):
+                if row_of[j] == FREE:
+                    v[i] -= tied[row_of[i], j] * v[j]
+
+
+@kernel
+def follow_motors(robot: ControlledRobot, state: ControlState) -> None:
+    """Let what follows by loops and couplings do as trunk and motors do; update the state."""
+    follow_positions(robot, state)
+    robot.update(state)
+    if robot.loops.bias.shape[0] > 0:
+        follow_speeds(robot, state, 0)
+        robot.update(state)
 
 
 @kernel

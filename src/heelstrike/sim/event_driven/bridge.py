@@ -22,6 +22,7 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -63,8 +64,10 @@ TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
 # Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
 SLOW = 1e-3
-# The two halves of a bridge of order one are half as wrong as the whole.
-SAFETY = 2.0
+# The two halves of a bridge of order one are half as wrong as the whole, so that it is twice as
+# wrong as they are apart; and what puts its end on the ground afterwards, which they do not know
+# of, moves it up to as far again in most cases.
+SAFETY = 4.0
 # Slopes of the step to come, where states can be kept until then.
 HERE, HALVED = 2, 3
 
@@ -106,6 +109,8 @@ def gather_near(model: Model, length: float, bouncing: bool, phase: Phase, memor
             point = contact - phase.first_second
             if phase.passing[point] == 1 or phase.seconds.gap[point] == np.inf:
                 continue
+        if phase.first_dry <= contact < phase.first_second and phase.closed[contact] == 0:
+            continue
         gap_rows(model, memory.equations.tree, memory.contacts, phase, contact, count, assembly)
         if phase.first_dry <= contact < phase.first_second:
             write_free(0.0, length, contact, count, model, phase, memory)
@@ -146,13 +151,17 @@ def leave_faces(model: Model, phase: Phase) -> None:
 
 @kernel
 def collect_impulses(count: int, assembly: Assembly, reaction: Reaction, phase: Phase) -> None:
-    """Write what the bridge found: impulses, and modes of what does not leave by its end."""
-    impulse, nv = assembly.answer.impulse, phase.begin.shape[0] // 2
+    """Write what the bridge found: impulses, and modes of what does not leave by its end.
+
+    Its velocity then is that of the problem, which knows how the ground turns under the robot in
+    this time, but for restitution and gaps that close.
+    """
+    impulse, velocity = assembly.answer.impulse, assembly.answer.velocity
     for place in range(count):
         contact = assembly.candidate[place]
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        if not row_product(assembly.jacobian, 2 * place, phase.end[nv:]) > TOUCHING:
+        if not velocity[2 * place] - phase.lean[place] > TOUCHING:
             reaction.mode[contact] = assembly.answer.mode[place]
 
 
@@ -316,7 +325,7 @@ def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -
             if contacts.gap[point] <= TOUCHING:
                 stand_on_face(model, ground, tree, point, contacts, memory.surface, phase)
         elif contact >= phase.first_dry:
-            if mode[contact] != STICK:
+            if phase.closed[contact] == 1 and mode[contact] != STICK:
                 joint = phase.dry_joint[contact - phase.first_dry]
                 phase.slide[contact] = heading(phase.begin[model.nq + joint])
             continue
@@ -337,7 +346,7 @@ def cross(
     """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     if phase.time - phase.series >= PROGRESS:
         phase.series = phase.time
         phase.bridges = 0
@@ -361,10 +370,11 @@ def cross(
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows
-    write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+    write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
     for dry in range(phase.dry_joint.shape[0]):
         torque = phase.impulse[phase.first_dry + dry, 1] / phase.length
         record.friction_torque[row, phase.dry_joint[dry]] = torque
+    share_friction(model, phase.breakaway, record.friction_torque[row], record.brake_torque[row])
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
     adopt_end(model, scene.ground, memory, phase)

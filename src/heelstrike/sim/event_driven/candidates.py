@@ -31,7 +31,7 @@ def known_force(
     add_pushes(model, equations.tree, pushes, force)
     for i in range(model.nu):
         force[model.actuator_joint[i]] += torque[i]
-    dry_force(phase.dry_joint, phase.slide[phase.first_dry :], model.dry_friction, force)
+    dry_force(phase.dry_joint, phase.slide[phase.first_dry :], phase.breakaway, force)
     for i in range(model.nv):
         rate[i] = force[i] - equations.bias[i]
 

@@ -44,6 +44,11 @@ from heelstrike.sim.memory import Assembly, Equations, Loops, Memory
 # How far a projection may move a state, as a multiple of the error that a step may make: the end of
 # a step, beyond which the motion has not kept its constraints, and a place on its dense output.
 EXPLAINED, INTERPOLATED = 100.0, 1e4
+# How far (m, rad) what is open may be beyond its limit to be put back on it: less is nothing, more
+# is no rounding.
+SHALLOW, DEEP = 2e-11, 1e-8
+# How far (m, rad) and how fast (m/s, rad/s) a state may be off its constraints as it is.
+PLACED, STILL = 5e-11, 1e-9
 
 
 @kernel
@@ -314,7 +319,7 @@ def hold_closed(
         impulse[2 * place + 1] = 0.0
         if phase.first_dry <= contact < phase.first_second:
             joint = phase.dry_joint[contact - phase.first_dry]
-            impulse[2 * place] = model.dry_friction[joint]
+            impulse[2 * place] = phase.breakaway[joint]
     loops = rows_of(memory.loops)
     total = count + loops
     free_loops(total, memory.loops, memory.equations.rate, 1.0, assembly)
@@ -437,37 +442,88 @@ def move_by_saddle_point(
 
 
 @kernel
+def gather_sunk(
+    count: int, model: Model, contacts: Contacts, state: Floats, phase: Phase, memory: Memory
+) -> int:
+    """Append the open contacts that are beyond the ground, or their range, by rounding.
+
+    After those that are closed, and before the loops. What reaches the ground in this instant is
+    none of them: it is the instant that is corrected. Returns how many there are.
+    """
+    assembly, sunk = memory.assembly, 0
+    for contact in range(phase.first_dry):
+        if phase.closed[contact] == 1 or phase.fired[2 * contact] == 1:
+            continue
+        if contact < model.nc and phase.passing[contact] == 1:
+            continue
+        if -DEEP < gap_now(contact, contacts, phase, state) < -SHALLOW:
+            place = count + sunk
+            gap_rows(model, memory.equations.tree, contacts, phase, contact, place, assembly)
+            assembly.candidate[place] = contact
+            sunk += 1
+    if sunk > 0:
+        total = append_loops(phase.closed.shape[0], count + sunk, memory.loops, assembly)
+        assemble_delassus(model, total, memory.equations, assembly)
+    return sunk
+
+
+@kernel
+def list_sunk(size: int, count: int, sunk: int, loops: int, phase: Phase) -> int:
+    """List the rows of what :func:`gather_sunk` found after the `size` others; return how many."""
+    for k in range(size - loops, size):  # those of the loops have been listed in their place
+        phase.row[k] += 2 * sunk
+    for place in range(count, count + sunk):
+        phase.row[size] = 2 * place
+        phase.lean[size] = 0.0
+        size += 1
+    return size
+
+
+@kernel
 def project(
     model: Model, ground: GroundModel, memory: Memory, phase: Phase, state: Floats
-) -> float:
+) -> tuple[float, float, float]:
     """Put a state back on its contact constraints, along the shortest way that the masses allow.
 
     Closed points return to the ground, sticking ones (and joints) to where they began to stick,
-    ends of loops to each other, and their velocities along these directions vanish. Returns how far
-    (m) the worst is left from its place: constraints that say the same twice need not agree.
+    ends of loops to each other, and their velocities along these directions vanish. What is open
+    and a little beyond its limit is put there, too.
+
+    Returns how far (m) the worst is left from its place - constraints that say the same twice need
+    not agree - and how far it was off, and how fast (m/s), to begin with.
     """
     q, v = state[: model.nq], state[model.nq :]
     contacts, equations, assembly = memory.contacts, memory.equations, memory.assembly
     system, row, loops = phase.system, phase.row, rows_of(memory.loops)
+    strayed, fastest = 0.0, 0.0
     for attempt in range(5):
         observe_faces(model, ground, state, phase, memory)
         weigh(model, equations)
         if loops > 0:
             find_loops(model, q, v, equations.tree, memory.loops)
         count = gather_closed(model, contacts, phase, memory.loops, equations, assembly)
-        total = count + loops
+        sunk = 0
+        if attempt < 4:
+            sunk = gather_sunk(count, model, contacts, state, phase, memory)
+        total = count + sunk + loops
         if total == 0:
-            return 0.0
+            return 0.0, strayed, 0.0
         size = list_unknowns(count, loops, assembly.candidate, memory.surface.friction, phase)
+        if sunk > 0:
+            size = list_sunk(size, count, sunk, loops, phase)
         worst = 0.0
         for i in range(size):
             error = displacement(row[i], model, equations.tree, contacts, memory, phase, state)
             system[i, size] = -error
             worst = max(worst, abs(error))
+        if attempt == 0:
+            strayed = worst
         positions = worst > 1e-14 and attempt < 4
         if not positions:
             for i in range(size):
-                system[i, size] = -row_product(assembly.jacobian, row[i], v)
+                speed = row_product(assembly.jacobian, row[i], v)
+                system[i, size] = -speed
+                fastest = max(fastest, abs(speed))
         for i in range(size):
             phase.saddle.bias[i] = -system[i, size]
         rank = solve_constraints(size, 0.0, assembly.problem.delassus, phase)
@@ -480,8 +536,18 @@ def project(
                 assembly.answer.impulse[row[i]] = phase.unknown[i]
             add_impulse(model, assembly, total, equations, q if positions else v)
         if not positions:
-            return worst
-    return math.inf
+            return worst, strayed, fastest
+    return math.inf, strayed, fastest
+
+
+@kernel
+def is_in_place(strayed: float, fastest: float) -> bool:
+    """Whether a state off its constraints by so much (m, m/s) need not be put there.
+
+    Beside a singular pose, as of straight legs that coincide, the rounding of a gap is worth a
+    large move of the joints, which nothing asks for.
+    """
+    return strayed <= PLACED and fastest <= STILL
 
 
 @kernel

@@ -104,4 +104,4 @@ def free_gap_acceleration(
     assembly.problem.free[2 * place + 1] = along_tangent
     if phase.first_dry <= contact and not is_second:
         joint = phase.dry_joint[contact - phase.first_dry]
-        assembly.problem.bound[place] = model.dry_friction[joint]
+        assembly.problem.bound[place] = phase.breakaway[joint]

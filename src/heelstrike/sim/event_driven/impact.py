@@ -37,6 +37,8 @@ ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
 
 # Velocities (m/s) up to which a point on the ground is at rest.
 REST = 1e-9
+# Velocities (m/s, rad/s) along a loop up to which it has none.
+ROUNDING = 1e-13
 # Energy counts as made when it exceeds this part of the energy that went through the contacts.
 NOTICEABLE = 1e-9
 # Bounces shorter than this (s) lose what restitution gave them, and of those shorter than this the
@@ -54,6 +56,17 @@ def heading(speed: float) -> int:
     if speed > REST:
         return 1
     return -1 if speed < -REST else 0
+
+
+@kernel
+def clear_rounding(first: int, end: int, free: Floats) -> None:
+    """Let rows of loops be at rest that are but for rounding.
+
+    Loops that say the same twice would not agree on it.
+    """
+    for place in range(first, end):
+        if abs(free[2 * place]) <= ROUNDING:
+            free[2 * place] = 0.0
 
 
 @kernel
@@ -95,6 +108,7 @@ def collide(
     find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
+    clear_rounding(count, total, free)
     assemble_delassus(model, total, equations, assembly)
     status = solve_velocities(count, model, memory, phase)
     note_residual(assembly.answer.residual, memory.tally)
@@ -123,7 +137,8 @@ def collide(
         made += work
         through += abs(work)
     for dry in range(phase.dry_joint.shape[0]):
-        phase.slide[phase.first_dry + dry] = heading(v[phase.dry_joint[dry]])
+        contact = phase.first_dry + dry
+        phase.slide[contact] = phase.closed[contact] * heading(v[phase.dry_joint[dry]])
     return status == SOLVED, made / through if through > 0.0 else 0.0
 
 

@@ -7,6 +7,8 @@ limit of a sticking one.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from heelstrike.compiler.compilation import kernel
@@ -21,7 +23,13 @@ from heelstrike.sim.event_driven.dormand_prince import (
     interpolate,
     stage_point,
 )
-from heelstrike.sim.event_driven.dynamics import EXPLAINED, evaluate, explained, look, project
+from heelstrike.sim.event_driven.dynamics import (
+    EXPLAINED,
+    evaluate,
+    explained,
+    look,
+    project,
+)
 from heelstrike.sim.event_driven.faces import has_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
@@ -49,9 +57,11 @@ NEAR_ENOUGH = 0.1
 # How often a step is looked through for its first event.
 ATTEMPTS = 3
 # Where a point that has just left the ground is looked for: at this part of the way to the first
-# sample, and so on, until that is less than this (s).
+# sample, and so on, until that is less than this (s); and one that rises no further from it than
+# this (m), until that is less than this (s).
 EARLIER = 0.25
 SOONEST = 1e-8
+LOW, SOON = 1e-5, 1e-6
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
@@ -147,12 +157,12 @@ def find_root(
     """Fraction of the step at which an event function first changes sign, or turns round.
 
     In the bracket (low, its value, high, its value) it is positive at `low` and negative at `high`;
-    with `turn` not zero these are `turn` times its rate. Regula falsi that halves the interval
-    every third time. An event function that is zero at `low`, where its phase begins, is first
-    followed back from `high` to where it is positive.
+    with `turn` not zero these are `turn` times its rate, which takes forces if it is that of a
+    speed. Regula falsi that halves the interval every third time. An event function that is zero at
+    `low`, where its phase begins, is first followed back from `high` to where it is positive.
     """
     low, low_value, high, high_value = bracket
-    forces = not is_geometric(function, phase)
+    forces = (function % 2 == 1 and turn != 0.0) or not is_geometric(function, phase)
     width = EVENT_TIME / length
     going_back = low_value <= 0.0
     for attempt in range(200):
@@ -176,10 +186,57 @@ def find_root(
 
 @kernel
 def just_left(function: int, phase: Phase) -> bool:
-    """Whether it is the gap of an open contact that is still on the ground."""
+    """Whether it is the gap of an open contact still on the ground, or rising close above it."""
     contact = function // 2
-    is_gap = contact < phase.watched and function % 2 == 0
-    return bool(is_gap and phase.closed[contact] == 0 and phase.before[function] <= TOGETHER)
+    if contact >= phase.watched or function % 2 == 1 or phase.closed[contact] == 1:
+        return False
+    rises = phase.before_rate[function] >= 0.0
+    return bool(phase.before[function] <= (LOW if rises else TOGETHER))
+
+
+@kernel
+def is_sliding_speed(function: int, phase: Phase) -> bool:
+    """Whether it is the speed of what slides, whose rate is known."""
+    contact = function // 2
+    if contact >= phase.watched or function % 2 == 0 or phase.slide[contact] == 0:
+        return False
+    return bool(phase.group[contact] == contact)
+
+
+@kernel
+def may_dip(function: int, span: float, phase: Phase) -> bool:
+    """Whether a function that falls at one sample and rises at the next may vanish between them.
+
+    A convex one is nowhere below both tangents; it is given twice that depth.
+    """
+    before, rate = phase.before[function], phase.before_rate[function]
+    value, later_rate = phase.sample[function], phase.sample_rate[function]
+    where = (before - value + later_rate * span) / (later_rate - rate)
+    if not 0.0 <= where <= span:
+        return True
+    return bool(2.0 * (before + rate * where) <= min(before, value))
+
+
+@kernel
+def lowest_place(before: float, rate: float, value: float, later_rate: float) -> float:
+    """Fraction of an interval at which the cubic through values and rates is lowest, if below zero.
+
+    Rates are per interval. Returns ``NO_EVENT`` where it stays above zero.
+    """
+    down = max(-rate, 0.0) + max(later_rate, 0.0)
+    if min(before, value) > 0.15 * down:  # 4/27 is the most that a rate takes away
+        return NO_EVENT
+    third = rate + later_rate - 2.0 * (value - before)
+    second = value - before - rate - third
+    root = second * second - 3.0 * third * rate
+    if not root > 0.0 or (second <= 0.0 and third <= 0.0):
+        return NO_EVENT
+    root = math.sqrt(root)
+    part = -rate / (second + root) if second > 0.0 else (root - second) / (3.0 * third)
+    if not 0.0 < part < 1.0:
+        return NO_EVENT
+    lowest = before + part * (rate + part * (second + part * third))
+    return part if lowest < -TOGETHER else NO_EVENT
 
 
 @kernel
@@ -197,8 +254,12 @@ def crossing(
     rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
     is_gap = function < 2 * phase.watched
     is_gap = is_gap and function % 2 == 0 and phase.closed[function // 2] == 0
-    if is_gap and rate < 0.0 and later_rate > 0.0 and value >= 0.0:
-        # An open point came down and went up again: how close was it?
+    dips = rate < 0.0 and later_rate > 0.0 and value >= 0.0
+    if dips and not is_gap:
+        span = length * (high - low)
+        dips = is_sliding_speed(function, phase) and may_dip(function, span, phase)
+    if dips:
+        # An open point came down and went up again, or what slides was slower: how near to zero?
         bracket = low, -rate, high, -later_rate
         end = find_root(scene, function, -1.0, bracket, length, control, memory, phase)
         value = phase.value[function]
@@ -206,6 +267,14 @@ def crossing(
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
         least = phase.absolute + phase.relative
+    if is_gap and value >= -least:
+        # It may have been lower in between, and be on its way up at both ends.
+        span = (high - low) * length
+        dip = lowest_place(before, span * rate, value, span * later_rate)
+        if dip < NO_EVENT:
+            end = low + dip * (high - low)
+            evaluate_within(scene, end, length, False, control, memory, phase)
+            value = phase.value[function]
     # What is below zero from the beginning tells nothing new until it falls further.
     if not value < -least - max(-before, 0.0):
         return NO_EVENT
@@ -230,9 +299,10 @@ def early_crossing(
     but on a scale of its own: it is looked for at ever smaller parts of the way there.
     """
     value, rate = phase.sample[function], phase.sample_rate[function]
+    soonest = SOONEST if phase.before[function] <= TOGETHER else SOON
     root = NO_EVENT
     part = high
-    while root == NO_EVENT and part * length > SOONEST:
+    while root == NO_EVENT and part * length > soonest:
         part *= EARLIER
         evaluate_within(scene, part, length, False, control, memory, phase)
         phase.sample[function] = phase.value[function]
@@ -256,7 +326,7 @@ def first_event(
     functions = 2 * phase.watched
     if has_corners(scene.ground):
         functions += scene.model.nc
-    together = EVENT_TIME / length
+    together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
     low = 0.0
     for k in range(1, SAMPLES + 1):
         high = k / SAMPLES
@@ -313,7 +383,7 @@ def settle(scene: Scene, memory: Memory, phase: Phase) -> bool:
     end, before = phase.end, phase.trial
     for i in range(end.shape[0]):
         before[i] = end[i]
-    left = project(scene.model, scene.ground, memory, phase, end)
+    left, _, _ = project(scene.model, scene.ground, memory, phase, end)
     return left <= max(TOGETHER, 2.0 * phase.left) and explained(before, end, EXPLAINED, phase)
 
 

@@ -26,7 +26,7 @@ from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind
-from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import awaits_hold, note_brakes, stops_any, take_hold
 from heelstrike.sim.contacts.faces import NO_FACE, locate_on_face, take_surface
 from heelstrike.sim.contacts.geometry import evaluate_equations
 from heelstrike.sim.contacts.latches import react
@@ -35,7 +35,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
 from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
-from heelstrike.sim.event_driven.dynamics import evaluate, project
+from heelstrike.sim.event_driven.dynamics import evaluate, is_in_place, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
     is_at_second,
@@ -49,7 +49,13 @@ from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, h
 from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
-from heelstrike.sim.event_driven.rows import ROWS_OF_AN_INSTANT, write_row, write_rows_within
+from heelstrike.sim.event_driven.rows import (
+    NO_ROOM,
+    ROWS_OF_AN_INSTANT,
+    TOO_FAR,
+    write_row,
+    write_rows_within,
+)
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import DIVERGED, DONE, FORK, RECORD_FULL, SOLVER_FAILED, Kernels, Scene
 from heelstrike.sim.memory import Assembly, Memory, Reported, Surface, contact_capacity
@@ -87,7 +93,7 @@ SHORT_STEP = 1e-6
 SHARE_OF_A_STEP = 0.2
 
 # How far the first projection of a phase may move coordinates and velocities (m, rad, m/s, rad/s;
-# of large ones, this part): at the start of a run, later, and how much further after a bridge, for
+# of large ones, this part): at the start of a run, later, and how much faster after a bridge, for
 # each second of its length, up to a longest. Impacts and events leave nothing to be projected.
 FITTING = 1e-4
 UNSEEN = 1e-6
@@ -100,6 +106,8 @@ FIRST_LOOK = 1e-9
 LAST_LOOK = 1e-4
 CLEARLY = 1e-7
 LOOKS = 24
+# Forces that are so far beyond a limit, as a fraction of the weight, when a phase begins, are none.
+CONTRADICTION = 1e-3
 
 # Places in the life of a simulation: the first contact modes are being decided; they have been.
 BEGUN = 1
@@ -366,20 +374,23 @@ def begin_phase(
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
         before[i] = begin[i]
-    phase.left = project(model, ground, memory, phase, begin)
+    phase.left, strayed, fastest = project(model, ground, memory, phase, begin)
     closest, slip = (ON_THE_GROUND, FITTING) if phase.started == BEGUN else (TOUCHING, UNSEEN)
+    quick = slip
     if phase.bridge_end == phase.time:
-        slip += BRIDGED * min(phase.length, LONG_BRIDGE)
+        quick += BRIDGED * min(phase.length, LONG_BRIDGE)
     fits = phase.left <= closest
     for i in range(begin.shape[0]):
-        fits = fits and abs(begin[i] - before[i]) <= slip * (1.0 + abs(before[i]))
+        most = slip if i < model.nq else quick
+        fits = fits and abs(begin[i] - before[i]) <= most * (1.0 + abs(before[i]))
+    if not fits:
+        for i in range(begin.shape[0]):
+            begin[i] = before[i]
+        fits = is_in_place(strayed, fastest)
     if fits:
         first = record.events
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)
         react(model, first, begin[: model.nq], record, memory.loops)
-    else:
-        for i in range(begin.shape[0]):
-            begin[i] = before[i]
     return fits
 
 
@@ -422,6 +433,9 @@ def decide_modes(
         if not jammed:
             return begin_phase(model, scene.ground, count, memory, phase, record)
         jammed = False
+        if phase.last_row < phase.time:
+            write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[1])
         if not jump(model, memory, phase, record):
             return False
     return False
@@ -443,13 +457,26 @@ def behind(contact: int, direction: float, contacts: Contacts, phase: Phase) -> 
 
 
 @kernel
-def begin_dry_joints(v: Floats, phase: Phase, reported: Reported) -> None:
-    """Let joints with dry friction begin as they move."""
+def rubs_otherwise(breakaway: Floats, phase: Phase) -> bool:
+    """Whether a joint has other dry friction from now on."""
+    found = False
+    for joint in phase.dry_joint:
+        found = found or phase.breakaway[joint] != breakaway[joint]
+    return found
+
+
+@kernel
+def begin_rubbing(v: Floats, breakaway: Floats, phase: Phase, reported: Reported) -> None:
+    """Let joints with dry friction begin as they move, and those with none any more be free."""
     for dry in range(phase.dry_joint.shape[0]):
-        contact = phase.first_dry + dry
-        phase.slide[contact] = heading(v[phase.dry_joint[dry]])
-        reported.closed[contact] = 1
-        reported.slipping[contact] = phase.slide[contact]
+        contact, joint = phase.first_dry + dry, phase.dry_joint[dry]
+        phase.breakaway[joint] = breakaway[joint]
+        rubs = 1 if breakaway[joint] > 0.0 else 0
+        if phase.closed[contact] != rubs:
+            phase.closed[contact] = rubs
+            phase.slide[contact] = rubs * heading(v[joint])
+            reported.closed[contact] = rubs
+            reported.slipping[contact] = phase.slide[contact]
 
 
 @kernel
@@ -470,6 +497,15 @@ def turns_over(
         take_surface(model, ground, contact, contact, face, surface)
         phase.closed[contact] = 0
     return True
+
+
+@kernel
+def touches_at_start(model: Model, contact: int, gap: float, phase: Phase) -> bool:
+    """Whether an open contact is on its limit when the run begins, and may not pass below it."""
+    phase.group[contact] = contact
+    if contact < model.nc and gap < -ON_THE_GROUND:
+        phase.passing[contact] = phase.let_pass
+    return bool(gap <= ON_THE_GROUND and phase.passing[contact] == 0)
 
 
 @kernel
@@ -508,13 +544,12 @@ def find_what_happened(
             elif first or second:
                 forced = True
             continue
+        if phase.first_dry <= contact < phase.first_second:
+            continue
         gap = gap_now(contact, contacts, phase, phase.begin)
         normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
         if starting:
-            phase.group[contact] = contact
-            if contact < model.nc and gap < -ON_THE_GROUND:
-                phase.passing[contact] = phase.let_pass
-            first = gap <= ON_THE_GROUND and normal <= rest and phase.passing[contact] == 0
+            first = touches_at_start(model, contact, gap, phase) and normal <= rest
         may_pass = first and not starting and contact < model.nc
         if turns:
             first = normal <= rest
@@ -527,6 +562,7 @@ def find_what_happened(
             impact = True
         elif first and normal <= rest:
             phase.closed[contact] = 1
+            phase.hit[contact] = UNPRESSED
             phase.slide[contact] = 0
             if abs(tangent) > rest:
                 phase.slide[contact] = 1 if tangent > 0.0 else -1
@@ -652,7 +688,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     for i in range(model.nv):
         phase.begin[i] = q[i]
         phase.begin[model.nq + i] = v[i]
-    begin_dry_joints(v, phase, memory.reported)
+    begin_rubbing(v, memory.breakaway, phase, memory.reported)
     evaluate_equations(model, q, v, equations)
     locate(model, ground, equations.tree, phase, memory.contacts, memory.surface)
     code = meet_event(True, model, ground, memory, phase, record)
@@ -671,17 +707,41 @@ def prepare(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> 
 
 @kernel
 def brake(scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record) -> None:
-    """Let the brakes that have been put on take hold, by an impact of all that touches."""
+    """Let the brakes that have been put on take hold, by an impact of all that touches.
+
+    Those that slip begin to, and end.
+    """
     model = scene.model
     if phase.last_row < phase.time:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
-    take_hold(memory.loops)
-    evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
-    for contact in range(phase.closed.shape[0]):
-        phase.hit[contact] = 0
-    if not strike(model, scene.ground, memory, phase, record):
-        phase.bridging = 1
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
+    begin_rubbing(phase.begin[model.nq :], memory.breakaway, phase, memory.reported)
+    stops = take_hold(model, memory.loops)
+    # Of joints at rest there is no impact to solve: its data would be rounding.
+    if stops and stops_any(model, phase.begin[model.nq :], REST, memory.loops):
+        evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+        for contact in range(phase.closed.shape[0]):
+            phase.hit[contact] = 0
+        if not strike(model, scene.ground, memory, phase, record):
+            phase.bridging = 1
     note_brakes(model, phase.time, 1.0, record, memory.loops)
+
+
+@kernel
+def contradicts_itself(phase: Phase) -> bool:
+    """Whether forces of the phase that begins are far beyond limits at once.
+
+    At a pole of the forces, before which they grow without bound, the modes of a moment later may
+    be none of now. An event function that is negative from the beginning would not end the phase.
+    """
+    if phase.deficient == 1:
+        return False
+    least = -CONTRADICTION * phase.weight
+    for contact in range(phase.watched):
+        if phase.carrier[contact] == 1 and phase.value[2 * contact] < least:
+            return True
+        if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < least:
+            return True
+    return False
 
 
 @kernel
@@ -695,7 +755,7 @@ def decide(
         change = abs(memory.torque[i] - phase.torque[i])
         jumped = jumped or change > JUMP * (1.0 + abs(memory.torque[i]))
         phase.torque[i] = memory.torque[i]
-    if awaits_hold(memory.loops):
+    if awaits_hold(memory.loops) or rubs_otherwise(memory.breakaway, phase):
         brake(scene, control, memory, phase, record)
     phase.at_event = phase.undecided
     open_modes = phase.at_event == 1 or jumped
@@ -709,6 +769,11 @@ def decide(
     phase.forced = 0
     phase.jammed = 0
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
+    if open_modes and contradicts_itself(phase):
+        phase.bridging = 1
+        phase.at_event = 0
+        phase.undecided = 1
+        return DONE
     if phase.at_event == 1:
         show_forces(phase.force, phase, memory.contacts)
     return DONE
@@ -722,7 +787,7 @@ def report(
     every_step = phase.output_period == 0.0 and memory.tally.steps % phase.row_every == 0
     last = (clock.finishing == 1 or every_step) and phase.last_row < phase.time
     if phase.at_event == 1 or last:
-        write_row(scene, phase.time, phase.begin, control, memory, phase, record)
+        write_row(scene, phase.time, phase.begin, True, control, memory, phase, record)
 
 
 @kernel
@@ -761,6 +826,7 @@ def move_over(
     phase.burst = 0
     phase.allowance = EVENTS_A_BRIDGE
     phase.next_length = 1e-6
+    write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     meet_event(False, scene.model, scene.ground, memory, phase, record)
     show_state(scene.model, phase, memory)
@@ -798,8 +864,12 @@ def move(
                 phase.bridging = 1
             phase.next_length = 1e-6
             return DONE
-    if not write_rows_within(scene, control, memory, phase, record):
+    written = write_rows_within(scene, control, memory, phase, record)
+    if written == NO_ROOM:
         return RECORD_FULL
+    if written == TOO_FAR:  # the step is taken again, to end there
+        phase.finished = 0
+        return DONE
     end_step(model, clock, memory, phase, record)
     clock.time = phase.time
     if phase.has_fired == 1:

@@ -60,7 +60,7 @@ def form_groups(
         if model.nc <= contact < phase.first_dry:
             phase.carrier[contact] = phase.closed[contact]
         elif phase.first_dry <= contact < phase.first_second:
-            sticks = 1 if phase.slide[contact] == 0 else 0
+            sticks = 1 if phase.closed[contact] == 1 and phase.slide[contact] == 0 else 0
             phase.holder[contact] = sticks
             if sticks == 1 and phase.stuck[contact] == 0:
                 joint = phase.dry_joint[contact - phase.first_dry]
@@ -185,7 +185,7 @@ def report_modes(
         if contact >= phase.first_second:
             pass  # its point is on the ground with the first face
         elif contact >= phase.first_dry:
-            if now != before:
+            if now != before and closed[contact] == 1:
                 kind = JOINT_STICK if now == 0 else JOINT_SLIP
                 joint = phase.dry_joint[contact - phase.first_dry]
                 log_event(time, kind, joint, 0.0, 0.0, record)

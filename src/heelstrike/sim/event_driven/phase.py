@@ -11,7 +11,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.sim.contacts.faces import NO_FACE
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.dormand_prince import DENSE_ROWS, SLOPES
-from heelstrike.sim.memory import contact_capacity
+from heelstrike.sim.memory import contact_capacity, dry_joints
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -63,7 +63,8 @@ class Phase(Bundle):
     carry normal force, and one tangential force stands for all. Joint stops are numbered on from
     the contact points, joints with dry friction from these; in the shapes below nc counts all. A
     dry joint is always closed, on a contact of its own
-    (:mod:`heelstrike.sim.contacts.dry_friction`).
+    (:mod:`heelstrike.sim.contacts.dry_friction`), but for one that has friction of a brake alone
+    (:mod:`heelstrike.sim.contacts.brakes`), which opens and closes with it.
 
     After all these come the second faces of the contact points, one each: contacts of their own
     on ground with concave corners, and none elsewhere.
@@ -80,7 +81,9 @@ class Phase(Bundle):
     stop_side, stop_limit : (ns,) float
         Joint of each stop; 1 for a lower, -1 for an upper end of its range; that end.
     dry_joint : (nd,) int
-        Joints with dry friction.
+        Joints that may have dry friction.
+    breakaway : (nv,) float
+        The most that it is of each joint in this phase.
     latch_stop : (latches,) int
         The stop that each latch is, as contacts are numbered here.
     order : (3,) int
@@ -188,6 +191,7 @@ class Phase(Bundle):
     stop_side: Floats = array("ns")
     stop_limit: Floats = array("ns")
     dry_joint: Integers = array("nd", of=int)
+    breakaway: Floats = array("nv")
     latch_stop: Integers = array("latches", of=int)
     order: Integers = array(3, of=int)
     closed: Integers = array("contacts", of=int)
@@ -270,7 +274,7 @@ def allocate_phase(robot: Robot) -> Phase:
     mass, gravity = float(sum(model.mass)), np.sqrt(np.sum(model.gravity**2))
     lower = np.flatnonzero(np.isfinite(model.lower))
     upper = np.flatnonzero(np.isfinite(model.upper))
-    dry = np.flatnonzero(model.dry_friction > 0.0)
+    dry = dry_joints(model)
     firsts, loops = contact_capacity(robot), most_rows(model)
     contacts = firsts + robot.nc
     forces = 2 * contacts + loops
@@ -286,7 +290,7 @@ def allocate_phase(robot: Robot) -> Phase:
         stop_joint=np.concatenate((lower, upper)).astype(np.int64),
         stop_side=np.concatenate((np.ones(len(lower)), -np.ones(len(upper)))),
         stop_limit=np.concatenate((model.lower[lower], model.upper[upper])),
-        dry_joint=dry.astype(np.int64),
+        dry_joint=dry,
         latch_stop=np.array(
             [
                 robot.nc
@@ -299,7 +303,6 @@ def allocate_phase(robot: Robot) -> Phase:
             ],
             dtype=np.int64,
         ),
-        closed=np.repeat([0, 1, 0], [firsts - len(dry), len(dry), robot.nc]),
         last_impact=np.full(contacts, -np.inf),
         accumulation=np.full(contacts, np.inf),
         value=np.ones(2 * contacts + robot.nc), face=np.full(contacts, NO_FACE),

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.brakes import share_friction
 from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
-from heelstrike.sim.event_driven.dynamics import INTERPOLATED, evaluate, explained, project
+from heelstrike.sim.event_driven.dynamics import (
+    INTERPOLATED,
+    evaluate,
+    explained,
+    is_in_place,
+    project,
+)
+from heelstrike.sim.event_driven.location import TOGETHER
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
@@ -20,6 +28,10 @@ from heelstrike.sim.record.recording import note_residual, note_row
 
 # Rows that an instant may add: one due before it, two of an event, one at the end.
 ROWS_OF_AN_INSTANT = 4
+# What came of writing the rows within a step.
+WRITTEN, NO_ROOM, TOO_FAR = 0, 1, 2
+# Part of a step from which on a row is at its end.
+AT_ITS_END = 0.999
 
 
 @kernel
@@ -37,24 +49,50 @@ def note_state(model: Model, row: int, state: Floats, record: Record) -> None:
 
 
 @kernel
-def write_row(
-    scene: Scene, time: float, state: Floats, control: Control, memory: Memory, phase: Phase,
-    record: Record,
-) -> None:  # fmt: skip
-    """Append a state, put on its constraints, with the certified contact forces in it."""
-    model, contacts, assembly = scene.model, memory.contacts, memory.assembly
-    trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
+def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool:
+    """Write a state that is to become a row, put on its constraints, to ``phase.trial``.
+
+    Returns whether the error of the dense output explains how far it is moved. If not it stays.
+    """
+    trial = phase.trial
     for i in range(state.shape[0]):
         trial[i] = state[i]
-    project(model, scene.ground, memory, phase, trial)
-    if not explained(state, trial, INTERPOLATED, phase):
-        for i in range(state.shape[0]):
-            trial[i] = state[i]
+    _, strayed, fastest = project(scene.model, scene.ground, memory, phase, trial)
+    if explained(state, trial, INTERPOLATED, phase):
+        return True
+    for i in range(state.shape[0]):
+        trial[i] = state[i]
+    return is_in_place(strayed, fastest)
+
+
+@kernel
+def write_row(
+    scene: Scene, time: float, state: Floats, lawful: bool, control: Control, memory: Memory,
+    phase: Phase, record: Record,
+) -> None:  # fmt: skip
+    """Append a state, put on its constraints, with the certified contact forces in it.
+
+    Where no contact forces obey the laws there are none in the row.
+    """
+    put_right(scene, state, memory, phase)
+    write_right(scene, time, lawful, control, memory, phase, record)
+
+
+@kernel
+def write_right(
+    scene: Scene, time: float, lawful: bool, control: Control, memory: Memory, phase: Phase,
+    record: Record,
+) -> None:  # fmt: skip
+    """Append the state in ``phase.trial``, as :func:`write_row` does."""
+    model, contacts, assembly = scene.model, memory.contacts, memory.assembly
+    trial, residual, impulse = phase.trial, assembly.answer.residual, assembly.answer.impulse
     evaluate(scene, time, trial, control, memory, phase, phase.slopes[SLOPES - 1])
     for k in range(3):
         residual[k] = 0.0
     count, loops = phase.closed_count, rows_of(memory.loops)
-    if count + loops > 0:
+    if not lawful:
+        count = 0
+    elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
         note_loops(model, count + loops, impulse, memory.loops)
@@ -62,7 +100,7 @@ def write_row(
     note_row(time, memory, record)
     note_state(model, row, trial, record)
     slide = phase.slide[phase.first_dry :]
-    dry_force(phase.dry_joint, slide, model.dry_friction, friction_torque)
+    dry_force(phase.dry_joint, slide, phase.breakaway, friction_torque)
     deepest = memory.tally.penetration
     for contact in range(model.nc):
         if phase.passing[contact] == 0:
@@ -87,6 +125,7 @@ def write_row(
             _, record.slip_velocity[row, contact] = contact_velocity(
                 model, memory.equations.tree, contacts, contact
             )
+    share_friction(model, phase.breakaway, friction_torque, record.brake_torque[row])
     for second in range(phase.first_second, phase.watched):
         record_corner(row, second - phase.first_second, model, memory, phase, record)
     phase.last_row = time
@@ -96,20 +135,34 @@ def write_row(
 
 
 @kernel
+def comes_down(contact: int, phase: Phase) -> bool:
+    """Whether an open contact reaches its limit at the end of the step, or is hit with others.
+
+    What the end looked like is kept: the rows of the step may be written in parts.
+    """
+    near = phase.end_value[2 * contact] <= 2.0 * TOGETHER and phase.end_rate[2 * contact] < 0.0
+    return bool(phase.fired[2 * contact] == 1 or near)
+
+
+@kernel
 def write_rows_within(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
-) -> bool:
-    """Append the rows due within the finished step; return whether there was room for all.
+) -> int:
+    """Append the rows due within the finished step; return whether all, or what is in the way.
 
-    An event at its end has rows of its own, one before it if velocities or normals may jump.
+    An event at its end has rows of its own, one before it if velocities or normals may jump. Where
+    the dense output is too far from the constraints, as beside a singular pose, the step has to end
+    at the row: nothing but integration finds the state there. Rows before it are taken back, since
+    the shorter step may meet an event that the longer one has passed.
     """
     period = phase.output_period * phase.row_every
     last = phase.time + phase.length
+    first, next_row, last_row = record.rows, phase.next_row, phase.last_row
     touch = False
     if phase.has_fired == 1:
         last -= 1e-12
         for contact in range(phase.watched):
-            touch = touch or (phase.closed[contact] == 0 and phase.fired[2 * contact] == 1)
+            touch = touch or (phase.closed[contact] == 0 and comes_down(contact, phase))
         for corner in range(2 * phase.watched, 2 * phase.watched + scene.model.nc):
             touch = touch or phase.fired[corner] == 1
     state = phase.slopes[SLOPES - 1]
@@ -118,7 +171,7 @@ def write_rows_within(
         part = (time - phase.time) / phase.length
         if not (period > 0.0 and time <= last):
             if not touch:
-                return True
+                return WRITTEN
             touch = False
             time = phase.time + phase.length
             part = 1.0
@@ -126,10 +179,15 @@ def write_rows_within(
                 meets = phase.closed[second] == 0 and phase.fired[2 * second] == 1
                 phase.meets[second - phase.first_second] = 1 if meets else 0
         if record.rows + ROWS_OF_AN_INSTANT > record.time.shape[0]:
-            return False
+            return NO_ROOM
         if part < 1.0:
             interpolate(part, phase.begin, phase.dense, state)
         else:  # the end has been put on its constraints, and on the event
             for i in range(state.shape[0]):
                 state[i] = phase.end[i]
-        write_row(scene, time, state, control, memory, phase, record)
+        fits = put_right(scene, state, memory, phase)
+        if not fits and part < AT_ITS_END and not last_row > phase.time:
+            phase.next_length = time - phase.time
+            record.rows, phase.next_row, phase.last_row = first, next_row, last_row
+            return TOO_FAR
+        write_right(scene, time, True, control, memory, phase, record)

@@ -176,7 +176,9 @@ def _check(robot: Robot) -> None:
     }
     for name, number in NUMBERS.items():
         values = np.asarray(getattr(model, name))
-        if name in SCALES and not np.all((values >= number.least) & (values <= number.most)):
+        if name in (*SCALES, "brake_limit") and not np.all(
+            (values >= number.least) & (values <= number.most)
+        ):
             raise DamageError(f"{name} must be {bounds(name)}")
         if number.points:
             high = model.extents[number.points]

@@ -88,6 +88,8 @@ def note_events(model: Model, time: float, step: float, memory: Memory, record: 
             note_stop(model, time, step, joint, memory, record)
     for dry in range(memory.dry_joint.shape[0]):
         joint = memory.dry_joint[dry]
+        if memory.breakaway[joint] == 0.0:
+            continue
         rests = abs(memory.next_v[joint]) <= SLIP_SPEED
         if memory.reported.resting[dry] == -1:
             memory.reported.resting[dry] = 1 if abs(memory.v[joint]) <= SLIP_SPEED else 0

@@ -45,7 +45,7 @@ from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
-from heelstrike.sim.contacts.brakes import note_brakes, take_hold
+from heelstrike.sim.contacts.brakes import note_brakes, share_friction, take_hold
 from heelstrike.sim.contacts.dry_friction import select_dry_joints
 from heelstrike.sim.contacts.geometry import (
     add_impulse,
@@ -272,7 +272,7 @@ def find_loops_of_step(model: Model, memory: Memory) -> None:
     could not meet it.
     """
     loops = memory.loops
-    stops = take_hold(loops)
+    stops = take_hold(model, loops)
     find_loops(model, memory.q, memory.v, memory.equations.tree, loops)
     for row in range(loops.rows.bias.shape[0] if stops else 0):
         loops.rows.bias[row] = 0.0
@@ -671,8 +671,13 @@ def push_all(
 
 
 @dissolved_kernel
-def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory: Memory) -> bool:
-    """Find the impulses of the candidates and add what they do to the velocity; return success."""
+def solve_candidates(
+    model: Model, near: int, joints: int, count: int, work: Stepping, memory: Memory
+) -> bool:
+    """Find the impulses of the candidates and add what they do to the velocity; return success.
+
+    Points are the first `near` of `count`, points and stops the first `joints`.
+    """
     assembly, contacts, dry_joint = memory.assembly, memory.contacts, memory.dry_joint
     equations, usual, problem = memory.equations, memory.usual, memory.assembly.problem
     impact, step = work.impact, work.step
@@ -680,14 +685,12 @@ def solve_candidates(model: Model, near: int, count: int, work: Stepping, memory
     straight = corners == 0 and are_usual(assembly.candidate, near, DELASSUS, usual)
     if straight:
         gather_delassus(model, contacts, dry_joint, near, count, equations, usual, assembly)
-        joints = count - rows_of(memory.loops)
-        for place in range(joints, count):
-            add_loop(model, near, joints, place, memory)
+        loops = count - rows_of(memory.loops)
+        for place in range(loops, count):
+            add_loop(model, near, loops, place, memory)
         if near == count == usual.usual_points.shape[0]:
             problem = usual.usual_problem
     else:
-        rows_there = dry_joint.shape[0] + corners + rows_of(memory.loops)
-        joints = count - rows_there
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
@@ -785,7 +788,7 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
     again = True
     solved = True
-    near = count = 0
+    near = joints = count = 0
     impact.relaxed = 0
     while again:
         free_velocity(model, work, time, memory)
@@ -794,10 +797,11 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
         count = select_stops(model, work, near, memory)
-        count = hold_latched(model, count, memory)
+        joints = count = hold_latched(model, count, memory)
         count = select_dry_joints(
-            model, work.step, count, memory.dry_joint, reaction.dry_mode, memory.next_v, assembly
-        )
+            model, work.step, count, memory.dry_joint, memory.breakaway, reaction.dry_mode,
+            memory.next_v, assembly,
+        )  # fmt: skip
         impact.corner.count = 0
         if impact.corner.near > 0:
             count = select_corners(model, count, work, memory)
@@ -807,7 +811,7 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         if impact.relaxed == 1:
             close_gaps(model, work.step, count, impact, memory)
         if count > 0:
-            solved = solve_candidates(model, near, count, work, memory)
+            solved = solve_candidates(model, near, joints, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
         if not is_linearised(work.scheme):
             again = False
@@ -881,6 +885,9 @@ def decide(
     first = record.events
     note_events(model, clock.time, work.step, memory, record)
     react(model, first, memory.q, record, memory.loops)
+    share_friction(
+        model, memory.breakaway, memory.reaction.friction_torque, memory.loops.brake_force
+    )
     note_brakes(model, clock.time, work.step, record, memory.loops)
     return DONE if solved else SOLVER_FAILED
 

@@ -107,8 +107,8 @@ class Plot:
 
 
 def plots(run: Run, gait: Gait | None, rows: Rows, zmp: ZeroMomentPoint) -> list[Plot]:
-    """Make the panels of a run: joints, torques, zero moment point, forces, friction, energy."""
-    found = [*_joints(run, gait, rows), *_torques(run, rows)]
+    """Make the panels of a run: joints, torques, brakes, feet, energy."""
+    found = [*_joints(run, gait, rows), *_torques(run, rows), *_brakes(run, rows)]
     if run.robot.feet:
         found += [_pressure(run, rows, zmp), *_forces(run, rows), _friction(run, rows)]
     return [*found, *_energy(run, rows)]
@@ -165,6 +165,37 @@ def _torques(run: Run, rows: Rows) -> list[Plot]:
                 traces,
                 [("limit", level) for level in limits],
                 span=_usual_span(run, run.torque[:, several], limits),
+                steps=True,
+                note=_limits_in_words(limits, unit),
+                group="joint torques",
+            )
+        )
+    return found
+
+
+def _brakes(run: Run, rows: Rows) -> list[Plot]:
+    """What brakes do to their joints, with the limits of those that slip."""
+    robot, model = run.robot, run.robot.model
+    leg = legs(robot)
+    found = []
+    for name, several in _alike(robot.brake_names, np.arange(model.brakes)).items():
+        unit = "N m" if model.axis[model.brake_joint[several[0]], 0] != 0.0 else "N"
+        ends = {float(model.brake_limit[k]) for k in several if np.isfinite(model.brake_limit[k])}
+        limits = sorted({sign * end for end in ends for sign in (-1.0, 1.0)})
+        traces = [
+            Trace(
+                run.brake_torque[rows, k], in_words(robot.brake_names[k]),
+                int(leg[model.brake_joint[k]]), place,
+            )
+            for place, k in enumerate(several)
+        ]  # fmt: skip
+        found.append(
+            Plot(
+                f"{name} brake",
+                unit,
+                traces,
+                [("slips", level) for level in limits],
+                span=_usual_span(run, run.brake_torque[:, several], limits),
                 steps=True,
                 note=_limits_in_words(limits, unit),
                 group="joint torques",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
@@ -44,8 +45,9 @@ def mjcf(robot: Robot) -> Element:
         name = f"{LATCH}:{robot.joint_names[joint]}"
         name += f":{body_name[release]}" if release >= 0 else ""
         SubElement(holder, "numeric", name=name, data=str(side))
-    for name in robot.brake_names:
-        SubElement(holder, "numeric", name=f"{BRAKE}:{name}", data="1")
+    for name, limit in zip(robot.brake_names, model.brake_limit, strict=True):
+        data = "1" if math.isinf(limit) else f"1 {number(limit)}"
+        SubElement(holder, "numeric", name=f"{BRAKE}:{name}", data=data)
     for name in SCALES:
         for point_name, value in zip(_geom_names(robot), getattr(model, name), strict=True):
             if value != NUMBERS[name].default:

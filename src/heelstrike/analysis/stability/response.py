@@ -1,0 +1,296 @@
+"""What any disturbance does to any closed loop, by differences, for its gait sensitivity norm.
+
+As :func:`~heelstrike.floquet_multipliers` measures errors that are there in the middle of a step,
+a walk is disturbed here by what happens from then on, for one return: a push, another ground, other
+parameters of the controller. Errors x across the walk and indicators g then obey
+
+    x⁺ = A x + B e,   g = C x + D e
+
+with disturbances e, from return to return.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.analysis.stability.across import Across
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
+from heelstrike.analysis.stability.returns import returned, stays_early
+from heelstrike.analysis.stability.section import Section
+from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import EventKind
+from heelstrike.sim.controller.interface import Controller
+from heelstrike.sim.method import Method
+from heelstrike.sim.run import Run
+from heelstrike.sim.simulation import Simulation
+from heelstrike.sim.snapshot import Snapshot
+from heelstrike.sim.whole_run import whole
+
+Floats = NDArray[np.float64]
+ROWS = 10
+"""Steps of the method between two rows of a return that an indicator is told from."""
+
+Disturb = Callable[[Simulation, float], None]
+Indicator = Callable[[Run], ArrayLike]
+
+
+def step_duration(run: Run) -> float:
+    """Seconds from the first touchdown of a return to the last, of a robot on two legs: a step.
+
+    Parameters
+    ----------
+    run : Run
+        From the middle of a step to the middle of the same foot's next.
+
+    Returns
+    -------
+    float
+        In s.
+
+    Raises
+    ------
+    LimitCycleError
+        If there are no two touchdowns.
+    """
+    down = [event.time for event in run.events if event.kind is EventKind.TOUCHDOWN]
+    if len(down) < 2:
+        raise LimitCycleError("a disturbed walk has not taken two steps in a return")
+    return down[-1] - down[0]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DisturbanceResponse:
+    """How a walk responds to disturbances, from return to return.
+
+    Attributes
+    ----------
+    A : (m, m) float
+        Errors one return later of errors across the walk.
+    B : (m, k) float
+        The same of disturbances of size one that last a return.
+    C : (l, m) float
+        Changes of the indicators in the return by errors at its beginning.
+    D : (l, k) float
+        The same by the disturbances.
+    disturbances : tuple of k str
+        Their names.
+    steps : int
+        Steps of a return.
+    """
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+    disturbances: tuple[str, ...]
+    steps: int
+
+    @cached_property
+    def norm(self) -> float:
+        """Gait sensitivity norm: of all disturbances together, new ones in every return."""
+        return gait_sensitivity_norm(self.A, self.B, self.C, self.D)
+
+    @cached_property
+    def norms(self) -> dict[str, float]:
+        """The norm of each disturbance by itself."""
+        return {
+            name: gait_sensitivity_norm(self.A, self.B[:, [k]], self.C, self.D[:, [k]])
+            for k, name in enumerate(self.disturbances)
+        }
+
+    def after(self, name: str, returns: int) -> Floats:
+        """Indicators after one disturbance of size one, in its return and those after it.
+
+        Parameters
+        ----------
+        name : str
+            Which disturbance.
+        returns : int
+            How many returns.
+
+        Returns
+        -------
+        (returns, l) float
+            Changes of the indicators.
+        """
+        place = self.disturbances.index(name)
+        seen, error = [self.D[:, place]], self.B[:, place]
+        for _ in range(returns - 1):
+            seen.append(self.C @ error)
+            error = self.A @ error
+        return np.array(seen)
+
+
+# More arguments than eight: what walks, and what is disturbed how, are a user's to say.
+def disturbance_response(
+    robot: Robot,
+    state: State | Snapshot,
+    controller: Controller | None = None,
+    *,
+    disturbances: Mapping[str, tuple[Disturb, float]],
+    indicator: Indicator = step_duration,
+    ground: Ground | None = None,
+    method: Method | None = None,
+    control_period: float | None = None,
+    settling: int = 10,
+    returns: int = 4,
+    disturbance: float | None = None,
+    longest_step: float = 3.0,
+) -> DisturbanceResponse:
+    """Measure how a walk responds to disturbances, under any controller and method.
+
+    Parameters
+    ----------
+    robot : Robot
+        A robot that is free to move along the ground.
+    state : State or Snapshot
+        Where the walk begins.
+    controller : object with ``torque(t, state, contacts)``, or None
+        One in Python must take part in snapshots.
+    disturbances : mapping of str to (callable, float)
+        By name: ``disturb(simulation, size)``, which is called in the middle of a step and changes
+        what comes then, by ``simulation.apply(push)``, ``simulation.ground = ...`` or
+        ``simulation.parameters``; and a size for differences, small and both ways.
+    indicator : callable
+        Takes the :class:`~heelstrike.Run` of a return, with a row every ten steps of the method and
+        all events, and returns one or more numbers, which must not depend on when it began; the
+        duration of a step by default.
+    ground : Ground
+        Level or sloping ground; ``Ground()`` by default.
+    method : Method
+        Way through time; ``TimeStepping()`` by default.
+    control_period : float, optional
+        As of :func:`~heelstrike.simulate`.
+    settling, returns : int
+        Steps before anything is disturbed; returns over which the differences are averaged.
+    disturbance : float, optional
+        Size of the errors that are put in, as of :func:`~heelstrike.floquet_multipliers`.
+    longest_step : float
+        Seconds after which a step without touchdown has failed.
+
+    Returns
+    -------
+    DisturbanceResponse
+
+    Raises
+    ------
+    LimitCycleError
+        If the walk, or a disturbed one, falls, takes no steps or stands otherwise one return later.
+    SimulationError, ControllerError
+        If an argument is not usable, or a controller cannot be kept.
+
+    Notes
+    -----
+    A ground that is higher in the end counts as level: errors are seen from it. What a disturbance
+    has changed is as before in the next return. A return is two steps, of a robot with two legs.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> from heelstrike.experiments.passive import METHOD, passive_walk
+    >>> robot, ramp = hs.load_robot("compass_gait"), hs.Ground(friction=3.0, slope=-0.05)
+    >>> cycle = passive_walk(robot, ramp)
+    >>> def pushed(simulation, size):
+    ...     force, t = (size / 0.1, 0.0), simulation.time
+    ...     simulation.apply(hs.Push(2, force=force, start=t, duration=0.1))
+    >>> found = hs.disturbance_response(
+    ...     robot, cycle.state, disturbances={"push": (pushed, 1e-3)}, ground=ramp, method=METHOD,
+    ...     settling=0, returns=1,
+    ... )  # s of duration of every other step, per N s
+    >>> bool(0.0 < found.norm < 1.0)
+    True
+    """
+    if settling < 0 or returns < 1:
+        raise SimulationError(
+            f"settling must not be negative and returns at least one; got {settling!r}, {returns!r}"
+        )
+    _check(disturbances)
+    loop = ClosedLoop(
+        robot, controller, state, method=method, ground=ground, control_period=control_period,
+        record_every=ROWS,
+    )  # fmt: skip
+    if disturbance is not None and not 0.0 < disturbance < 1.0:
+        raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
+    walk = loop.follow(settling, returns, longest_step)
+    size = loop.usual_disturbance(walk) if disturbance is None else float(disturbance)
+    section = Section(loop, walk, size, None)
+    found = [returned(loop, section, walk, k, size, indicator) for k in range(returns)]
+    errors = Across.of(
+        found, stays_early(loop, section, walk), section.of_robot, smooth=size <= SMOOTH
+    )
+    kept = list(errors.kept)
+    into, through = [], []
+    for name, (disturb, amount) in disturbances.items():
+        after = [
+            _responded(loop, section, walk, k, name, disturb, amount, indicator)
+            for k in range(returns)
+        ]
+        into.append(np.mean([errors.bases[k + 1].T @ e[kept] for k, (e, _) in enumerate(after)], 0))
+        through.append(np.mean([seen for _, seen in after], axis=0))
+    seen = [each.seen[:, kept] @ errors.bases[k] for k, each in enumerate(found)]
+    return DisturbanceResponse(
+        A=np.mean(errors.across, axis=0),
+        B=np.array(into).T,
+        C=np.mean(seen, axis=0),
+        D=np.array(through).T,
+        disturbances=tuple(disturbances),
+        steps=walk.steps,
+    )
+
+
+def _check(disturbances: Mapping[str, tuple[Disturb, float]]) -> None:
+    if not isinstance(disturbances, Mapping) or not disturbances:
+        raise SimulationError(
+            "disturbances are given by name, as in {'push': (pushed, 1e-3)}, where "
+            f"pushed(simulation, size) disturbs; got {disturbances!r}"
+        )
+    for name, given in disturbances.items():
+        pair = isinstance(given, tuple) and len(given) == 2 and callable(given[0])
+        if not (pair and isinstance(given[1], (int, float)) and 0.0 < given[1] < np.inf):
+            raise SimulationError(
+                f"disturbance {name!r} must be a function (simulation, size) and a positive size, "
+                f"got {given!r}"
+            )
+
+
+def _responded(
+    loop: ClosedLoop, section: Section, walk: Walk, place: int, name: str, disturb: Disturb,
+    amount: float, indicator: Indicator,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Errors and changes of the indicators after a disturbance of size one."""
+    begin, end = walk.begins[place], walk.begins[place + 1]
+    sides = []
+    for sign in (1.0, -1.0):
+        simulation = loop.fresh()
+        simulation.restore(begin)
+        disturb(simulation, sign * amount)
+        doing = f"disturbance {name!r} of size {sign * amount:.3g}"
+        loop.advanced(simulation, end.time, doing)
+        if section.feet_of(simulation.state, simulation.ground) != section.feet(end):
+            raise LimitCycleError(f"{doing} makes the robot stand on another foot one return later")
+        there, numbers = section.read(simulation)
+        there[1] -= _raised(loop, simulation)
+        told = np.atleast_1d(np.asarray(indicator(whole(simulation.record)), np.float64))
+        if not np.all(np.isfinite(told)):
+            raise SimulationError(f"{doing}: the indicator is {told}, no finite numbers")
+        sides.append((np.concatenate((section.of(there), numbers)), told))
+    (up, seen_up), (down, seen_down) = sides
+    return (up - down) / (2.0 * amount), (seen_up - seen_down) / (2.0 * amount)
+
+
+def _raised(loop: ClosedLoop, simulation: Simulation) -> float:
+    """How much higher the ground is than the usual one, where the robot stands (m)."""
+    state = simulation.state
+    seen = contact_kinematics(loop.robot, state.q, state.v, simulation.ground)
+    x = float(seen.position[int(np.argmin(seen.gap)), 0])
+    return float(simulation.ground.height(x) - loop.ground.height(x))

@@ -1,0 +1,155 @@
+"""What controllers are made of: a robot, a gait of it, numbers; or in words why that is none."""
+
+from __future__ import annotations
+
+import math
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.errors import ControllerError, GaitError
+from heelstrike.gait.gait import Gait
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.law import REAL, per_actuator
+
+Floats = NDArray[np.float64]
+
+INSTEAD = {
+    "Robot": "hs.load_robot(...) makes one",
+    "Gait": "hs.optimize_gait(robot, ...) or hs.load_gait(file, robot=robot) makes one",
+    "PhasedGait": "hs.PhasedGait.from_gait(robot, gait) makes one",
+    "StepFamily": "hs.StepFamily.around(phased_gait) makes one",
+    "Encoder": "hs.Encoder() makes one",
+}
+"""How to come by what is wanted."""
+
+
+def must_be(kind: type, name: str, value: object) -> None:
+    """Refuse an argument of another kind.
+
+    Raises
+    ------
+    ControllerError
+        That says what is wanted, what was given, and what makes one.
+    """
+    if not isinstance(value, kind):
+        advice = f"; {INSTEAD[kind.__name__]}" if kind.__name__ in INSTEAD else ""
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise ControllerError(
+            f"{name} must be {article} {kind.__name__}, got {_shown(value)}{advice}"
+        )
+
+
+def check_gait(robot: Robot, gait: Gait) -> None:
+    """Refuse a gait of another robot.
+
+    A robot with other numbers than the gait was designed for will do, as long as it is called the
+    same: a law may know its robot wrongly.
+
+    Raises
+    ------
+    ControllerError
+        That names the robots, or the joints.
+    """
+    must_be(Robot, "robot", robot)
+    must_be(Gait, "gait", gait)
+    try:
+        gait.check_joints(robot)
+    except GaitError as error:
+        raise ControllerError(str(error)) from None
+    if gait.robot != robot.name:
+        raise ControllerError(
+            f"this gait is one of robot {gait.robot!r}, not of {robot.name!r}, whose joints are "
+            "called the same. Design one for it with optimize_gait; if it is the same robot with "
+            f"other numbers, call it the same: dataclasses.replace(robot, name={gait.robot!r})"
+        )
+
+
+def number_of(name: str, value: object) -> float:
+    """Return a number, which need not be finite.
+
+    Raises
+    ------
+    ControllerError
+        If it is none.
+    """
+    found = (
+        value.item() if isinstance(value, (np.ndarray, np.generic)) and value.size == 1 else value
+    )
+    if isinstance(found, bool) or not isinstance(found, Real):
+        raise ControllerError(f"{name} must be a number, got {_shown(value)}")
+    return float(found)
+
+
+def positive(name: str, value: object) -> float:
+    """Return a positive, finite number.
+
+    Raises
+    ------
+    ControllerError
+        If it is none.
+    """
+    found = number_of(name, value)
+    if not 0.0 < found < math.inf:
+        raise ControllerError(f"{name} must be a positive number, got {found!r}")
+    return found
+
+
+def numbers_of(name: str, value: ArrayLike) -> Floats:
+    """Return an array of numbers.
+
+    Raises
+    ------
+    ControllerError
+        If there is another thing among them.
+    """
+    try:
+        found = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        found = np.asarray(None)
+    if found.dtype.kind not in REAL:
+        raise ControllerError(f"{name} must be numbers, got {_shown(value)}")
+    return found.astype(np.float64)
+
+
+def gains_of(name: str, value: ArrayLike, robot: Robot) -> Floats:
+    """Return gains of each actuator, (nu,), that are not negative, of one for all or for each.
+
+    Raises
+    ------
+    ControllerError
+        If they are none.
+    """
+    gains = per_actuator(name, value, robot)
+    if np.any(gains < 0.0):
+        raise ControllerError(f"{name} must not be negative, got {value!r}")
+    return gains
+
+
+def weights_of(name: str, value: ArrayLike, size: int, *, positive: bool = False) -> Floats:
+    """Return so many weights of a quadratic cost, (size,), of one for all or one of each.
+
+    Raises
+    ------
+    ControllerError
+        If they are not that many finite numbers from 0 on, or above 0.
+    """
+    weights = numbers_of(name, value)
+    fits = weights.ndim <= 1 and weights.size in (1, size)
+    least = "positive" if positive else "not negative"
+    if not fits or not np.all(np.isfinite(weights)) or np.any(weights < 0.0):
+        raise ControllerError(
+            f"{name} must be one number that is {least}, or {size} of them, got {value!r}"
+        )
+    if positive and np.any(weights == 0.0):
+        raise ControllerError(f"{name} must be positive, got {value!r}")
+    return np.broadcast_to(weights, (size,)).copy()
+
+
+def _shown(value: Any) -> str:
+    """Write what was given, with its kind, in a line."""
+    text = repr(value)
+    short = text if len(text) <= 60 else f"{text[:57]}..."
+    return f"{short} ({type(value).__name__})"

@@ -1,0 +1,267 @@
+"""The linear-quadratic regulator about a gait on flat feet: torques by the time since touchdown.
+
+    τ = τ_d(s) + K(s) (x_d(s) − x),   x = (q, q̇) of the joints
+
+On the other foot errors are looked at in the mirror, and torques are.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from heelstrike.compiler.bundle import array, number
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.arguments import check_gait, weights_of
+from heelstrike.control.computed_torque import (
+    Stance,
+    StepTiming,
+    has_landed,
+    pitch_of,
+    restart_at_touchdown,
+)
+from heelstrike.control.gait_lqr.flat import FINE, KEPT, FlatOrbit
+from heelstrike.control.gait_lqr.transverse import multipliers_of
+from heelstrike.errors import ControllerError
+from heelstrike.gait.gait import Footing, Gait
+from heelstrike.robot.loops import refuse_loops
+from heelstrike.robot.model import Floats, Integers
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.law import Law, controller
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+
+REPEATS = 1e-6
+"""Impacts may lead this far from the beginning of the gait (rad, rad/s)."""
+
+
+class Parameters(StepTiming):
+    """Numbers of the law.
+
+    Attributes
+    ----------
+    first : int
+        The foot that stands as torques and gains are given.
+    actuator, actuator_sign : (nu,) int and float
+        The mirror of the joints.
+    breakpoints : (pieces + 1,) float
+        Times in a step between which one polynomial holds (s).
+    coefficients : (2, pieces, terms, nu) float
+        For either stance foot the joints' polynomials, lowest power first.
+    duration : float
+        Of a step (s).
+    latest : float
+        The reference goes on along its polynomials until this time in a step (s).
+    torque : (places, nu) float
+    gains : (places, nu, 2 nu) float
+        Torques of the gait, and K, evenly over the step; between them they are linear.
+    """
+
+    first: int = number(int)
+    actuator: Integers = array("nu", of=int)
+    actuator_sign: Floats = array("nu")
+    breakpoints: Floats = array("pieces + 1")
+    coefficients: Floats = array(2, "pieces", "terms", "nu")
+    duration: float = number(float)
+    latest: float = number(float)
+    torque: Floats = array("places", "nu")
+    gains: Floats = array("places", "nu", "2 nu")
+
+
+class Memory(Stance):
+    """What the law remembers; the rest is scratch.
+
+    Attributes
+    ----------
+    away : (2 nu,) float
+        Errors as on the first foot.
+    asked : (nu,) float
+        Torques as on the first foot.
+    error : (2 nu,) float
+        Errors.
+    """
+
+    away: Floats = array("2 nu")
+    asked: Floats = array("nu")
+    error: Floats = array("2 nu")
+
+
+@kernel
+def find_errors(state: ControlState, parameters: Parameters, memory: Memory, phase: float) -> None:
+    """Write what joints lack of the gait at a time in the step, and their velocities."""
+    late = phase > parameters.latest
+    s = min(phase, parameters.latest)
+    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
+    piece = 0
+    while piece < coefficients.shape[1] - 1 and s >= breakpoints[piece + 1]:
+        piece += 1
+    s -= breakpoints[piece]
+    count = coefficients.shape[3]
+    for i in range(count):
+        position, velocity = 0.0, 0.0
+        for k in range(coefficients.shape[2] - 1, -1, -1):
+            velocity = velocity * s + position
+            position = position * s + coefficients[memory.stance, piece, k, i]
+        if late:
+            velocity = 0.0
+        memory.error[i] = position - state.joint_position[i]
+        memory.error[count + i] = velocity - state.joint_velocity[i]
+
+
+@controller
+def flat_gait_lqr(
+    t: float, state: ControlState, contacts: Contacts, robot: ControlledRobot,
+    parameters: Parameters, memory: Memory, torque: Floats,
+) -> None:  # fmt: skip
+    """Joint torques of the law above."""
+    restart_at_touchdown(t, contacts, robot, parameters, memory)
+    landed = has_landed(t, state, contacts, robot, parameters, memory)
+    phase = t - memory.start
+    find_errors(state, parameters, memory, phase)
+    n, first = robot.nu, memory.stance == parameters.first
+    for i in range(n):
+        j, sign = (i, 1.0) if first else (parameters.actuator[i], parameters.actuator_sign[i])
+        memory.away[i] = sign * memory.error[j]
+        memory.away[n + i] = sign * memory.error[n + j] if landed else 0.0
+    last = parameters.torque.shape[0] - 1
+    place = min(max(phase / parameters.duration, 0.0), 1.0) * last
+    here = min(int(place), last - 1)
+    part = place - here
+    for i in range(n):
+        total = 0.0
+        for side in range(2):
+            asked = parameters.torque[here + side, i]
+            for j in range(2 * n):
+                asked += parameters.gains[here + side, i, j] * memory.away[j]
+            total += (part if side == 1 else 1.0 - part) * asked
+        memory.asked[i] = total
+    for i in range(n):
+        if first:
+            torque[i] = memory.asked[i]
+        else:
+            torque[i] = parameters.actuator_sign[i] * memory.asked[parameters.actuator[i]]
+
+
+class FlatGaitLQR(Law):
+    """Walk on flat feet by the linear-quadratic regulator about a gait.
+
+    The torques are those of the gait at the time since the last touchdown, and gains times what the
+    joints differ from it; the gains solve the Riccati equation of all steps to come, impacts
+    included. See ``docs/lqr.md`` for the theory and what it cannot do.
+
+    Parameters
+    ----------
+    robot : Robot
+        A floating robot with two mirrored flat feet, all joints but the trunk's actuated.
+    gait : Gait
+        The gait, which stands on one flat foot at a time and which its impact leads back to.
+    position_weight, velocity_weight : float or (nu,) array
+        What errors of the joints and their velocities cost (1/rad², s²/rad²).
+    torque_weight : float or (nu,) array
+        What torques cost besides those of the gait, 1/(N m)².
+
+    Attributes
+    ----------
+    multipliers : (2 nu,) complex
+        Floquet multipliers of a step that the linear equations predict, the largest first: of the
+        mean of those in which heel or toe come down first.
+    either : tuple of two float
+        Size of the largest if one end of the sole always comes down first, and if the other does.
+
+    Raises
+    ------
+    ControllerError
+        If the robot cannot be controlled this way, the gait or a weight does not fit it, or the
+        motors cannot stabilise it.
+
+    Examples
+    --------
+    >>> import heelstrike as hs
+    >>> robot = hs.load_robot("bravo7")
+    >>> gait = hs.optimize_gait(robot, step_length=0.30, step_duration=0.70, starts=1)
+    >>> law = hs.FlatGaitLQR(robot, gait)
+    >>> hs.simulate(robot, law, state=gait.initial_state, duration=1.4).completed
+    True
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        gait: Gait,
+        *,
+        position_weight: ArrayLike = 1e5,
+        velocity_weight: ArrayLike = 1e3,
+        torque_weight: ArrayLike = 1.0,
+    ) -> None:
+        check_gait(robot, gait)
+        refuse_loops(robot, "a regulator about a gait", ControllerError)
+        pitch_of(robot)
+        _check(robot, gait)
+        by_position = weights_of("position_weight", position_weight, robot.nu)
+        by_velocity = weights_of("velocity_weight", velocity_weight, robot.nu)
+        effort = weights_of("torque_weight", torque_weight, robot.nu, positive=True)
+        orbit = FlatOrbit(robot, gait)
+        if not orbit.misses < REPEATS:
+            raise ControllerError(
+                f"the impact of robot {robot.name!r} at the end of this gait misses its beginning "
+                f"by {orbit.misses:.2g} rad or rad/s; design one with optimize_gait"
+            )
+        cost = np.diag(np.concatenate([by_position, by_velocity]))
+        gains = _table(orbit.regulator(cost, np.diag(effort)))
+        # What the table makes of the gains is what is predicted.
+        places = (np.arange(FINE) + 0.5) / FINE
+        step = orbit.over_a_step(_at(gains, places))
+        self.multipliers: NDArray[np.complex128] = multipliers_of(orbit.jump @ step)
+        self.either = tuple(float(abs(multipliers_of(each @ step)[0])) for each in orbit.jumps)
+        if not np.all(np.abs(self.multipliers) < 1.0):
+            raise ControllerError("no regulator makes this walk repeat; try other weights")
+        mirror = robot.mirror
+        assert mirror is not None  # see pitch_of
+        driven = mirror.among(robot.model.actuator_joint)
+        duration = gait.step_duration
+        sides = [gait.pieces, gait.mirrored_pieces()]
+        if gait.stance_foot:
+            sides.reverse()
+        parameters = Parameters(
+            first=gait.stance_foot,
+            actuator=driven.joint,
+            actuator_sign=driven.sign,
+            breakpoints=gait.breakpoints,
+            coefficients=np.array(sides),
+            duration=duration,
+            earliest=0.5 * duration,
+            latest=1.1 * duration,
+            landing=0.02 * duration,
+            torque=orbit.torques(np.linspace(0.0, duration, KEPT + 1)),
+            gains=gains,
+        )
+        begin = {"stance": gait.stance_foot, "landed": 1}
+        super().__init__(flat_gait_lqr, parameters, memory=begin, robot=robot)
+        self.gait = gait
+
+
+def _check(robot: Robot, gait: Gait) -> None:
+    """Refuse gaits that do not stand on one flat foot at a time."""
+    flat = [phase.contacts == {gait.stance_foot: Footing.FLAT} for phase in gait.phases]
+    if not all(flat) or any(len(foot.contacts) < 2 for foot in robot.feet):
+        raise ControllerError(
+            "this regulator needs a gait that stands on one flat foot at a time; for one on point "
+            "feet, hs.GaitLQR(hs.PhasedGait.from_gait(robot, gait))"
+        )
+
+
+def _table(gains: Floats) -> Floats:
+    """Gains at even places of the step, of those in the middles of finer intervals."""
+    middles = (np.arange(len(gains)) + 0.5) / len(gains)
+    places = np.linspace(0.0, 1.0, KEPT + 1)
+    flat = gains.reshape(len(gains), -1)
+    found = np.array([np.interp(places, middles, each) for each in flat.T]).T
+    return found.reshape(KEPT + 1, *gains.shape[1:])
+
+
+def _at(table: Floats, places: Floats) -> Floats:
+    """Entries of a table, as the law reads it."""
+    even = np.linspace(0.0, 1.0, len(table))
+    flat = table.reshape(len(table), -1)
+    found = np.array([np.interp(places, even, each) for each in flat.T]).T
+    return found.reshape(len(places), *table.shape[1:])

@@ -1,0 +1,115 @@
+"""Responses to disturbances, against simulations and against the linearisation of a step."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+import heelstrike as hs
+from heelstrike.experiments.passive import METHOD, passive_walk
+
+SLOPE = -0.05
+RAMP = hs.Ground(friction=3.0, slope=SLOPE)
+
+
+@cache
+def compass() -> tuple[hs.Robot, hs.LimitCycle]:
+    robot = hs.load_robot("compass_gait")
+    return robot, passive_walk(robot, RAMP)
+
+
+def pushed(simulation: hs.Simulation, size: float) -> None:
+    """An impulse of a size (N s) at the hip."""
+    force, now = (size / 0.05, 0.0), simulation.time
+    simulation.apply(hs.Push(2, force=force, start=now, duration=0.05))
+
+
+def raised(simulation: hs.Simulation, size: float) -> None:
+    """A ramp that is higher from the next foothold on, along the normal."""
+    _, cycle = compass()
+    edge, slope = 1.93 * cycle.step_length, np.tan(SLOPE)
+    x = np.array([-5.0, edge, edge + 1e-3, edge + 60.0])
+    z = slope * x + size / np.cos(SLOPE) * np.array([0.0, 0.0, 1.0, 1.0])
+    simulation.ground = hs.Ground(friction=3.0, profile=np.column_stack((x, z)))
+
+
+@cache
+def measured() -> hs.DisturbanceResponse:
+    robot, cycle = compass()
+    return hs.disturbance_response(
+        robot, cycle.state, disturbances={"push": (pushed, 1e-4), "height": (raised, 1e-5)},
+        ground=RAMP, method=METHOD, settling=0, returns=1,
+    )  # fmt: skip
+
+
+def durations(push: float, returns: int) -> np.ndarray:
+    """Durations of every other step, a walk being pushed in the middle of its second."""
+    robot, cycle = compass()
+    simulation = hs.Simulation(robot, state=cycle.state, ground=RAMP, method=METHOD)
+    simulation.advance(1.5 * cycle.period)
+    pushed(simulation, push)
+    simulation.advance((2 * returns + 1.5) * cycle.period)
+    down = [e.time for e in simulation.record.events if e.kind.name == "TOUCHDOWN" and e.time > 0.0]
+    return np.diff(down)[1::2][:returns]
+
+
+def test_durations_after_a_push_are_what_is_predicted() -> None:
+    """By both ways, of 1e-4 N s: errors of differences are its square, and 1e-12 s over it."""
+    size, returns = 1e-4, 5
+    change = (durations(size, returns) - durations(-size, returns)) / (2.0 * size)
+    np.testing.assert_allclose(measured().after("push", returns)[:, 0], change, atol=2e-5)
+    assert np.abs(change).max() > 1e-3
+
+
+def test_norms_are_those_of_their_parts() -> None:
+    found = measured()
+    assert found.norms.keys() == {"push", "height"}
+    assert found.norm == pytest.approx(np.hypot(*found.norms.values()))
+    assert found.norms["push"] == pytest.approx(np.linalg.norm(found.after("push", 60)), rel=1e-9)
+
+
+def test_a_higher_foothold_is_that_of_the_linearised_step() -> None:
+    """Of two steps the first ends on it; the second's duration follows from errors it began with.
+
+    Seen without a difference of simulations: saltation matrices.
+    """
+    robot, cycle = compass()
+    step = hs.monodromy(robot, cycle.state, ground=RAMP, method=METHOD)
+    height = step.step_height
+    wanted = [height.duration_state @ height.state]
+    error = step.matrix @ step.matrix @ height.state
+    for _ in range(3):
+        wanted.append(height.duration_state @ error)
+        error = step.matrix @ step.matrix @ error
+    found = measured().after("height", 4)[:, 0]
+    np.testing.assert_allclose(found, wanted, atol=2e-4)
+    assert np.abs(wanted).max() > 1e-2
+
+
+def test_multipliers_are_those_of_the_walk() -> None:
+    _, cycle = compass()
+    values = np.sort_complex(np.linalg.eigvals(measured().A))
+    np.testing.assert_allclose(values, np.sort_complex(cycle.multipliers**2), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({}, "given by name"),
+        ([pushed], "given by name"),
+        ({"push": pushed}, "'push' must be a function"),
+        ({"push": (pushed, 0.0)}, "a positive size"),
+        ({"push": (1.0, pushed)}, "'push' must be a function"),
+        ({"push": (pushed, 1e4)}, "disturbance 'push' of size 1e"),
+    ],
+)
+def test_disturbances_that_are_none(given: Any, said: str) -> None:
+    robot, cycle = compass()
+    with pytest.raises(hs.HeelstrikeError, match=said):
+        hs.disturbance_response(
+            robot, cycle.state, disturbances=given, ground=RAMP, method=METHOD, settling=0,
+            returns=1,
+        )  # fmt: skip
