@@ -44,7 +44,7 @@ LEAST_RATE = 0.3
 # Part of the robot's weight that the stance foot is pressed with at least.
 PRESSED = 0.1
 # Joints keep within the range that they have in the family, and this much beyond (rad).
-BEYOND_FAMILY = 0.2
+BEYOND_FAMILY = 0.5
 # A foot that is less than this above the ground (m) has just stood there.
 STOOD = 0.01
 
@@ -349,14 +349,17 @@ def stepping_constraints(
     change = aim - memory.before
     memory.shift = memory.before + share * change
     follow(memory, theta, memory.shift, share1 * change / half, share2 * change / (half * half))
-    take_up(memory, theta)
+    if memory.landed == 1:
+        take_up(memory, theta)
     bearable = memory.bearable
     for i in range(robot.nu):
         error = state.joint_position[i] - memory.value[i]
         error_rate = state.joint_velocity[i] - memory.gradient[i] * rate
         bearable.slope[i] = memory.gradient[i]
         bearable.wanted[i] = memory.curvature[i] * rate * rate
-        bearable.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
+        # An impact that takes a while is not fought: no motor is a match for it.
+        if memory.landed == 1:
+            bearable.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
     bear(
         state, contacts, robot, parameters.phase, memory.stance, parameters.bounds, memory.bearable
     )
