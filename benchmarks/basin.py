@@ -19,7 +19,7 @@ KP, KD = 100.0, 40.0
 PHASES = 20
 SEEDS, OTHER_SEEDS = range(10), range(1000, 1020)
 
-BENT_GAITS = {"rabbit": (0.45, 0.9, 0.25), "rabbit_optimtraj": (0.5, 0.95, 0.35)}
+BENT_GAITS = {"rabbit": (0.43, 0.86, 0.25), "rabbit_optimtraj": (0.5, 0.95, 0.35)}
 """Length (m), speed (m/s) and friction of the gaits whose feet land elsewhere."""
 BENT_CLEARANCE = 0.05
 BENT = {"right_knee": (0.2, 2.6), "right_hip": (-0.8, 1.5)}

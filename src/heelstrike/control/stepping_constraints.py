@@ -398,7 +398,7 @@ class SteppingConstraints(Law):
         *,
         kp: ArrayLike = 900.0,
         kd: ArrayLike = 60.0,
-        response: float = 0.5,
+        response: float = 0.45,
         trust: float = 0.5,
         friction: float = 0.6,
     ) -> None:
