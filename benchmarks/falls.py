@@ -55,7 +55,7 @@ DURATION = 3.0
 """Seconds of a fall."""
 ROWS, FINE = 1e-3, 1e-4
 """Time between rows (s), and at a second look where speeds change too fast for the first: rows come
-from the dense output, and the run is the same."""
+from the dense output; a step that cannot be put on the ground at one of them ends there."""
 LIMIT = 60.0
 """Processor seconds after which one hangs."""
 FREE = 1.5

@@ -207,7 +207,7 @@ def test_speed_comes_back_by_the_factor_of_the_zero_dynamics() -> None:
     [
         ({"kp": -1.0}, "kp must not be negative"),
         ({"kd": [1.0, 2.0]}, "kd must be one finite number or 4"),
-        ({"finite_time": 0.0}, "positive time"),
+        ({"finite_time": 0.0}, "finite_time must be a positive number"),
         ({"exponent": 1.0}, "between 0 and 1"),
         ({"outputs": np.ones((2, 2))}, r"shape \(4, 4\)"),
         ({"outputs": np.ones((4, 4))}, "singular"),

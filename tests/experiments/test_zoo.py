@@ -336,6 +336,9 @@ def test_wrong_questions_are_refused(tmp_path: Path) -> None:
     walks.bravo7().save(tmp_path / "mine, too.xml")
     loaded = campaign.loaded(f'rabbit, "{tmp_path / "mine, too.xml"}"', {})
     assert list(loaded) == ["rabbit", "mine, too.xml"]
+    assert campaign.chosen_controllers("wholebody,\n  jointpd") == (  # a shell's lines
+        BY_NAME["WholeBody"], BY_NAME["JointPD"],
+    )  # fmt: skip
 
 
 # How it is shown

@@ -15,6 +15,7 @@ from heelstrike.analysis import energy_balance
 from heelstrike.errors import RobotError, SimulationError
 from heelstrike.gait.gait import fingerprint
 from heelstrike.robot import Robot, RobotBuilder
+from heelstrike.sim.batch import _joints as runs_of
 from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.files.robot_dataset import robot_to_dataset, stored_robot
 from heelstrike.sim.memory import allocate_memory
@@ -255,6 +256,17 @@ def test_a_batch_begins_with_brakes_on() -> None:
     snapshot = hs.simulate(robots[0], state=robots[0].state(), duration=0.01).final
     with pytest.raises(SimulationError, match=r"simulate\(state=snapshot\) goes on"):
         hs.simulate_batch(robots[0], state=snapshot, duration=0.05)  # type: ignore[arg-type]
+
+
+def test_joints_may_be_an_array() -> None:
+    """An array is several joints, though it has an ``__index__``; a number of numpy is one."""
+    robot = pendulum()
+    state = robot.state({"swing": 0.4})
+    for joints in (np.array([0]), np.array(["swing"]), np.int64(0)):
+        simulation = hs.Simulation(robot, state=state, braked=joints)  # type: ignore[arg-type]
+        assert simulation.braked == ("swing",)
+    assert runs_of("braked", np.array([0])) == [(0,)]
+    assert runs_of("braked", np.array([[0], [0]])) == [(0,), (0,)]
 
 
 def test_a_run_may_begin_with_a_brake_on(tmp_path: Path) -> None:

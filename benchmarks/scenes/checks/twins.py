@@ -10,7 +10,8 @@ from states that differ from this one in the last digits (NUDGES, relative). If 
 far from each other, but for a factor of CONTROL, the difference is the motion's (*amplified*): no
 arithmetic can tell these ends apart. If they are not, both the twin and the scene itself are
 judged; where neither breaks a law, the ends are two solutions (*another solution*, Coulomb's law
-may have several), and if one does, or there is none, the difference is *not explained*.
+may have several), and if one does, or there is none, the difference is *not explained*. Where the
+scene does not come to its end there is nothing to compare (*no end*), even if no twin does.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ def ends(setting: Setting, state: hs.State, begin: float) -> Any:
 def apart(one: Any, other: Any, back: Twin | None = None) -> float:
     """Difference of the last states of two runs, the other told in the words of the one."""
     if one is None or other is None:
-        return 0.0 if one is other else float("inf")
+        return float("inf")
     q, v = other.position[-1], other.velocity[-1]
     if back is not None:
         state = back.back(q, v)
@@ -94,6 +95,8 @@ def own_spread(setting: Setting, state: hs.State, begin: float, run: Any) -> flo
 def compare(setting: Setting, twins: tuple[Twin, ...], state: hs.State, begin: float) -> Words:
     """Compare one window; explain the difference if there is one."""
     run = ends(setting, state, begin)
+    if run is None:
+        return {"begin": begin, "size": float("inf"), "twin": "", "cause": "no end"}
     compared = []
     for twin in twins:
         end = ends(twin.setting, twin.there(state.q, state.v), begin)
@@ -125,6 +128,8 @@ def twins_of_scene(check: str, seed: int, *, twins: bool = True) -> Words:
         state = hs.State(run.position[row], run.velocity[row])
         found.append(compare(setting, others, state, float(run.time[row])))
     causes = sorted({one["cause"] for one in found if one["cause"]})
+    if not run.completed:
+        causes.append(run.status.value)
     return result | {
         "status": run.status.value,
         "message": run.message,

@@ -375,9 +375,10 @@ class ComputedTorque(Law):
         kd: ArrayLike = 40.0,
         encoder: Encoder | None = None,
     ) -> None:
-        check_gait(robot, gait)
+        must_be(Robot, "robot", robot)
         refuse_loops(robot, "computed torque", ControllerError, loops=False)
         pitch = pitch_of(robot)
+        check_gait(robot, gait)
         if encoder is not None:
             must_be(Encoder, "encoder", encoder)
         if gait.point_feet:

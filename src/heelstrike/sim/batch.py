@@ -25,7 +25,7 @@ from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
-from heelstrike.sim.contacts.latches import several
+from heelstrike.sim.contacts.latches import is_one, several
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
 from heelstrike.sim.frame import compiled_loop
@@ -203,7 +203,8 @@ def simulate_batch(
     record_every : int, optional
         Steps between two rows of the records; by default nothing is kept but how each run ended,
         so that memory does not grow with the duration. The runs are those of `simulate` with the
-        same `record_every`, or a huge one: writing an event-driven row may change a last digit.
+        same `record_every`, or a huge one: writing an event-driven row may change a last digit, or
+        end a step there.
     stop_when_fallen : bool, optional
         See :func:`~heelstrike.simulate`.
     latched : joints, or sequence of n of them or None, optional
@@ -408,7 +409,7 @@ def _pushes(pushes: Any) -> Sequence[Sequence[Push]]:
 def _joints(name: str, joints: Any) -> Sequence[Any]:
     """Joints run by run: those of a plain sequence are for all."""
     listed = list(several(name, joints))
-    single = [hasattr(each, "__index__") or isinstance(each, str) for each in listed]
+    single = [is_one(each) for each in listed]
     if all(single):
         return [tuple(listed)]
     if any(single):

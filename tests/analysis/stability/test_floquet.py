@@ -126,7 +126,7 @@ def test_what_a_controller_remembers_is_in_the_loop() -> None:
 
 
 class Remembers:
-    """A controller in Python: a count, and a speed that it follows."""
+    """A controller in Python: a count, a speed that it follows, and what it does not know."""
 
     def __init__(self) -> None:
         self.count, self.speed = 0.0, 0.0
@@ -137,10 +137,10 @@ class Remembers:
         return np.zeros(0)
 
     def snapshot(self) -> list[float]:
-        return [self.count, self.speed]
+        return [self.count, self.speed, float("nan")]
 
     def restore(self, numbers: np.ndarray) -> None:
-        self.count, self.speed = map(float, numbers)
+        self.count, self.speed = map(float, numbers[:2])
 
 
 def test_a_controller_in_python_that_takes_part() -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from functools import cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.analysis.stability.loop import steps_of
+from heelstrike.analysis.stability.response import step_duration
 from heelstrike.experiments.passive import METHOD, passive_walk
+from heelstrike.sim.closed_sets import EventKind
 
 SLOPE = -0.05
 RAMP = hs.Ground(friction=3.0, slope=SLOPE)
@@ -113,3 +117,31 @@ def test_disturbances_that_are_none(given: Any, said: str) -> None:
             robot, cycle.state, disturbances=given, ground=RAMP, method=METHOD, settling=0,
             returns=1,
         )  # fmt: skip
+
+
+def test_a_fixed_step_does_not_tell_durations() -> None:
+    """Touchdowns fall on its steps: any small disturbance would seem to do nothing to them."""
+    robot, cycle = compass()
+    with pytest.raises(hs.SimulationError, match="touchdowns fall on steps"):
+        hs.disturbance_response(
+            robot, cycle.state, disturbances={"push": (pushed, 1e-4)}, ground=RAMP,
+            method=hs.TimeStepping(),
+        )  # fmt: skip
+
+
+def test_a_step_is_from_foot_to_foot() -> None:
+    """Both ends of soles come down, the rear foot rocks at an impact, and one late in its step."""
+    robot = hs.load_robot("bravo7")
+    (right, left), kind = robot.feet, EventKind.TOUCHDOWN
+    down = [
+        (0.15, right.contacts[1]), (0.35, left.contacts[0]), (0.351, right.contacts[1]),
+        (0.36, left.contacts[1]), (0.75, left.contacts[1]), (1.05, right.contacts[1]),
+        (1.06, right.contacts[0]), (1.0601, left.contacts[0]),
+    ]  # fmt: skip
+    events = [SimpleNamespace(time=time, contact=contact, kind=kind) for time, contact in down]
+    run: Any = SimpleNamespace(robot=robot, events=events, time=np.array([0.0, 1.4]))
+    assert step_duration(run) == pytest.approx(0.7)
+    assert [foot for _, foot in steps_of(robot, events, 0.0)] == [0, 1, 0]
+    run.events = events[3:5]
+    with pytest.raises(hs.LimitCycleError, match="two steps"):
+        step_duration(run)

@@ -228,6 +228,18 @@ def test_it_finds_the_ground_where_it_is_not_expected() -> None:
     assert run.log["slope"].values[-1] == pytest.approx(0.1, abs=0.02)
 
 
+def test_it_looks_for_the_ground_at_the_end_of_a_step_only() -> None:
+    """What it remembers of being late is a small error before: no foot is thrown down for it."""
+    found = []
+    for late in (0.0, 1e-3):
+        simulation = hs.Simulation(walking.bravo7(), law(), state=walking.gait().initial_state)
+        simulation.advance(0.3)
+        simulation.memory.late = late
+        simulation.advance(0.32)
+        found.append(simulation.state.v)
+    np.testing.assert_array_equal(*found)
+
+
 def test_feet_that_do_not_lie_flat_are_not_thrown_about() -> None:
     """Ground with corners at random heights of ±30 mm: feet stand on one end before they turn."""
     rng = np.random.default_rng(5)

@@ -5,18 +5,22 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scenes import running
 from scenes.checks import bridges, orders, twins
 from scenes.checks.commands import CHECKS, check
 from scenes.checks.summary import summary
+from scenes.findings import Findings
 from scenes.methods import Setting
 from scenes.scene import random_scene
 from scenes.twins import Twin, twins_of
 
 import heelstrike as hs
+from heelstrike.sim.closed_sets import RunStatus
 
 SEED = 10
 """Falls onto the ground, and chatters."""
@@ -40,6 +44,40 @@ def test_twins_agree_and_a_wrong_one_does_not() -> None:
     assert found["size"] > twins.AGREE
     assert found["spread"] < 1e-3 * found["size"]  # its own last digits do not do that
     assert found["cause"] != "amplified"
+
+
+def test_scenes_that_do_not_arrive_do_not_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither where no twin comes to its end, too, nor where the scene breaks off."""
+    monkeypatch.setattr(twins, "ends", lambda *_: None)
+    setting = Setting.of(random_scene(SEED))
+    found = twins.compare(setting, twins_of(setting)[:2], setting.scene.state(setting.robot), 0.0)
+    assert found["cause"] == "no end"
+    broken = SimpleNamespace(completed=False, status=RunStatus.DIVERGED, message="", events=())
+    monkeypatch.setattr(twins, "windows", lambda run: [])
+    monkeypatch.setattr(Setting, "run", lambda *_: broken)
+    result = twins.twins_of_scene("twins", SEED)
+    assert not result["passes"]
+    assert result["cause"] == "diverged"
+
+
+def test_a_second_look_that_breaks_off_excuses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What happens between rows is looked at again in a run that has to get as far."""
+
+    def run(_: Setting, method: str, **settings: Any) -> Any:
+        end = 0.1 if settings else 0.5
+        return SimpleNamespace(
+            completed=True, status=RunStatus.COMPLETED, message="", time=np.array([0.0, end])
+        )
+
+    def judge(_: Setting, method: str, run: Any) -> Findings:
+        found = Findings()
+        found.look("energy", np.array([float(run.time[-1] > 0.2)]), 0.5, run.time[-1:])
+        return found
+
+    monkeypatch.setattr(Setting, "run", run)
+    monkeypatch.setattr(Setting, "judge", judge)
+    result = running.run_scene("event_driven", SEED, twins=False)
+    assert [one["law"] for one in result["objections"]] == ["energy"]
 
 
 def test_the_last_digits_of_a_nudge() -> None:

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 import heelstrike as hs
 from heelstrike.sim import EventKind
 from heelstrike.sim.event_driven.location import NO_EVENT, lowest_place
+from heelstrike.sim.event_driven.rows import is_inside
 
 GRAVITY, STIFFNESS = 9.81, 1e4
 
@@ -90,3 +91,10 @@ def test_a_stop_touched_and_left_between_two_samples_is_seen() -> None:
     touches = [event.time for event in run.events if event.kind is EventKind.JOINT_STOP]
     assert touches == pytest.approx([2.9e-3], abs=1e-9)
     assert run.position[:, 0].min() >= -1e-10
+
+
+def test_a_step_ends_at_a_row_inside_it_only() -> None:
+    """A row may be due where the step begins, but for rounding: it cannot be cut down to that."""
+    assert is_inside(0.3004, 0.3, 1e-3)
+    assert not is_inside(0.1 * 3, 0.3, 1e-3)
+    assert not is_inside(0.3 + 0.9995e-3, 0.3, 1e-3)

@@ -160,22 +160,17 @@ class ClosedLoop:
 
     def foot(self, contact: int) -> int:
         """What comes down as one: the points of a foot, or every spoke by itself."""
-        if is_wheel(self.robot):
-            return contact
-        for place, foot in enumerate(self.robot.feet):
-            if contact in foot.contacts:
-                return place
-        return len(self.robot.feet) + contact
+        return foot_of(self.robot, contact)
 
     def _landings(self, wanted: int, longest: float) -> list[tuple[float, int]]:
         """When which foot first touched the ground, of the first so many steps."""
         simulation = self.fresh()
         begin = simulation.time
         while True:
-            before = len(self._steps(whole(simulation.record).events, begin))
+            before = len(steps_of(self.robot, whole(simulation.record).events, begin))
             doing = f"the undisturbed walk ends after {before} steps, {wanted} are needed"
             self.advanced(simulation, simulation.time + longest, doing)
-            steps = self._steps(whole(simulation.record).events, begin)
+            steps = steps_of(self.robot, whole(simulation.record).events, begin)
             if len(steps) >= wanted:
                 return steps
             if len(steps) == before:
@@ -184,17 +179,34 @@ class ClosedLoop:
                     f"{simulation.time - longest:.6g} s on, in {longest:.6g} s (longest_step)"
                 )
 
-    def _steps(self, events: Sequence[Event], begin: float) -> list[tuple[float, int]]:
-        """When which foot touched the ground first, however often it bounced or rocked then."""
-        landings = [
-            (event.time, self.foot(event.contact))
-            for event in events
-            if event.kind is EventKind.TOUCHDOWN and event.time > begin
-        ]
-        times = [begin, *(time for time, _ in landings)]
-        apart = REBOUND * max(np.diff(times), default=0.0)
-        steps: list[tuple[float, int]] = []
-        for time, foot in landings:
-            if time - (steps[-1][0] if steps else begin) > apart:
-                steps.append((time, foot))
-        return steps
+
+def steps_of(robot: Robot, events: Sequence[Event], begin: float) -> list[tuple[float, int]]:
+    """When which foot touched the ground first, however often it bounced or rocked then.
+
+    A foot may rock long after it has come down, and the other at the impact of this one: a step is
+    one by another foot, some time later.
+    """
+    landings = [
+        (event.time, foot_of(robot, event.contact))
+        for event in events
+        if event.kind is EventKind.TOUCHDOWN and event.time > begin
+    ]
+    times = [begin, *(time for time, _ in landings)]
+    apart = REBOUND * max(np.diff(times), default=0.0)
+    alone = len({foot_of(robot, contact) for contact in range(robot.nc)}) == 1
+    steps: list[tuple[float, int]] = []
+    for time, foot in landings:
+        last, stands = steps[-1] if steps else (begin, None)
+        if time - last > apart and (alone or foot != stands):
+            steps.append((time, foot))
+    return steps
+
+
+def foot_of(robot: Robot, contact: int) -> int:
+    """Tell what comes down as one: the points of a foot, or every spoke by itself."""
+    if is_wheel(robot):
+        return contact
+    for place, foot in enumerate(robot.feet):
+        if contact in foot.contacts:
+            return place
+    return len(robot.feet) + contact

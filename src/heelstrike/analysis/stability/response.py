@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
+from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk, steps_of
 from heelstrike.analysis.stability.returns import returned, stays_early
 from heelstrike.analysis.stability.section import Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
@@ -28,7 +28,6 @@ from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
-from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.method import Method
 from heelstrike.sim.run import Run
@@ -45,7 +44,7 @@ Indicator = Callable[[Run], ArrayLike]
 
 
 def step_duration(run: Run) -> float:
-    """Seconds from the first touchdown of a return to the last, of a robot on two legs: a step.
+    """Seconds from one foot's touchdown to the other's, the last of a return: a step.
 
     Parameters
     ----------
@@ -60,12 +59,12 @@ def step_duration(run: Run) -> float:
     Raises
     ------
     LimitCycleError
-        If there are no two touchdowns.
+        If no two feet come down.
     """
-    down = [event.time for event in run.events if event.kind is EventKind.TOUCHDOWN]
-    if len(down) < 2:
+    steps = steps_of(run.robot, run.events, float(run.time[0]))
+    if len(steps) < 2:
         raise LimitCycleError("a disturbed walk has not taken two steps in a return")
-    return down[-1] - down[0]
+    return steps[-1][0] - steps[-2][0]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -164,7 +163,7 @@ def disturbance_response(
     indicator : callable
         Takes the :class:`~heelstrike.Run` of a return, with a row every ten steps of the method and
         all events, and returns one or more numbers, which must not depend on when it began; the
-        duration of a step by default.
+        duration of a step by default, for which `method` must not have a fixed step.
     ground : Ground
         Level or sloping ground; ``Ground()`` by default.
     method : Method
@@ -174,7 +173,8 @@ def disturbance_response(
     settling, returns : int
         Steps before anything is disturbed; returns over which the differences are averaged.
     disturbance : float, optional
-        Size of the errors that are put in, as of :func:`~heelstrike.floquet_multipliers`.
+        Size of the errors that are put in, as of :func:`~heelstrike.floquet_multipliers`. Of a walk
+        that keeps step with the calls of its controller 1e-5 tells more than the usual size.
     longest_step : float
         Seconds after which a step without touchdown has failed.
 
@@ -219,6 +219,13 @@ def disturbance_response(
         robot, controller, state, method=method, ground=ground, control_period=control_period,
         record_every=ROWS,
     )  # fmt: skip
+    counts_steps = loop.simulation.method.step_length is not None
+    if counts_steps and indicator is step_duration:
+        raise SimulationError(
+            "with a fixed step touchdowns fall on steps, and their times do not tell small "
+            "disturbances: simulate with method=hs.EventDriven(), or give an indicator= that "
+            "does not count steps"
+        )
     if disturbance is not None and not 0.0 < disturbance < 1.0:
         raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)

@@ -258,9 +258,11 @@ class Words:
             found = {k: v for k, v in found.items() if any(_is(k, name) for name in wanted)}
         self.names = list(found)
         self._units = self._varying(walk.duration)
-        if self._opaque:  # of numbers without names, those that are always whole count something
-            self.names = [name for name in self.names if name not in self._whole]
+        # What is not known yet, NaN, cannot be wrong by a little.
+        self.names = [name for name in self.names if name not in self._unknown]
         if wanted is None:
+            if self._opaque:  # of numbers without names, those always whole count something
+                self.names = [name for name in self.names if name not in self._whole]
             self.names = self._that_matter()
         self.unit = np.array([self._units[name] for name in self.names])
         self.instants = self._instants(walk)
@@ -300,13 +302,14 @@ class Words:
             self._loop.advanced(simulation, until, "the walk does not go on")
             seen.append(list(self._all(simulation).values()))
         rows = np.array(seen).reshape(LOOKS + 1, -1)
-        spread = np.ptp(rows, axis=0)
+        finite = np.isfinite(rows).all(axis=0)
+        spread = np.ptp(np.where(finite, rows, 0.0), axis=0)
         every = list(self._all(simulation))
+        self._unknown = {name for name, known in zip(every, finite, strict=True) if not known}
         self._whole = {
             name for i, name in enumerate(every) if np.array_equal(rows[:, i], np.rint(rows[:, i]))
         }
-        good = np.isfinite(spread) & (spread > STEADY)
-        return dict(zip(every, np.where(good, spread, 1.0).tolist(), strict=True))
+        return dict(zip(every, np.where(spread > STEADY, spread, 1.0).tolist(), strict=True))
 
     def _instants(self, walk: Walk) -> Floats:
         """One for numbers that are instants: when a step began, say. They grow as time does."""

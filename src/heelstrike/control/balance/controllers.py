@@ -238,8 +238,9 @@ class FootstepFeedback(WholeBody):
 
 def _feet(robot: Robot, gait: Gait) -> list[Sole]:
     """Return the soles, or refuse what the law cannot control."""
-    check_gait(robot, gait)
+    must_be(Robot, "robot", robot)
     refuse_loops(robot, "whole-body control", ControllerError)
+    check_gait(robot, gait)
     free = robot.nv - robot.nu
     if not robot.floating or len(robot.feet) != 2 or free != 3:
         raise ControllerError(

@@ -174,6 +174,11 @@ class FlatGaitLQR(Law):
         If the robot cannot be controlled this way, the gait or a weight does not fit it, or the
         motors cannot stabilise it.
 
+    Notes
+    -----
+    The gains are those of torques that follow at once. With the usual weights errors of a light
+    foot die within a millisecond: where the law is called less often, weights have to be less.
+
     Examples
     --------
     >>> import heelstrike as hs

@@ -211,7 +211,7 @@ def _named(kind: str, words: str | None, known: Sequence[Named]) -> tuple[Named,
 
 def _words(words: str) -> list[str]:
     """Words between commas; one that has a comma itself stands in double quotes."""
-    read = csv.reader([words], skipinitialspace=True)
+    read = csv.reader([" ".join(words.splitlines())], skipinitialspace=True)
     return [word.strip() for row in read for word in row if word.strip()]
 
 

@@ -138,6 +138,11 @@ def latches_at(
     return tuple((np.isin(model.latch_joint, chosen) & there).tolist())
 
 
+def is_one(joints: Any) -> bool:
+    """Whether it is a joint by itself, rather than several: arrays have an ``__index__``, too."""
+    return isinstance(joints, str) or (hasattr(joints, "__index__") and np.ndim(joints) == 0)
+
+
 def several(name: str, joints: Any) -> Iterable[Any]:
     """Return joints of which one may be given by itself.
 
@@ -146,7 +151,7 @@ def several(name: str, joints: Any) -> Iterable[Any]:
     SimulationError
         If they are none; `name` is what is asked for.
     """
-    if isinstance(joints, str) or hasattr(joints, "__index__"):
+    if is_one(joints):
         return (joints,)
     if not isinstance(joints, Iterable):
         raise SimulationError(f"{name} must be names of joints, got {joints!r}")

@@ -387,6 +387,7 @@ def begin_phase(
         for i in range(begin.shape[0]):
             begin[i] = before[i]
         fits = is_in_place(strayed, fastest)
+        phase.left = strayed
     if fits:
         first = record.events
         report_modes(model, phase.time, phase.started == BEGUN, phase, memory.reported, record)

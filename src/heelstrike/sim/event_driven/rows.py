@@ -18,7 +18,7 @@ from heelstrike.sim.event_driven.dynamics import (
     is_in_place,
     project,
 )
-from heelstrike.sim.event_driven.location import TOGETHER
+from heelstrike.sim.event_driven.location import TOGETHER, shortest_step
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
@@ -72,7 +72,7 @@ def write_row(
 ) -> None:  # fmt: skip
     """Append a state, put on its constraints, with the certified contact forces in it.
 
-    Where no contact forces obey the laws there are none in the row.
+    Where no contact forces obey the laws there are none in the row, and none of loops.
     """
     put_right(scene, state, memory, phase)
     write_right(scene, time, lawful, control, memory, phase, record)
@@ -92,6 +92,9 @@ def write_right(
     count, loops = phase.closed_count, rows_of(memory.loops)
     if not lawful:
         count = 0
+        for place in range(loops):
+            impulse[2 * place] = 0.0
+        note_loops(model, loops, impulse, memory.loops)
     elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
@@ -145,6 +148,12 @@ def comes_down(contact: int, phase: Phase) -> bool:
 
 
 @kernel
+def is_inside(time: float, begin: float, length: float) -> bool:
+    """Whether a row within a step is at neither of its ends, so that the step could end there."""
+    return bool(shortest_step(begin) <= time - begin < AT_ITS_END * length)
+
+
+@kernel
 def write_rows_within(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record
 ) -> int:
@@ -168,13 +177,14 @@ def write_rows_within(
     state = phase.slopes[SLOPES - 1]
     while True:
         time = phase.next_row * period
-        part = (time - phase.time) / phase.length
-        if not (period > 0.0 and time <= last):
+        part = 1.0
+        if period > 0.0 and time <= last:
+            part = (time - phase.time) / phase.length
+        else:  # the step may have no length at all
             if not touch:
                 return WRITTEN
             touch = False
             time = phase.time + phase.length
-            part = 1.0
             for second in range(phase.first_second, phase.watched):
                 meets = phase.closed[second] == 0 and phase.fired[2 * second] == 1
                 phase.meets[second - phase.first_second] = 1 if meets else 0
@@ -186,7 +196,8 @@ def write_rows_within(
             for i in range(state.shape[0]):
                 state[i] = phase.end[i]
         fits = put_right(scene, state, memory, phase)
-        if not fits and part < AT_ITS_END and not last_row > phase.time:
+        inside = is_inside(time, phase.time, phase.length)
+        if not fits and inside and not last_row > phase.time:
             phase.next_length = time - phase.time
             record.rows, phase.next_row, phase.last_row = first, next_row, last_row
             return TOO_FAR
