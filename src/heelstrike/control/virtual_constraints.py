@@ -17,7 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.arguments import gains_of, must_be, number_of, numbers_of
+from heelstrike.control.arguments import (
+    gains_of,
+    must_be,
+    number_of,
+    numbers_of,
+    positive,
+)
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.places import point_columns
 from heelstrike.dynamics.spatial import Spatial, cross
@@ -284,7 +290,7 @@ class VirtualConstraints(Law):
         must_be(PhasedGait, "gait", gait)
         robot = gait.robot
         if finite_time is not None:
-            number_of("finite_time", finite_time)
+            positive("finite_time", finite_time)
         number_of("exponent", exponent)
         if finite_time is not None and not 0.0 < finite_time < np.inf:
             raise ControllerError(f"finite_time must be a positive time in s, got {finite_time!r}")
