@@ -1,7 +1,8 @@
 """What rabbit stands under virtual constraints: pushes by phase, slopes, steps, rough ground.
 
 A gait of 0.6 m at 1.1 m/s, gains 100/s² and 40/s for all of it, no feedback of where the feet land;
-or, with ``--footsteps``, 0.5 m at 1 m/s with bent knees, the defaults of ``SteppingConstraints``.
+or, with ``--footsteps``, one with bent knees for each robot (`BENT_GAITS`), and the defaults of
+``SteppingConstraints`` for both.
 ``python benchmarks/basin.py`` prints the tables of docs/virtual-constraints.md.
 """
 
@@ -18,19 +19,26 @@ KP, KD = 100.0, 40.0
 PHASES = 20
 SEEDS, OTHER_SEEDS = range(10), range(1000, 1020)
 
-BENT_LENGTH, BENT_SPEED, BENT_CLEARANCE = 0.5, 1.0, 0.05
-"""Of the gait whose feet land elsewhere, m and m/s."""
+BENT_GAITS = {"rabbit": (0.43, 0.86, 0.25), "rabbit_optimtraj": (0.5, 0.95, 0.35)}
+"""Length (m), speed (m/s) and friction of the gaits whose feet land elsewhere."""
+BENT_CLEARANCE = 0.05
 BENT = {"right_knee": (0.2, 2.6), "right_hip": (-0.8, 1.5)}
 """Its ranges of the joints: knees that stay bent, a trunk that does not lean far (rad)."""
 
 
-def footstep_trial(robot: hs.Robot, method: hs.TimeStepping | hs.EventDriven) -> hs.Trial:
-    """Return the walk with footstep feedback."""
+def bent_family(robot: hs.Robot) -> hs.StepFamily:
+    """Return the gaits of the walk with footstep feedback."""
+    length, speed, friction = BENT_GAITS[robot.name]
     gait = hs.optimize_gait(
-        robot, step_length=BENT_LENGTH, step_duration=BENT_LENGTH / BENT_SPEED, friction=0.5,
+        robot, step_length=length, step_duration=length / speed, friction=friction,
         clearance=BENT_CLEARANCE, joint_ranges=BENT,
     )  # fmt: skip
-    family = hs.StepFamily.around(hs.PhasedGait.from_gait(robot, gait))
+    return hs.StepFamily.around(hs.PhasedGait.from_gait(robot, gait))
+
+
+def footstep_trial(robot: hs.Robot, method: hs.TimeStepping | hs.EventDriven) -> hs.Trial:
+    """Return the walk with footstep feedback."""
+    family = bent_family(robot)
     law, zero = hs.SteppingConstraints(family), hs.zero_dynamics(family.gait)
     cycle = hs.find_limit_cycle(robot, zero.initial_state, law, memory=("slope",))
     print(f"contraction {zero.contraction:.4f}; multipliers with feedback {cycle.multipliers[:4]}")
@@ -64,7 +72,7 @@ def trial(robot: hs.Robot, method: hs.TimeStepping | hs.EventDriven) -> hs.Trial
 def main() -> None:
     """Measure and print."""
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--robot", default="rabbit")
+    options.add_argument("--robot", choices=BENT_GAITS, default="rabbit")
     options.add_argument("--phases", type=int, default=PHASES)
     options.add_argument("--event-driven", action="store_true", help="else 1 ms of time stepping")
     options.add_argument("--footsteps", action="store_true", help="with footstep feedback")

@@ -63,7 +63,8 @@ def in_the_air(state: hs.State) -> Contacts:
 
 def memory_with(draw: np.random.Generator) -> Memory:
     """Memory of a step on some slope, off the gait as it began."""
-    parts, f = Memory.allocate({"nu": 4, "terms": 25, "levels": 33, "axes": 2, "nv": 7}), family()
+    extents = {"nu": 4, "terms": 25, "levels": 33, "axes": 2, "nv": 7, "n": 4, "m": 19}
+    parts, f = Memory.allocate(extents), family()
     powers = [1.0, 0.4, 0.16]
     parts.coefficients[:] = np.tensordot(powers, f.coefficients, 1)
     parts.middle[:] = np.tensordot(powers, f.middle, 1)
@@ -144,8 +145,32 @@ def test_it_asks_no_more_of_the_ground_than_that_can_bear(swing: float) -> None:
         )
         normal, tangent = motion.contact_force[robot.feet[0].contacts[0]]
         room[type(law)] = min(0.6 * normal - abs(tangent), normal - 0.1 * robot.weight)
+        most = np.abs(torque).max()
+    assert most <= robot.model.torque_upper.max() * (1.0 + 1e-9)
     assert room[hs.VirtualConstraints] < -1.0
     assert room[hs.SteppingConstraints] > -1e-6 * robot.weight
+
+
+def test_a_joint_is_braked_before_the_end_of_its_range() -> None:
+    """Without gains nothing else would: it goes on at 8 rad/s, a tenth of a radian before it."""
+    first, last = family().gait.phase_range
+    robot = family().gait.robot
+    state = on_the_walk(first + 0.3 * (last - first))
+    knee = robot.joint_names.index("left_knee")
+    braked = {}
+    for law in (
+        hs.VirtualConstraints(family().gait, kp=0.0, kd=0.0),
+        hs.SteppingConstraints(family(), kp=0.0, kd=0.0, friction=5.0),
+    ):
+        law.torque(0.0, state, in_the_air(state))  # the step has begun
+        q, v = state.q.copy(), state.v.copy()
+        q[knee], v[knee] = law_module._bounds(family(), 0.6).upper[-1] - 0.1, 8.0
+        torque = law.torque(0.0, hs.State(q, v), in_the_air(state))
+        motion = hs.contact_forward_dynamics(robot, q, v, torque, ground=hs.Ground(friction=50.0))
+        braked[type(law)] = -motion.acceleration[knee]
+    assert braked[hs.VirtualConstraints] < 0.0
+    # It may come nearer as exp(-100 t) does, twice over.
+    assert braked[hs.SteppingConstraints] == pytest.approx(2.0 * 100.0 * 8.0 - 100.0**2 * 0.1)
 
 
 def test_the_multipliers_with_feedback() -> None:

@@ -18,26 +18,22 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.polynomial.chebyshev import chebval
 from numpy.typing import ArrayLike
 
-from heelstrike.compiler.bundle import Bundle, array, cell, number
+from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import gains_of, must_be, number_of
+from heelstrike.control.bearable import GROUND_ROWS, JOINT_ROWS, Bearable, Bounds, bear
 from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
-from heelstrike.control.virtual_constraints import (
-    demand,
-    hold_foot,
-    series,
-)
-from heelstrike.dynamics.frames import into_frame
-from heelstrike.dynamics.spatial import Spatial, spatial
+from heelstrike.control.virtual_constraints import series
 from heelstrike.errors import ControllerError
 from heelstrike.gait.phased.family import StepFamily
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-from heelstrike.sim.controller.stance import joint_torques, solve_three_transposed
+from heelstrike.sim.controller.stance import joint_torques
 
 # Phases, in parts of half a step from its middle, between which one shift goes over to the next.
 BEGINS, ENDS = -0.8, 0.5
@@ -47,6 +43,8 @@ FADES = 0.8
 LEAST_RATE = 0.3
 # Part of the robot's weight that the stance foot is pressed with at least.
 PRESSED = 0.1
+# Joints keep within the range that they have in the family, and this much beyond (rad).
+BEYOND_FAMILY = 0.5
 # A foot that is less than this above the ground (m) has just stood there.
 STOOD = 0.01
 
@@ -62,10 +60,8 @@ class Parameters(Bundle):
         Shift, in largest ones, for an energy that is twice the usual one.
     trust : float
         Part of the difference to the slope of the last step that is believed.
-    friction : float
-        Friction that the law counts on.
-    press : float
-        Normal force that it keeps on the foot (N).
+    bounds : Bounds
+        What ground and joints are counted on to bear.
     steepest : float
         Largest slope of the family (tangent).
     rate : float
@@ -88,8 +84,7 @@ class Parameters(Bundle):
     kd: Floats = array("nu")
     response: float = number(float)
     trust: float = number(float)
-    friction: float = number(float)
-    press: float = number(float)
+    bounds: Bounds = part(Bounds)
     steepest: float = number(float)
     rate: float = number(float)
     level: float = number(float)
@@ -143,8 +138,7 @@ class Memory(Bundle):
     value: Floats = array("nu")
     gradient: Floats = array("nu")
     curvature: Floats = array("nu")
-    wanted: Floats = array("nu")
-    force: Floats = array("nv")
+    bearable: Bearable = part(Bearable)
     momentum: Floats = array(3)
     center: Floats = array("axes")
 
@@ -336,50 +330,6 @@ def take_up(memory: Memory, theta: float) -> None:
         memory.curvature[i] += 6.0 * left * (inner - left * along) / (width * width)
 
 
-@kernel
-def room(robot: ControlledRobot, parameters: Parameters, normal: Floats, force: Floats) -> Spatial:
-    """What is left of the least normal force and of friction on either side, (3,)."""
-    columns, rest = robot.columns, robot.unactuated
-    a, b, c = rest[0], rest[1], rest[2]
-    x, z, _ = solve_three_transposed(
-        spatial(columns, a), spatial(columns, b), spatial(columns, c),
-        (force[a], force[b], force[c]),
-    )  # fmt: skip
-    up, along = into_frame(normal, (x, z))
-    return (
-        up - parameters.press,
-        parameters.friction * up - along,
-        parameters.friction * up + along,
-    )
-
-
-@kernel
-def obey_within(
-    state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
-    memory: Memory,
-) -> None:  # fmt: skip
-    """Write `robot.force` for the accelerations, or for as much of them as the ground can bear."""
-    foot = memory.stance
-    normal = contacts.normal[robot.foot_contact[foot]]
-    turning, drift = hold_foot(state, contacts, robot, parameters.phase, foot)
-    demand(state, robot, turning, drift, memory.wanted, memory.gradient)
-    asked = room(robot, parameters, normal, robot.force)
-    if min(asked[0], min(asked[1], asked[2])) >= 0.0:
-        return
-    for j in range(robot.nv):
-        memory.force[j] = robot.force[j]
-    for i in range(robot.nu):
-        memory.wanted[i] = 0.0
-    demand(state, robot, turning, drift, memory.wanted, memory.gradient)
-    idle = room(robot, parameters, normal, robot.force)
-    part = 1.0
-    for k in range(3):
-        if asked[k] < 0.0 and asked[k] < idle[k]:
-            part = min(part, max(idle[k], 0.0) / (max(idle[k], 0.0) - asked[k]))
-    for j in range(robot.nv):
-        robot.force[j] += part * (memory.force[j] - robot.force[j])
-
-
 @controller
 def stepping_constraints(
     state: ControlState, contacts: Contacts, robot: ControlledRobot, parameters: Parameters,
@@ -399,13 +349,20 @@ def stepping_constraints(
     change = aim - memory.before
     memory.shift = memory.before + share * change
     follow(memory, theta, memory.shift, share1 * change / half, share2 * change / (half * half))
-    take_up(memory, theta)
+    if memory.landed == 1:
+        take_up(memory, theta)
+    bearable = memory.bearable
     for i in range(robot.nu):
         error = state.joint_position[i] - memory.value[i]
         error_rate = state.joint_velocity[i] - memory.gradient[i] * rate
-        memory.wanted[i] = memory.curvature[i] * rate * rate
-        memory.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
-    obey_within(state, contacts, robot, parameters, memory)
+        bearable.slope[i] = memory.gradient[i]
+        bearable.wanted[i] = memory.curvature[i] * rate * rate
+        # An impact that takes a while is not fought: no motor is a match for it.
+        if memory.landed == 1:
+            bearable.wanted[i] -= parameters.kp[i] * error + parameters.kd[i] * error_rate
+    bear(
+        state, contacts, robot, parameters.phase, memory.stance, parameters.bounds, memory.bearable
+    )
     joint_torques(robot, torque)
 
 
@@ -425,8 +382,9 @@ class SteppingConstraints(Law):
         Part of the difference between the slope of the last step and the one believed that is
         believed, from 0 to 1.
     friction : float
-        Friction that the law counts on. Where the constraints ask for more of the stance foot, or
-        for less than a tenth of the weight, joints are accelerated by as much less.
+        Friction that the law counts on. Where the constraints ask for more of the stance foot, for
+        less than a tenth of the weight, for more than a motor has, or drive a joint beyond what the
+        family does with it, joints are accelerated otherwise, by as little as that takes.
 
     Raises
     ------
@@ -438,9 +396,9 @@ class SteppingConstraints(Law):
         self,
         family: StepFamily,
         *,
-        kp: ArrayLike = 400.0,
-        kd: ArrayLike = 40.0,
-        response: float = 0.5,
+        kp: ArrayLike = 900.0,
+        kd: ArrayLike = 60.0,
+        response: float = 0.45,
         trust: float = 0.5,
         friction: float = 0.6,
     ) -> None:
@@ -464,8 +422,7 @@ class SteppingConstraints(Law):
             kd=gains_of("kd", kd, robot),
             response=float(response),
             trust=float(trust),
-            friction=float(friction),
-            press=PRESSED * robot.weight,
+            bounds=_bounds(family, float(friction)),
             steepest=family.slope,
             rate=family.rate,
             level=float(family.energy[0].sum()),
@@ -479,6 +436,27 @@ class SteppingConstraints(Law):
             "stance": gait.stance_foot,
             "terms": len(gait.coefficients),
             "levels": family.energy.shape[1],
+            "n": robot.nu,
+            "m": GROUND_ROWS + JOINT_ROWS * robot.nu,
         }
         super().__init__(stepping_constraints, parameters, memory=memory, robot=robot)
         self.family = family
+
+
+def _bounds(family: StepFamily, friction: float) -> Bounds:
+    """Bounds of the law: joints go where they do in one of the nine gaits."""
+    series_of, places = family.coefficients_on_both_feet(), np.linspace(-1.0, 1.0, 65)
+    lower, upper = np.inf, -np.inf
+    for b in (-1.0, 0.0, 1.0):
+        for t in (-1.0, 0.0, 1.0):
+            powers = np.outer([1.0, b, b * b], [1.0, t, t * t])
+            own = np.tensordot(series_of, powers, ((1, 2), (0, 1)))
+            joints = chebval(places, np.moveaxis(own, 1, 0))
+            lower = np.minimum(lower, joints.min(axis=(0, 2)))
+            upper = np.maximum(upper, joints.max(axis=(0, 2)))
+    return Bounds(
+        friction=friction,
+        press=PRESSED * family.gait.robot.weight,
+        lower=lower - BEYOND_FAMILY,
+        upper=upper + BEYOND_FAMILY,
+    )

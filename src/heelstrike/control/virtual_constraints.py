@@ -214,8 +214,8 @@ def hold_foot(
 def demand(
     state: ControlState, robot: ControlledRobot, turning: Spatial, drift: tuple[float, float],
     accelerations: Floats, slope: Floats,
-) -> None:  # fmt: skip
-    """Write `robot.force` that gives the joints the accelerations + θ̈ slope, the foot held."""
+) -> float:  # fmt: skip
+    """Write `robot.force` that gives joints the accelerations + θ̈ slope, the foot held; tell θ̈."""
     wanted, force, other = robot.acceleration, robot.force, robot.other
     along = robot.passive  # it is written anew below
     complete(robot, (-drift[0], -drift[1], 0.0), accelerations, wanted)
@@ -231,6 +231,7 @@ def demand(
     share = -missing / (with_phase - missing)
     for j in range(robot.nv):
         force[j] += share * (other[j] - force[j])
+    return share
 
 
 @controller

@@ -1,0 +1,185 @@
+"""What ground, motors and joints can bear of what constraints ask: the nearest that they can.
+
+While the ground holds a point foot, its force, the torques of the motors and the rate of the phase
+are affine functions of what is wanted of the joints. Where that would need more friction than there
+is, a pull of the ground, more than a motor has, or would carry a joint out of its range, it is
+changed as little as may be: a quadratic programme with an unknown for each joint.
+"""
+
+from __future__ import annotations
+
+from heelstrike.compiler.bundle import Bundle, array, number, part
+from heelstrike.compiler.compilation import kernel
+from heelstrike.control.quadratic.dual_active_set import solve_or_relax
+from heelstrike.control.quadratic.program import SOLVED, Program
+from heelstrike.control.virtual_constraints import demand, hold_foot
+from heelstrike.dynamics.frames import into_frame
+from heelstrike.dynamics.spatial import Spatial, spatial
+from heelstrike.robot.model import Floats
+from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.stance import joint_torques, solve_three_transposed
+
+# Rows: pressing, friction either way; then of each joint its motor's least and greatest torque, and
+# the low and the high end of its range.
+GROUND_ROWS = 3
+JOINT_ROWS = 4
+# In which order they are given up if not all can be kept: the greatest first.
+RANGE_LEVEL, PRESS_LEVEL, CONE_LEVEL, MOTOR_LEVEL = 4, 3, 2, 1
+# A joint may near the end of its range at this rate (1/s).
+NEARING = 100.0
+# What a motor without a limit has (N m).
+ENDLESS = 1e9
+
+
+class Bounds(Bundle):
+    """What is to be kept to.
+
+    Attributes
+    ----------
+    friction, press : float
+        Friction that is counted on; normal force that is kept on the foot (N).
+    lower, upper : (nu,) float
+        Ranges of the joints (rad).
+    """
+
+    friction: float = number(float)
+    press: float = number(float)
+    lower: Floats = array("nu")
+    upper: Floats = array("nu")
+
+
+class Bearable(Bundle):
+    """What is wanted, and the programme of what can be had.
+
+    Attributes
+    ----------
+    wanted, slope : (nu,) float
+        The joints are to be accelerated by wanted + θ̈ slope, θ the phase.
+    program : Program
+        Its unknowns are changes of `wanted`.
+    asked, share : (nv,) and (nv, nu) float
+        Generalised force that gives what is wanted, and how it changes.
+    turned : (nu,) float
+        How θ̈ changes.
+    torque : (nu,) float
+        Scratch.
+    """
+
+    wanted: Floats = array("nu")
+    slope: Floats = array("nu")
+    program: Program = part(Program)
+    asked: Floats = array("nv")
+    share: Floats = array("nv", "nu")
+    turned: Floats = array("nu")
+    torque: Floats = array("nu")
+
+
+@kernel
+def ground_rows(robot: ControlledRobot, normal: Floats, friction: float, torque: Floats) -> Spatial:
+    """Find the rows of the ground, and the torques, for a force in `robot.force`."""
+    columns, rest, force = robot.columns, robot.unactuated, robot.force
+    a, b, c = rest[0], rest[1], rest[2]
+    x, z, _ = solve_three_transposed(
+        spatial(columns, a), spatial(columns, b), spatial(columns, c),
+        (force[a], force[b], force[c]),
+    )  # fmt: skip
+    up, along = into_frame(normal, (x, z))
+    joint_torques(robot, torque)
+    return up, friction * up - along, friction * up + along
+
+
+@kernel
+def borne(
+    state: ControlState, robot: ControlledRobot, normal: Floats, turning: float, bounds: Bounds,
+    bearable: Bearable,
+) -> bool:  # fmt: skip
+    """Whether what is wanted, whose force is in `robot.force`, can be had; write the bounds."""
+    bound, torque, model = bearable.program.bound, bearable.torque, robot.model
+    up, ahead, behind = ground_rows(robot, normal, bounds.friction, torque)
+    bound[0], bound[1], bound[2] = bounds.press - up, -ahead, -behind
+    for i in range(robot.nu):
+        row = GROUND_ROWS + JOINT_ROWS * i
+        bound[row] = max(model.torque_lower[i], -ENDLESS) - torque[i]
+        bound[row + 1] = torque[i] - min(model.torque_upper[i], ENDLESS)
+        place, speed = state.joint_position[i], state.joint_velocity[i]
+        free = bearable.wanted[i] + turning * bearable.slope[i] + 2.0 * NEARING * speed
+        bound[row + 2] = NEARING**2 * (bounds.lower[i] - place) - free
+        bound[row + 3] = NEARING**2 * (place - bounds.upper[i]) + free
+    worst = 0.0
+    for row in range(bound.shape[0]):
+        worst = max(worst, bound[row])
+    return worst <= 0.0
+
+
+@kernel
+def find_shares(
+    state: ControlState, robot: ControlledRobot, turning: Spatial, drift: tuple[float, float],
+    bearable: Bearable,
+) -> None:  # fmt: skip
+    """Write how force and θ̈ change with what is wanted: they are affine in it."""
+    wanted, slope = bearable.wanted, bearable.slope
+    rate = demand(state, robot, turning, drift, wanted, slope)
+    for j in range(robot.nv):
+        bearable.asked[j] = robot.force[j]
+    for i in range(robot.nu):
+        wanted[i] += 1.0
+        bearable.turned[i] = demand(state, robot, turning, drift, wanted, slope) - rate
+        wanted[i] -= 1.0
+        for j in range(robot.nv):
+            bearable.share[j, i] = robot.force[j] - bearable.asked[j]
+
+
+@kernel
+def write_rows(robot: ControlledRobot, normal: Floats, friction: float, bearable: Bearable) -> None:
+    """Write the rows of the programme."""
+    rows, torque = bearable.program.rows, bearable.torque
+    for k in range(robot.nu):
+        for j in range(robot.nv):
+            robot.force[j] = bearable.share[j, k]
+        rows[0, k], rows[1, k], rows[2, k] = ground_rows(robot, normal, friction, torque)
+        for i in range(robot.nu):
+            row = GROUND_ROWS + JOINT_ROWS * i
+            rows[row, k], rows[row + 1, k] = torque[i], -torque[i]
+            own = 1.0 if i == k else 0.0
+            rows[row + 2, k] = own + bearable.turned[k] * bearable.slope[i]
+            rows[row + 3, k] = -rows[row + 2, k]
+
+
+@kernel
+def find_nearest(program: Program) -> None:
+    """Solve for the least change that keeps the rows, or as many of them as can be."""
+    for i in range(program.x.shape[0]):
+        program.gradient[i] = 0.0
+        for k in range(program.x.shape[0]):
+            program.hessian[i, k] = 1.0 if i == k else 0.0
+    program.equalities, program.count = 0, program.bound.shape[0]
+    for row in range(GROUND_ROWS, program.count):
+        ends = (row - GROUND_ROWS) % JOINT_ROWS >= 2
+        program.level[row] = RANGE_LEVEL if ends else MOTOR_LEVEL
+    program.level[0], program.level[1], program.level[2] = PRESS_LEVEL, CONE_LEVEL, CONE_LEVEL
+    solve_or_relax(program)
+    if program.status != SOLVED:
+        for i in range(program.x.shape[0]):
+            program.x[i] = 0.0
+
+
+@kernel
+def bear(
+    state: ControlState, contacts: Contacts, robot: ControlledRobot, phase: Floats, foot: int,
+    bounds: Bounds, bearable: Bearable,
+) -> None:  # fmt: skip
+    """Write `robot.force` that gives what is wanted, or the nearest that can be borne."""
+    normal = contacts.normal[robot.foot_contact[foot]]
+    turning, drift = hold_foot(state, contacts, robot, phase, foot)
+    rate = demand(state, robot, turning, drift, bearable.wanted, bearable.slope)
+    if borne(state, robot, normal, rate, bounds, bearable):
+        return
+    find_shares(state, robot, turning, drift, bearable)
+    write_rows(robot, normal, bounds.friction, bearable)
+    find_nearest(bearable.program)
+    for j in range(robot.nv):
+        total = bearable.asked[j]
+        for i in range(robot.nu):
+            total += bearable.share[j, i] * bearable.program.x[i]
+        robot.force[j] = total
