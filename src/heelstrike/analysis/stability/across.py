@@ -38,12 +38,13 @@ class Across:
     kept, inert : tuple of int
         Coordinates on which something hangs, and the rest.
     matrices, across : tuple of float arrays
-        Derivatives of the returns in the coordinates that are kept; the same across the walk.
+        Derivatives of the returns in the coordinates that are kept; the same across the walk, or all
+        the same where being early by less than a sample does not stay.
     bases : tuple of (n, m) float
         What the errors across the walk are in these coordinates, at the beginnings of the returns
         and the end of the last.
     along : float or None
-        What stays of being early; None of a walk that a clock drives.
+        What stays of being early, by a whole number of samples; None of a walk that a clock drives.
     """
 
     kept: tuple[int, ...]
@@ -59,7 +60,7 @@ class Across:
 
         `early` is what is left of being early: all of it, or less if a clock drives the walk.
         Disturbances that are `smooth`, less than what moves in a sample, tell by themselves what is
-        remembered of being early by as little.
+        remembered of being early by as little, and whether that stays.
         """
         kept, inert = _with_consequence([each.matrix for each in found], of_robot)
         square = np.ix_(kept, kept)
@@ -72,6 +73,8 @@ class Across:
             m = sum(i < of_robot for i in kept)
             remembered = _remembered(np.mean(matrices, axis=0), np.mean(ways[:-1], axis=0)[:m])
             ways = [np.concatenate((each[:m], remembered)) for each in ways]
+            if not _carried_on(matrices, ways):
+                return cls(tuple(kept), tuple(inert), matrices, matrices, same, early)
         bases = _alike([null_space(way[None, :]) for way in ways])
         across = [bases[k + 1].T @ each @ bases[k] for k, each in enumerate(matrices)]
         return cls(tuple(kept), tuple(inert), matrices, tuple(across), tuple(bases), early)
@@ -93,6 +96,18 @@ class Across:
         """The error that shrinks least, in the coordinates that are kept."""
         values, vectors = np.linalg.eig(np.mean(self.across, axis=0))
         return np.abs(self.bases[0] @ vectors[:, int(np.argmax(np.abs(values)))])
+
+
+def _carried_on(matrices: tuple[Floats, ...], ways: list[Floats]) -> bool:
+    """Tell whether being early by less than a sample stays: M u = u⁺, near enough.
+
+    A walk that keeps step with the calls of its controller loses it; to so small errors the calls
+    are a clock.
+    """
+    return all(
+        float(np.linalg.norm(matrix @ ways[k] - ways[k + 1])) <= STAYS * np.linalg.norm(ways[k + 1])
+        for k, matrix in enumerate(matrices)
+    )
 
 
 def _remembered(matrix: Floats, rate: Floats) -> Floats:
