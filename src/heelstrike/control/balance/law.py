@@ -196,7 +196,7 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     reference, plan = parameters.reference, memory.plan
     elapsed = max(t - memory.time, 0.0)
     memory.phase = min(memory.phase + memory.rate * elapsed, 1.0)
-    if memory.phase >= 1.0 and memory.late > 0.0:
+    if memory.phase >= 1.0:
         memory.late += elapsed
     memory.time = t
     plan.gone = elapsed
@@ -271,7 +271,7 @@ def want_height(
     fallen += 0.5 * (2.0 * x - plan.capture - plan.pressure) * (shrunk - 1.0)
     across = plan.foothold - (hip[0] - memory.sole[0]) - fallen
     limit = under + sqrt(max(reach * reach - across * across, 0.25 * reach * reach))
-    if memory.phase >= 1.0 and memory.late > 0.0:
+    if memory.phase >= 1.0:
         limit += min(memory.swing[1] - memory.sole[1] - memory.slope * plan.swing, 0.0)
     low = min(min(own - parameters.crouch, room), limit)
     height = own + alarm * (low - own)
@@ -344,7 +344,7 @@ def want_foothold(
     speed += alarm * parameters.lift * 32.0 * s * r * (r - s) * rate
     bend += alarm * parameters.lift * 32.0 * (1.0 - 6.0 * s * r) * squared
     height = memory.swing[1] - memory.sole[1]
-    if memory.phase >= 1.0 and memory.late > 0.0:
+    if memory.phase >= 1.0:
         part = min(memory.late / parameters.search, 1.0)
         speed = -parameters.slow - part * (parameters.fast - parameters.slow)
         rise = parameters.foot_kd * damping * (speed - memory.speed[1])
