@@ -38,8 +38,8 @@ class Across:
     kept, inert : tuple of int
         Coordinates on which something hangs, and the rest.
     matrices, across : tuple of float arrays
-        Derivatives of the returns in the coordinates that are kept; the same across the walk, or all
-        the same where being early by less than a sample does not stay.
+        Derivatives of the returns in the coordinates that are kept; the same across the walk, or
+        as they are where being early by less than a sample does not stay.
     bases : tuple of (n, m) float
         What the errors across the walk are in these coordinates, at the beginnings of the returns
         and the end of the last.
