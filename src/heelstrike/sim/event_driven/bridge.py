@@ -34,7 +34,7 @@ from heelstrike.sim.contacts.loops import append_loops, free_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
-from heelstrike.sim.event_driven.corners import is_cornered, is_struck, joined
+from heelstrike.sim.event_driven.corners import is_struck, log_impulse
 from heelstrike.sim.event_driven.dynamics import evaluate
 from heelstrike.sim.event_driven.faces import locate, stand_on_face
 from heelstrike.sim.event_driven.gaps import (
@@ -288,11 +288,8 @@ def report_impulses(
     """Append the bridge to the events, and the impulses of the contacts."""
     log_event(phase.time, BRIDGE, 0, phase.length, wrong, record)
     for contact in range(phase.first_dry):
-        normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
-        struck = normal > 0.0
-        if contact < model.nc and is_cornered(contact, phase):
-            struck = is_struck(contact, phase)
-            normal, tangent = joined(contact, phase.impulse, contacts, phase)
+        normal = phase.impulse[contact, 0]
+        struck = is_struck(contact, phase) if contact < model.nc else normal > 0.0
         if not struck:
             continue
         if contact >= model.nc:
@@ -305,7 +302,7 @@ def report_impulses(
             kind = TOUCHDOWN
             reported.closed[contact] = 1
             reported.slipping[contact] = 0
-        log_event(phase.time, kind, contact, normal, tangent, record)
+        log_impulse(kind, contact, contacts, phase, record)
 
 
 @kernel
