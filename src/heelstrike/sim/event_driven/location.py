@@ -63,8 +63,11 @@ ATTEMPTS = 3
 EARLIER = 0.25
 SOONEST = 1e-8
 LOW, SOON = 1e-5, 1e-6
-# How many faces a point may pass between two samples.
-MOST_FACES = 4
+# How many faces and corners a point may pass between two samples; part of the way to the first
+# sample after which it is told over which it is; a radius with which corners are faces, too.
+MOST_FACES = 6
+AT_ONCE = 1e-3
+A_DISC = 1.0
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
@@ -311,10 +314,10 @@ def face_within(
     scene: Scene, part: float, length: float, contact: int, control: Control, memory: Memory,
     phase: Phase,
 ) -> int:  # fmt: skip
-    """Face that an open point is nearest to at a fraction of the step."""
+    """Face, or corner, of the ground that an open point is nearest to at a fraction of the step."""
     evaluate_within(scene, part, length, False, control, memory, phase)
     x, z = memory.contacts.position[contact, 0], memory.contacts.position[contact, 1]
-    return int(nearest_face(scene.ground, x, z, 0.0))
+    return int(nearest_face(scene.ground, x, z, A_DISC))
 
 
 @kernel
@@ -343,15 +346,18 @@ def crossing_by_faces(
     """Fraction of the step at which an open point reaches ground whose nearest face changes.
 
     Its gap has kinks there, and is smooth in between. That of a point in the ground can be deepest
-    at one.
+    at one. Where it begins on the ground, as on a corner, a moment later tells over which face.
     """
     before, before_rate = phase.before[function], phase.before_rate[function]
     value, rate = phase.sample[function], phase.sample_rate[function]
     root, begin = NO_EVENT, low
     for _ in range(MOST_FACES):
-        end, beyond = next_kink(
-            scene, function // 2, begin, high, length, control, memory, phase
-        )  # fmt: skip
+        if begin == 0.0 and before <= TOGETHER:
+            end = beyond = AT_ONCE * high
+        else:
+            end, beyond = next_kink(
+                scene, function // 2, begin, high, length, control, memory, phase
+            )  # fmt: skip
         if end == high:
             break
         evaluate_within(scene, end, length, False, control, memory, phase)
