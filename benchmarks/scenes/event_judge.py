@@ -150,6 +150,12 @@ class EventRows:
         ahead = np.append(np.diff(self.instant), 1.0)
         self.ahead = np.repeat(ahead, self.last - self.first + 1)
         """Time from a row to the next instant."""
+        count = self.last - self.first + 1
+        self.next = np.repeat(np.append(self.first[1:], len(time) - 1), count)
+        """First row of the next instant."""
+        calm = ~self.eventful() | (count > 1)
+        self.goes_on = np.repeat(np.append(calm[1:], False), count)
+        """Whether that row shows what went before it, and not what an event has made of it."""
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
@@ -225,12 +231,18 @@ class EventRows:
         found.look("sticking point slides off", loose, LAW, rows.time, rows.contacts)
 
     def seen(self, into: Array) -> Array:
-        """Whether an acceleration into a limit lasts long enough to lead anywhere.
+        """Whether an acceleration (T, p) into a limit lasts long enough to lead anywhere.
 
         At the height of a bounce too small to see, a point as near to the ground as if it were held
-        on it falls freely.
+        on it falls freely. One that leaves under a force that vanishes may do so a moment early:
+        with an acceleration that changes evenly from a to a' over a time T it is deepest at its
+        end, or at ``t = 2 T a / (a − a')``, by ``t² (a / 2 + (a' − a) t / 6 T)``.
         """
-        return 0.5 * into * self.ahead[:, None] ** 2 > CLOSED
+        change = np.where(self.goes_on[:, None], into[self.next] - into, 0.0)
+        ahead = self.ahead[:, None]
+        turns = np.divide(-2.0 * into, change, where=change < 0.0, out=np.ones_like(into))
+        part = np.clip(turns, 0.0, 1.0)
+        return (part * ahead) ** 2 * (into / 2.0 + change * part / 6.0) > CLOSED
 
     def joints(self, found: Findings) -> None:
         rows, model, run = self.rows, self.rows.model, self.rows.run
