@@ -117,7 +117,7 @@ class EventRows:
         """Rows that show what follows their instant, not what went before."""
         # Where a push begins or ends at the instant of an event, its last row shows what follows.
         events = np.array([event.time for event in run.events])
-        met = np.abs(time[:, None] - events).min(axis=1, initial=np.inf) <= INSTANT
+        met = _distance(time, events) <= INSTANT
         follows = (met & self.settled)[:, None]
         # Without an event nobody knows which side of such an instant its row shows.
         edge = np.abs(time[:, None] - self.edges).min(axis=1, initial=np.inf) <= INSTANT
@@ -137,9 +137,9 @@ class EventRows:
         """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
         for event in run.events:
             if event.kind is EventKind.BRIDGE:
-                self.bridges[int(np.argmin(np.abs(self.instant - event.time)))] = event.impulse
+                self.bridges[self.at(event.time)] = event.impulse
         self.jams = {
-            int(np.argmin(np.abs(self.instant - event.time)))
+            self.at(event.time)
             for event in run.events
             if event.kind is EventKind.PAINLEVE and event.impulse[0] > 0.0
         }
@@ -156,6 +156,12 @@ class EventRows:
         calm = ~self.eventful() | (count > 1)
         self.goes_on = np.repeat(np.append(calm[1:], False), count)
         """Whether that row shows what went before it, and not what an event has made of it."""
+
+    def at(self, time: float) -> int:
+        """Instant nearest to a time."""
+        after = int(np.searchsorted(self.instant, time))
+        near = range(max(after - 1, 0), min(after + 1, len(self.instant)))
+        return min(near, key=lambda k: abs(self.instant[k] - time))
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
@@ -288,7 +294,7 @@ class EventRows:
         gains: set[int] = set()
         seen: dict[tuple[int, int, int], int] = {}
         for event in self.rows.run.events:
-            k = int(np.argmin(np.abs(self.instant - event.time)))
+            k = self.at(event.time)
             if event.kind is EventKind.ENERGY_GAIN:
                 gains.add(k)
             stop = event.kind is EventKind.JOINT_STOP
@@ -385,7 +391,7 @@ class EventRows:
 
     def end_of(self, k: int) -> int:
         """Instant at which the bridge that begins at instant k ends."""
-        return int(np.argmin(np.abs(self.instant - self.instant[k] - self.bridges[k][0])))
+        return self.at(self.instant[k] + self.bridges[k][0])
 
     def couple(self, k: int, left: Array, p: Array) -> Array:
         """Part of a generalised impulse that couples on discs in corners explain.
@@ -585,9 +591,9 @@ class EventRows:
         for event in self.rows.run.events:
             if event.kind is EventKind.ZENO:  # says when the bounces would have ended: it rests
                 continue
-            near = np.abs(self.instant - event.time) <= INSTANT
-            if np.any(near):
-                changes |= near
+            near = self.at(event.time)
+            if abs(self.instant[near] - event.time) <= INSTANT:
+                changes[near] = True
             elif not np.any(np.abs(self.edges - event.time) <= EDGE):
                 # It has no row of its own, as at the edges of pushes: nothing may be integrated
                 # across it.
@@ -620,6 +626,13 @@ class EventRows:
         """Whether a push begins or ends between instants k and k + 1."""
         begin, end = self.instant[k] - INSTANT, self.instant[k + 1] + INSTANT
         return bool(np.any((self.edges > begin) & (self.edges < end)))
+
+
+def _distance(time: Array, others: Array) -> Array:
+    """Distance of each time from the nearest of others, which are in order; infinite without."""
+    among = np.concatenate(([-np.inf], others, [np.inf]))
+    after = np.searchsorted(among, time).clip(1)
+    return np.minimum(among[after] - time, time - among[after - 1])
 
 
 def _size(matrix: Array, v: Array) -> float:
