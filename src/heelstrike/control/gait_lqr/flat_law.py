@@ -24,6 +24,7 @@ from heelstrike.control.gait_lqr.flat import FINE, KEPT, FlatOrbit
 from heelstrike.control.gait_lqr.transverse import multipliers_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Footing, Gait
+from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
@@ -89,21 +90,11 @@ class Memory(Stance):
 @kernel
 def find_errors(state: ControlState, parameters: Parameters, memory: Memory, phase: float) -> None:
     """Write what joints lack of the gait at a time in the step, and their velocities."""
-    late = phase > parameters.latest
-    s = min(phase, parameters.latest)
-    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
-    piece = 0
-    while piece < coefficients.shape[1] - 1 and s >= breakpoints[piece + 1]:
-        piece += 1
-    s -= breakpoints[piece]
-    count = coefficients.shape[3]
+    piece, inside, moves = place_in_step(phase, parameters.latest, parameters.breakpoints)
+    terms = parameters.coefficients[memory.stance, piece]
+    count = terms.shape[1]
     for i in range(count):
-        position, velocity = 0.0, 0.0
-        for k in range(coefficients.shape[2] - 1, -1, -1):
-            velocity = velocity * s + position
-            position = position * s + coefficients[memory.stance, piece, k, i]
-        if late:
-            velocity = 0.0
+        position, velocity, _ = motion_in_piece(terms, i, inside, moves)
         memory.error[i] = position - state.joint_position[i]
         memory.error[count + i] = velocity - state.joint_velocity[i]
 
