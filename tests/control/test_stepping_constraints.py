@@ -185,7 +185,7 @@ def test_a_joint_is_braked_before_the_end_of_its_range(period: float, rate: floa
 def test_a_joint_that_is_braked_from_call_to_call_comes_to_rest_within_its_range(
     period: float,
 ) -> None:
-    """It brakes as hard as it must and holds that until the next call; at first it is slow enough."""
+    """It is slow enough at first, brakes as hard as it must and holds that until the next call."""
     rate = uncompiled(nearing)(period)
     place, speed = -1.0, 0.5 * rate
     for _ in range(int(100.0 / (rate * period)) + 1):
