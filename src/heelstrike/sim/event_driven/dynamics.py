@@ -339,9 +339,7 @@ def hold_closed(
         return
     phase.deficient = 1 if rank < size else 0
     if phase.deficient == 1:
-        shorten(
-            0, size, rank, phase.scale, phase.lean, phase.column, phase.system, phase.unknown
-        )
+        shorten(0, size, rank, phase.scale, phase.lean, phase.column, phase.system, phase.unknown)
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
         if phase.lean[i] != 0.0:
