@@ -44,7 +44,7 @@ MOTION = 1e-6
 def judge_compliant(run: Any) -> Findings:
     """Judge a run on compliant ground, from its record."""
     found = Findings()
-    rows = Rows(run, corners=IN_CORNER, instants=True)
+    rows = Rows(run, corners=IN_CORNER)
     rows.geometry(found)
     found.figures["penetration"] = float(max(np.max(-rows.gap, initial=0.0), 0.0))
     if len(rows.time) > 1:

@@ -141,14 +141,16 @@ def call(place: int, impact: Impact) -> None:
 def relax(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
     """Leave the candidates where they are that are beyond stops or in the ground; return if any is.
 
-    Not if one is deeper than rounding and turning explain.
+    Not if one is deeper than rounding and turning explain. In a wedge that goes on all of it is
+    explained: the step before has let nothing sink but by turning.
     """
     deepest = 0.0
     for place in range(count):
         candidate = memory.assembly.candidate[place]
         if candidate < 2 * (model.nc + model.nv):
             deepest = min(deepest, gap_of(model, memory, impact.corner, candidate))
-    leaves = impact.relaxed == 0 and -WEDGED_BY <= deepest < 0.0
+    goes_on = impact.wedged == memory.tally.steps - 1
+    leaves = impact.relaxed == 0 and deepest < 0.0 and (goes_on or -WEDGED_BY <= deepest)
     if leaves:
         impact.relaxed = 1
     return leaves
