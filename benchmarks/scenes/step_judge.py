@@ -187,6 +187,7 @@ class _Steps:
         if mine is not None:
             whole = np.where(mine, -bounce * before, -np.inf)
             least = np.where(self.split[:, None], whole, -gap / self.h)
+            held |= (self.split & self.wedged)[:, None] & mine
             near = self.split[:, None] & (np.abs(gap) < 2.0 * TOUCHING)
             return np.where(held, -np.inf, least), near | held
         if self.scheme in BOUND:
@@ -228,11 +229,14 @@ class _Steps:
             moved, free = (rates(self.jacobian, v)[..., 0] for v in (self.moved, self.free))
             mine = self.arrives(found, "contact", self.gap, moved, free)
         least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
-        # Of the force of two faces only where it acts is known, and what it does. Schemes that push
-        # out of the ground do so at either face, with a part of it.
-        pushed_out = np.where(self.cornered, np.maximum(-self.gap, 0.0) / self.h, 0.0)
-        pressed = pushed_out * np.abs(self.impulse).sum(axis=-1)
-        self.asked_for += pressed.sum(axis=1) if self.scheme in BOUND else 0.0
+        # Of the force of two faces only where it acts is known, and what it does. What is asked of
+        # either face is: to push out of the ground, and to bounce.
+        came = np.linalg.norm(rates(self.jacobian, self.before), axis=-1)
+        asked = rows.measured.restitution[:-1] * came
+        if self.scheme in BOUND:
+            asked = asked + np.maximum(-self.gap, 0.0) / self.h
+        pressed = np.where(self.cornered, asked * np.abs(self.impulse).sum(axis=-1), 0.0)
+        self.asked_for += pressed.sum(axis=1)
         impulse = np.where(self.cornered[..., None], 0.0, self.impulse)
         near = near | self.cornered
         self.normals(
