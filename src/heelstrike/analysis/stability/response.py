@@ -290,9 +290,9 @@ def _responded(
         told = np.atleast_1d(np.asarray(indicator(whole(simulation.record)), np.float64))
         if not np.all(np.isfinite(told)):
             raise SimulationError(f"{doing}: the indicator is {told}, no finite numbers")
-        sides.append((np.concatenate((section.of(there), numbers)), told))
+        sides.append(((there, numbers), told))
     (up, seen_up), (down, seen_down) = sides
-    return (up - down) / (2.0 * amount), (seen_up - seen_down) / (2.0 * amount)
+    return section.error(up, down) / (2.0 * amount), (seen_up - seen_down) / (2.0 * amount)
 
 
 def _raised(loop: ClosedLoop, simulation: Simulation) -> float:
