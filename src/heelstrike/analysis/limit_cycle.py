@@ -147,9 +147,9 @@ def find_limit_cycle(
         from every touchdown if it begins afresh there. By default that of the controller, or it
         acts continuously.
     memory : sequence of str, optional
-        With `afresh`, members of the controller's memory that are carried from step to step: part of what repeats,
-        and of what is disturbed. In a shell they are named as in ``inside.filtered``,
-        ``own.joint_rate``.
+        With `afresh`, members of the controller's memory that are carried from step to step: part
+        of what repeats, and of what is disturbed. In a shell they are named as in
+        ``inside.filtered``, ``own.joint_rate``.
     relabelled : callable, optional
         ``relabelled(memory, time)`` changes the memory at the end of a step, which took a time, to
         that at the beginning of the next: legs exchanged, times counted from the touchdown.
@@ -200,8 +200,9 @@ def find_limit_cycle(
                     "afresh all memory is carried and no leg relabelled"
                 )
         loop = ClosedLoop(
-            robot, controller, state, method=method, ground=ground, control_period=control_period
-        )
+            robot, controller, state, method=method, ground=ground, control_period=control_period,
+            record_every=1,
+        )  # fmt: skip
         found = repeating_walk(
             loop, longest_step=longest_step, tolerance=tolerance, max_iterations=max_iterations
         )

@@ -83,6 +83,8 @@ class ClosedLoop:
         record_every: int = FEW_ROWS,
     ) -> None:  # fmt: skip
         self.robot, self.controller, self.ground = robot, controller, ground or Ground()
+        if isinstance(state, Snapshot):  # rows are counted on
+            record_every = int(state.identity.get("record_every", record_every))
         self._setup: dict[str, Any] = {
             "state": state, "method": method, "ground": ground, "control_period": control_period,
             "record_every": record_every,

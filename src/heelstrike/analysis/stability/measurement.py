@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,14 +43,29 @@ class Measurement:
         Their coordinates.
     found : list of Disturbed
         The returns.
-    errors : Across
-        The same without errors that are none.
+    early : float
+        What is left of being early.
+    in_step : bool
+        Whether samples take away what is less than one of it.
     """
 
     size: float
     section: Section
     found: list[Disturbed]
-    errors: Across
+    early: float
+    in_step: bool
+
+    @cached_property
+    def errors(self) -> Across:
+        """The returns without errors that are none."""
+        return self.without(self.found)
+
+    def without(self, found: list[Disturbed]) -> Across:
+        """Leave errors that are none out of returns of the same walk, as out of these."""
+        return Across.of(
+            found, self.early, self.section.of_robot, smooth=self.size <= SMOOTH,
+            in_step=self.in_step,
+        )  # fmt: skip
 
     @property
     def residual(self) -> float:
@@ -113,8 +129,4 @@ def measure(
                 f"this size are both. disturbance={min(SMOOTH, 0.1 * size):.3g} tells how small "
                 "errors die"
             )
-    early = stays_early(loop, section, walk)
-    errors = Across.of(
-        found, early, section.of_robot, smooth=size <= SMOOTH, in_step=hardly is not None
-    )
-    return Measurement(size, section, found, errors)
+    return Measurement(size, section, found, stays_early(loop, section, walk), hardly is not None)

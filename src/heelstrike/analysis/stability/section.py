@@ -48,6 +48,9 @@ INSTANTS = 0.1
 """Numbers that grow by what a return lasts, or as far as it goes, to this part of it, are instants
 or places."""
 
+GROWING = 0.01
+"""Part of the way of a return by which a place grows at least: heights do on a slope."""
+
 FARTHER = 0.125
 """Metres along the ground by which places are told from instants."""
 
@@ -367,15 +370,14 @@ class Words:
         instants = np.all(np.abs(grown - lasted) <= INSTANTS * lasted, axis=0)
         # No place goes farther than the robot, and what does not grow need not be asked about.
         far = np.abs(went)
-        growing = (np.abs(grown) > INSTANTS * far) & (np.abs(grown) <= (1.0 + INSTANTS) * far)
+        growing = (np.abs(grown) > GROWING * far) & (np.abs(grown) <= (1.0 + INSTANTS) * far)
         places = np.where(np.all(growing, axis=0), np.mean(grown / went, axis=0), 0.0)
+        moved = np.where(instants, 0.0, np.sign(places))  # at least those that are as far
         if places.any() and self._loop.can_be_moved:
             elsewhere = self._loop.fresh(FARTHER)
             self._loop.advanced(elsewhere, walk.begins[0].time, "a walk that begins elsewhere")
             moved = (self.read(elsewhere) * self.unit - seen[0]) / FARTHER
-            places[np.abs(moved - places) > INSTANTS] = 0.0
-        elif places.any():
-            places[instants] = 0.0
+        places[np.abs(moved - places) > INSTANTS * np.abs(moved)] = 0.0
         return np.asarray(instants & (places == 0.0), float), places
 
     def _that_matter(self) -> list[str]:
