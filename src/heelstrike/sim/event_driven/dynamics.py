@@ -11,7 +11,7 @@ import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.dynamics.dense import shorten, solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -285,6 +285,11 @@ def hold_by_saddle_point(
         saddle.system[nv + k, nv + size] = -saddle.bias[phase.row[k]]
     rank = solve_saddle_point(nv + size, saddle)
     phase.deficient = 1 if rank < nv + size else 0
+    if phase.deficient == 1:
+        shorten(
+            nv, nv + size, rank, saddle.scale, phase.lean, saddle.order, saddle.system,
+            saddle.unknown,
+        )  # fmt: skip
     saddle.needed = 1
     for i in range(nv):
         rate[i] = saddle.unknown[i]
@@ -336,6 +341,8 @@ def hold_closed(
         hold_by_saddle_point(size, count, model, state, memory, phase)
         return
     phase.deficient = 1 if rank < size else 0
+    if phase.deficient == 1:
+        shorten(0, size, rank, phase.scale, phase.lean, phase.column, phase.system, phase.unknown)
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
         if phase.lean[i] != 0.0:

@@ -129,7 +129,7 @@ def collide(
         through += abs(pressing) + abs(rubbing)
         phase.impulse[contact, 0] = impulse[2 * place]
         phase.impulse[contact, 1] = impulse[2 * place + 1]
-        rests = normal <= REST or phase.plastic[contact] == AT_REST
+        rests = normal <= max(REST, 2.0 * nudge) or phase.plastic[contact] == AT_REST
         phase.closed[contact] = 1 if rests else 0
         phase.slide[contact] = heading(tangent) if rests else 0
     for row in range(2 * count, 2 * total):  # what brakes take is not made by contacts at rest

@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats
 from heelstrike.sim.contacts.faces import nearest_face
 from heelstrike.sim.controller.control import Control
@@ -223,6 +223,28 @@ def may_dip(function: int, span: float, phase: Phase) -> bool:
     return bool(2.0 * (before + rate * where) <= min(before, value))
 
 
+@dissolved_kernel
+def may_cross(function: int, span: float, phase: Phase) -> bool:
+    """Whether a function that is positive at two samples may pass zero between them.
+
+    A gap has to fall by all that it is at the lower of its ends. A cubic falls by less than a sixth
+    of what its rates at both ends would make of it in the whole time between them: one that has
+    more left than all of that is not asked where it is lowest.
+    """
+    before, value = phase.before[function], phase.sample[function]
+    if not (before > 0.0 and value > 0.0):
+        return True
+    contact = function // 2
+    if contact >= phase.watched:
+        return False
+    rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
+    if function % 2 == 1:
+        return bool(phase.slide[contact] != 0 and rate < 0.0 and later_rate > 0.0)
+    if phase.closed[contact] == 1:
+        return False
+    return not min(before, value) > span * (max(-rate, 0.0) + max(later_rate, 0.0))
+
+
 @kernel
 def lowest_place(before: float, rate: float, value: float, later_rate: float) -> float:
     """Fraction of an interval at which the cubic through values and rates is lowest, if below zero.
@@ -273,7 +295,7 @@ def crossing(
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
         least = phase.absolute + phase.relative
-    if is_gap and value >= -least:
+    if is_gap and not dips and value >= -least:
         # It may have been lower in between, and be on its way up at both ends.
         span = (high - low) * length
         dip = lowest_place(before, span * rate, value, span * later_rate)
@@ -427,11 +449,12 @@ def first_event(
         first = NO_EVENT
         for i in range(functions):
             phase.fired[i] = 0
-            if corners and may_turn(i, length * (high - low), scene.model.contact_radius, phase):
+            span, root = (high - low) * length, NO_EVENT
+            if corners and may_turn(i, span, scene.model.contact_radius, phase):
                 root = crossing_by_faces(scene, i, low, high, length, control, memory, phase)
-            else:
+            elif may_cross(i, span, phase):
                 root = crossing(scene, i, low, high, length, control, memory, phase)
-            if root == NO_EVENT and k == 1 and just_left(i, phase):
+            if k == 1 and root == NO_EVENT and just_left(i, phase):
                 root = early_crossing(scene, i, high, length, control, memory, phase)
             if root < first - together:
                 for j in range(i):
