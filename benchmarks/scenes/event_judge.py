@@ -105,7 +105,7 @@ class EventRows:
         self.rows, self.start = rows, start
         time, run = rows.time, rows.run
         edges = [edge for one in run.pushes for edge in (one.start, one.end)]
-        self.edges = np.array(sorted(edges))
+        self.edges = np.sort(np.concatenate((edges, rows.ties.switches())))
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -151,6 +151,7 @@ class EventRows:
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
+        self.rows.ties.judge(found)
         self.forces(found)
         self.impacts(found)
         self.intervals(found)
@@ -236,7 +237,7 @@ class EventRows:
         size = self.force_size[:, None]
         time, names = rows.time, rows.joints
         speed = np.abs(rows.v) / (weight * self.speed_size[:, None] + 1e-9)
-        stop = run.stop_torque * weight / size
+        stop = np.where(rows.ties.latched, 0.0, run.stop_torque * weight / size)
         for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
             gap = side * (rows.q - limit)
             found.look(f"{name} stop: beyond it", np.nan_to_num(-gap), DEPTH, time, names)
@@ -344,6 +345,7 @@ class EventRows:
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
             left -= self.couple(a, left, p)
+            left -= rows.ties.explained(a, left)
             unexplained = rows.metric_of(one).of_force(left[None])
             unexplained -= BRIEF * self.force_size[a] * self.resting(b)
             found.look("balance of an impact", unexplained / size, JUMP, time)
@@ -495,7 +497,7 @@ class EventRows:
             kick = self.kick.get(k + 1)
             jump = np.zeros(n)
             if kick is not None and np.any(kick):
-                jump = np.linalg.solve(rows.matrix[b], kick)
+                jump = rows.ties.allowed(b, np.linalg.solve(rows.matrix[b], kick))
             change = rows.v[b] - rows.v[a] - jump
             matrix = rows.matrix[a]
             forced = span * (self.force_size[a] + self.force_size[b])

@@ -120,7 +120,11 @@ def _brakes(draw: np.random.Generator, scene: Scene, joints: list[int]) -> tuple
 def _latches(draw: np.random.Generator, scene: Scene, joints: list[int]) -> tuple[Latch, ...]:
     latches = []
     for joint in joints:
-        if np.isfinite(scene.links[joint].limits[0]) and draw.random() < 1.0 / 3.0 and scene.contacts:
+        if (
+            np.isfinite(scene.links[joint].limits[0])
+            and draw.random() < 1.0 / 3.0
+            and scene.contacts
+        ):
             end = str(draw.choice(("lower", "upper")))
             release = scene.contacts[int(draw.integers(len(scene.contacts)))].link
             latches.append(Latch(joint, end, release))

@@ -160,7 +160,7 @@ def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: I
             bounces = bounces or corner.restitution[second] > 0.0
     leaves = impact.relaxed == 0 and bounces
     if bounds_gaps and impact.relaxed == 0 and deepest < 0.0:
-        leaves = impact.wedged == memory.tally.steps - 1 or -WEDGED_BY <= deepest
+        leaves = impact.wedged == memory.tally.steps - 1 or deepest >= -WEDGED_BY
     if leaves:
         impact.relaxed = 1
     return leaves
