@@ -64,7 +64,7 @@ class _Samples:
         self.size = rows.metric.of_velocity(rows.v)
 
     def judge(self, found: Findings) -> None:
-        self.rows.ties.judge(found)
+        self.rows.ties.judge(found, self.rows.smooth)
         self.momentum(found)
         self.balance(found)
         self.contacts(found)

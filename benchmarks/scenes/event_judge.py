@@ -151,7 +151,7 @@ class EventRows:
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
-        self.rows.ties.judge(found)
+        self.rows.ties.judge(found, self.known)
         self.forces(found)
         self.impacts(found)
         self.intervals(found)
@@ -344,8 +344,7 @@ class EventRows:
             matrix = rows.matrix[a]
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
-            left -= self.couple(a, left, p)
-            left -= rows.ties.explained(a, left)
+            left -= rows.ties.explained(a, left, self.couples(a, p))
             unexplained = rows.metric_of(one).of_force(left[None])
             unexplained -= BRIEF * self.force_size[a] * self.resting(b)
             found.look("balance of an impact", unexplained / size, JUMP, time)
@@ -366,18 +365,14 @@ class EventRows:
         stops = (near <= TOGETHER) & (np.abs(rows.v[row]) <= RESTING)
         return int(points.sum() + stops.sum())
 
-    def couple(self, row: int, left: Array, p: Array) -> Array:
-        """Part of a generalised impulse that couples on discs in corners explain.
+    def couples(self, row: int, p: Array) -> Array:
+        """Rows (k, n) of the couples that discs in corners may feel in an impact.
 
         An event has the resultant of both faces, and not the moment of friction on the other one.
         """
         rows = self.rows
         discs = rows.cornered[row] & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
-        if not discs.any():
-            return np.zeros_like(left)
-        turns = rows.tree.turn[np.unique(rows.model.contact_link[discs])].T
-        weighed = np.linalg.solve(rows.matrix[row], turns)
-        return turns @ np.linalg.lstsq(turns.T @ weighed, weighed.T @ left, rcond=None)[0]
+        return rows.tree.turn[np.unique(rows.model.contact_link[discs])]
 
     def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
         """What holds at the end of the bridge that begins at instant k."""

@@ -125,7 +125,7 @@ class _Steps:
         """Energy that the bounds b of the normal velocities ask for."""
 
     def judge(self, found: Findings) -> None:
-        self.rows.ties.judge(found, self.h, exact=not self.split.any())
+        self.rows.ties.judge(found, self.rows.smooth, self.h, exact=not self.split.any())
         self.balance(found)
         self.motion(found)
         self.contacts(found)

@@ -26,13 +26,14 @@ OPEN = 1e-9
 """Displacement (m, rad) of a loop or coupling."""
 SPEED = 1e-7
 """Velocity against a tie, relative to the kinetic size of the velocity and what forces do in 1 ms."""
+ROW = 1e-3
 MOVED = 1e-9
 """Way (m, rad) of a joint from row to row that a brake holds."""
 LAW = 1e-6
 """Torque of a brake that slips, relative to its limit."""
-MOVING = 1e-5
+MOVING = 1e-3
 """Speed (rad/s, m/s) from which a brake slips; smoothed friction creeps below it."""
-ATTEMPTS = 4
+ATTEMPTS = 12
 """Newton steps that put positions back on the ties."""
 AT_THE_END = 1e-3
 """Distance (rad, m) from its end up to which a latch may hold."""
@@ -88,13 +89,14 @@ class JudgedTies:
         rows = self.tied.jacobian
         return self.force(0.5 * (rows[:-1] + rows[1:]))
 
-    def explained(self, row: int, impulse: Array) -> Array:
-        """Part (n,) of a generalised impulse that ties may have taken in an instant."""
-        if not self.any:
+    def explained(self, row: int, impulse: Array, more: Array) -> Array:
+        """Part (n,) of a generalised impulse that ties, and `more` rows (k, n), may have taken."""
+        if not self.any and len(more) == 0:
             return np.zeros_like(impulse)
         matrix = self.metric.matrix[row : row + 1]
         change = np.linalg.solve(matrix, impulse[None, :, None])[..., 0]
-        out: Array = (matrix @ torn(self._rows(row), Metric(matrix), change)[..., None])[0, :, 0]
+        rows = np.concatenate((self._rows(row), more[None]), axis=1)
+        out: Array = (matrix @ torn(rows, Metric(matrix), change)[..., None])[0, :, 0]
         return out
 
     def allowed(self, row: int, change: Array) -> Array:
@@ -151,12 +153,16 @@ class JudgedTies:
         single = self.held[:-1, :, None] * np.eye(self.held.shape[1])
         return np.concatenate((jacobian, single), axis=1)
 
-    def judge(self, found: Findings, step: float | None = None, *, exact: bool = True) -> None:
+    def judge(
+        self, found: Findings, known: Array, step: float | None = None, *, exact: bool = True
+    ) -> None:
         """Hold the ties of a record to their laws.
 
         Parameters
         ----------
         found : Findings
+        known : (T, n) float
+            Generalised forces of all but contacts and ties.
         step : float, optional
             Of time stepping (s).
         exact : bool
@@ -164,8 +170,8 @@ class JudgedTies:
         """
         if not self.any:
             return
-        run, tied, size = self.run, self.tied, self.metric.of_velocity(self.run.velocity)
-        names = run.robot.joint_names
+        run, tied, names = self.run, self.tied, self.run.robot.joint_names
+        size = self.metric.of_velocity(run.velocity) + ROW * self.metric.of_force(known)
         found.look("ties: open", np.abs(tied.displacement), OPEN, run.time)
         against = np.einsum("trn,tn->tr", tied.jacobian, run.velocity)
         weight = np.linalg.norm(
@@ -182,19 +188,17 @@ class JudgedTies:
         stays = self.held[:-2] & self.held[1:-1] & self.held[2:]
         way = np.where(stays, np.abs(run.position[2:] - run.position[1:-1]), 0.0)
         found.look("brake: joint moves", way, MOVED, run.time[1:-1], names)
-        self._slipping(found, run.velocity if step is None else _next(run.velocity))
+        self._slipping(found)
 
-    def _slipping(self, found: Findings, velocity: Array) -> None:
+    def _slipping(self, found: Findings) -> None:
+        """What a brake that slips does, where its joint moves one way from row to row."""
         run, model = self.run, self.run.robot.model
         for brake, joint in enumerate(model.brake_joint):
             limit, torque = model.brake_limit[brake], run.brake_torque[:, brake]
             if not np.isfinite(limit):
                 continue
             found.look("brake: limit", np.abs(torque) / limit - 1.0, LAW, run.time)
-            speed = velocity[:, joint]
-            drives = np.where(np.abs(speed) > MOVING, torque * np.sign(speed) / limit, 0.0)
-            found.look("brake: drives", drives, LAW, run.time)
-
-
-def _next(velocity: Array) -> Array:
-    return np.concatenate((velocity[1:], velocity[-1:]))
+            speed = run.velocity[:, joint]
+            way = np.sign(speed[:-1]) * (np.minimum(speed[:-1], speed[1:]) > MOVING)
+            way += np.sign(speed[:-1]) * (np.maximum(speed[:-1], speed[1:]) < -MOVING)
+            found.look("brake: drives", torque[:-1] * way / limit, LAW, run.time[:-1])
