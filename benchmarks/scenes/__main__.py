@@ -24,16 +24,11 @@ from pathlib import Path
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from scenes.campaign import Task, campaign, results_in  # noqa: E402
+from scenes.campaign import Task, add_arguments, campaign, results_in  # noqa: E402
 from scenes.checks.commands import CHECKS, check  # noqa: E402
 from scenes.methods import METHODS  # noqa: E402
 from scenes.running import FAMILIES, prepare, run_scene  # noqa: E402
 from scenes.table import page  # noqa: E402
-
-
-def _seeds(text: str) -> range:
-    first, _, last = text.partition(":")
-    return range(int(first), int(last)) if last else range(int(first))
 
 
 def main() -> None:
@@ -43,10 +38,7 @@ def main() -> None:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="run scenes and append what comes out to a file")
-    run.add_argument("--out", type=Path, required=True, help="file of results, one a line")
-    run.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
-    run.add_argument("--seeds", type=_seeds, default=range(300), help="FIRST:END or their number")
-    run.add_argument("--workers", type=int, choices=(1, 2), default=1)
+    add_arguments(run, 300, kept=True, of="methods", choices=METHODS)
     run.add_argument("--without-twins", action="store_true")
     run.add_argument("--family", choices=FAMILIES, default="free", help="tied: loops, brakes …")
     sums = commands.add_parser("page", help="sum a file of results up")
@@ -59,9 +51,7 @@ def main() -> None:
     show.add_argument("--family", choices=FAMILIES, default="free")
     for name, (_, words) in CHECKS.items():
         asks = commands.add_parser(name, help=words)
-        asks.add_argument("--seeds", type=_seeds, default=range(100), help="FIRST:END or number")
-        asks.add_argument("--out", type=Path, help="file of results, one a line")
-        asks.add_argument("--workers", type=int, choices=(1, 2), default=1)
+        add_arguments(asks, 100, kept=False)
     options = parser.parse_args()
     if options.command in CHECKS:
         with tempfile.TemporaryDirectory() as folder:

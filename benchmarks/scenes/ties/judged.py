@@ -154,8 +154,9 @@ class JudgedTies:
         return np.concatenate((jacobian, single), axis=1)
 
     def judge(
-        self, found: Findings, known: Array, step: float | None = None, *, exact: bool = True
-    ) -> None:
+        self, found: Findings, known: Array, step: float | None = None, *, exact: bool = True,
+        smooth: Array | bool = True,
+    ) -> None:  # fmt: skip
         """Hold the ties of a record to their laws.
 
         Parameters
@@ -167,6 +168,8 @@ class JudgedTies:
             Of time stepping (s).
         exact : bool
             Whether its velocities are those of one step, not those of an impact within it.
+        smooth : (T,) bool, optional
+            Rows of smooth motion: over a bridge velocities are those of its impulses.
         """
         if not self.any:
             return
@@ -179,7 +182,8 @@ class JudgedTies:
         )
         unit = weight * size[:, None] + 1e-6
         if step is None:
-            found.look("ties: moves against them", np.abs(against) / unit, SPEED, run.time)
+            against = np.where(np.atleast_1d(smooth)[:, None], np.abs(against) / unit, 0.0)
+            found.look("ties: moves against them", against, SPEED, run.time)
         elif exact:
             after = np.einsum("trn,tn->tr", tied.jacobian[:-1], run.velocity[1:])
             chord = after + 0.5 * step * tied.bias[:-1]

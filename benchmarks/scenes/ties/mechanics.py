@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from numpy.polynomial import polynomial
+from numpy.typing import NDArray
 
 from scenes.mechanics import Metric, Poses
 
