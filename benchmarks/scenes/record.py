@@ -120,7 +120,7 @@ class Rows:
         return total
 
     def contact_force(self) -> Array:
-        """Generalised force (T, n) of the recorded forces of contacts, stops, dry joints and ties."""
+        """Generalised force (T, n) of the recorded forces of contacts, joints and ties."""
         pushed = generalised(self.acting, self.force) + self.ties.force()
         return pushed + self.run.stop_torque + self.run.friction_torque
 

@@ -25,8 +25,9 @@ Array = NDArray[Any]
 OPEN = 1e-9
 """Displacement (m, rad) of a loop or coupling."""
 SPEED = 1e-7
-"""Velocity against a tie, relative to the kinetic size of the velocity and what forces do in 1 ms."""
+"""Velocity against a tie, relative to the kinetic size of that and of what forces do in a row."""
 ROW = 1e-3
+"""Time (s) of a row."""
 MOVED = 1e-9
 """Way (m, rad) of a joint from row to row that a brake holds."""
 LAW = 1e-6
@@ -142,14 +143,24 @@ class JudgedTies:
         q = self.run.position
         u = np.diff(q, axis=0) / step
         rows, before = self._with_brakes(self.tied.jacobian[:-1]), Metric(self.metric.matrix[:-1])
-        along = np.concatenate((-0.5 * step * self.tied.bias[:-1], 0.0 * u), axis=1)
+        along = np.concatenate((self.chord(step), 0.0 * u), axis=1)
         for _ in range(ATTEMPTS if self.along.shape[1] else 0):
             u = u + (q[1:] - self.put_back(q[:-1] + step * u)) / step
             u = u - torn(rows, before, u, along)
         return u
 
+    def chord(self, step: float) -> Array:
+        """What J v (T - 1, rows) is in a step of time stepping, or zero where a brake takes hold.
+
+        The velocity that J̇ v is of ends there.
+        """
+        taken = self.held[:-1].copy()
+        taken[1:] &= ~self.held[:-2]
+        out: Array = np.where(taken.any(axis=1)[:, None], 0.0, -0.5 * step * self.tied.bias[:-1])
+        return out
+
     def _with_brakes(self, jacobian: Array) -> Array:
-        """Rows (T - 1, rows + n, n) of ties, and of joints that brakes hold; the others are zero."""
+        """Rows (T - 1, rows + n, n) of ties and held joints; those of other joints are zero."""
         single = self.held[:-1, :, None] * np.eye(self.held.shape[1])
         return np.concatenate((jacobian, single), axis=1)
 
@@ -186,7 +197,7 @@ class JudgedTies:
             found.look("ties: moves against them", against, SPEED, run.time)
         elif exact:
             after = np.einsum("trn,tn->tr", tied.jacobian[:-1], run.velocity[1:])
-            chord = after + 0.5 * step * tied.bias[:-1]
+            chord = after - self.chord(step)
             unit = unit[:-1] + weight[:-1] * size[1:, None]
             found.look("ties: moves against them", np.abs(chord) / unit, SPEED, run.time[:-1])
         stays = self.held[:-2] & self.held[1:-1] & self.held[2:]
