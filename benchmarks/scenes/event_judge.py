@@ -73,6 +73,8 @@ BRIEF = 1e-8
 known forces do in it."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
+SAME = 4.0 * float(np.finfo(float).eps)
+"""Rows and events closer than this part of their time are of one instant of the simulator, too."""
 EDGE = 1e-12
 """An event this near (s) to where a push begins or ends happens there."""
 
@@ -272,14 +274,11 @@ class EventRows:
         joint: dict[int, Array] = {}
         most: dict[int, int] = {}
         gains: set[int] = set()
-        late: set[int] = set()
         seen: dict[tuple[int, int, int], int] = {}
         for event in self.rows.run.events:
             k = int(np.argmin(np.abs(self.instant - event.time)))
             if event.kind is EventKind.ENERGY_GAIN:
                 gains.add(k)
-            if event.kind is EventKind.BRIDGE:
-                late.add(k)
             stop = event.kind is EventKind.JOINT_STOP
             if event.impulse == (0.0, 0.0) or not (stop or event.kind in IMPULSIVE):
                 continue
@@ -294,23 +293,20 @@ class EventRows:
                     side * event.impulse[0]
                 )
             else:
-                impulse = self.in_first_frame(
-                    k, event, event.kind is EventKind.PAINLEVE or k in late
-                )
                 contact.setdefault(k, np.zeros((len(self.rows.contacts), 2)))[event.contact] += (
-                    impulse
+                    self.in_first_frame(k, event)
                 )
         return contact, joint, most, gains
 
-    def in_first_frame(self, k: int, event: Any, late: bool) -> Array:
-        """Impulse of an event in the frame that the first row of its instant has.
+    def in_first_frame(self, k: int, event: Any) -> Array:
+        """Impulse of an event in the frame of the first of the rows that are one instant here.
 
-        A point that meets a second face does so in the frame of that one, which is that of the row
-        before; jams and bridges after it are in the frame of the row behind.
+        It is told in that of the first row of its own instant: events told apart by rounding are
+        together here.
         """
         rows, low, high = self.rows, self.first[k], self.last[k]
-        same = np.flatnonzero(rows.time[low : high + 1] == event.time) + low
-        row = high if late else (same[0] if len(same) else low)
+        same = np.abs(rows.time[low : high + 1] - event.time) <= SAME * max(event.time, 1e-3)
+        row = low + int(np.argmax(same))
         x, z = rows.normal[row, event.contact]
         to_x, to_z = rows.normal[low, event.contact]
         along, across = event.impulse
@@ -343,7 +339,7 @@ class EventRows:
             matrix = rows.matrix[a]
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
-            left -= self.couple(a, left, p)
+            left -= self.couple(k, left, p)
             unexplained = rows.metric_of(one).of_force(left[None])
             unexplained -= BRIEF * self.force_size[a] * self.resting(b)
             found.look("balance of an impact", unexplained / size, JUMP, time)
@@ -364,13 +360,28 @@ class EventRows:
         stops = (near <= TOGETHER) & (np.abs(rows.v[row]) <= RESTING)
         return int(points.sum() + stops.sum())
 
-    def couple(self, row: int, left: Array, p: Array) -> Array:
+    def cornered(self, k: int) -> Array:
+        """Which points may be hit by both faces of a corner in an instant.
+
+        On a bridge these are also those that come to the second face by its end.
+        """
+        row, cornered = self.first[k], self.rows.cornered
+        if k not in self.bridges:
+            return cornered[row]
+        end = self.end_of(k)
+        return cornered[row] | cornered[self.first[end] : self.last[end] + 1].any(axis=0)
+
+    def end_of(self, k: int) -> int:
+        """Instant at which the bridge that begins at instant k ends."""
+        return int(np.argmin(np.abs(self.instant - self.instant[k] - self.bridges[k][0])))
+
+    def couple(self, k: int, left: Array, p: Array) -> Array:
         """Part of a generalised impulse that couples on discs in corners explain.
 
         An event has the resultant of both faces, and not the moment of friction on the other one.
         """
-        rows = self.rows
-        discs = rows.cornered[row] & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
+        rows, row = self.rows, self.first[k]
+        discs = self.cornered(k) & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
         if not discs.any():
             return np.zeros_like(left)
         turns = rows.tree.turn[np.unique(rows.model.contact_link[discs])].T
@@ -380,8 +391,7 @@ class EventRows:
     def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
         """What holds at the end of the bridge that begins at instant k."""
         rows, (length, wrong) = self.rows, self.bridges[k]
-        end = int(np.argmin(np.abs(self.instant - self.instant[k] - length)))
-        time = rows.time[one]
+        end, time = self.end_of(k), rows.time[one]
         apart = abs(self.instant[end] - self.instant[k] - length)
         found.look("bridge: row at its end", np.array([apart]), INSTANT, time)
         begin, last, after = self.first[k], self.last[k], self.first[end]
@@ -409,7 +419,7 @@ class EventRows:
         found.look("bridge: speed into the ground", into, 1.0, time, names)
         bounce = rows.measured.restitution[one] * np.maximum(-came[..., 0], 0.0)
         off = np.maximum(went[..., 0] - bounce, 0.0) / loose[..., 0]
-        one_face = ~rows.cornered[one]
+        one_face = ~self.cornered(k)[None]
         off = np.where(on & one_face & (pressed > LAW), off, 0.0)
         found.look("bridge: pressed and leaves", off, 1.0, time, names)
         cone = np.where(one_face, excess_over_cone(p[None], high) / unit[..., 1], 0.0)
@@ -525,7 +535,7 @@ class EventRows:
             return
         at = np.array(times)
         found.look("balance", np.array(momentum), BALANCE, at)
-        found.look("teleport", np.array(motion), MOTION, at, rows.joints)
+        found.look("teleport between rows", np.array(motion), MOTION, at, rows.joints)
         top = max(float(kinetic.max()), float(np.ptp(potential)), 1e-9)
         found.look("energy", np.array(work) / top, ENERGY, at)
 

@@ -47,7 +47,7 @@ def method_of(name: str, scene: Scene, rows: float | None = STEP, **settings: fl
 
 def bounces(name: str) -> bool:
     """Whether a method knows restitution; the others get the scene's ground without."""
-    return name in ("moreau_jean", "event_driven")
+    return name in ("moreau_jean", "impact_resolved", "event_driven")
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ FINE = 1e-4
 a row at every step of the integrator, and these crowd where forces grow without bound."""
 QUICK = 2.0
 """Processor time (s) of a scene that has time for that within the limit of a scene."""
-BETWEEN_ROWS = {"balance", "energy"}
+BETWEEN_ROWS = {"balance", "energy", "teleport between rows"}
 """Laws of what happens between rows: these alone are what the second look is for."""
 WARM = 1_000_000
 """Seed of the scene with which a worker compiles a method before any clock runs."""

@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.sim import Scheme
+from heelstrike.sim import EventKind, Scheme
 from scenes.findings import Findings
 from scenes.mechanics import Metric, generalised, rates
 from scenes.record import Rows, excess_over_cone, friction_that_does_not_oppose
@@ -118,6 +118,8 @@ class _Steps:
         if self.scheme is Scheme.IMPACT_RESOLVED:
             apart = np.abs(self.moved - self.after) * self.h / (1.0 + np.abs(rows.q[1:]))
             self.split = np.any(apart > MOTION, axis=1)
+        self.wedged = self.wedges()
+        """Whether a wedge is going on, in which steps may leave in the ground what is there."""
         self.asked_for = np.zeros(len(self.time))
         """Energy that the bounds b of the normal velocities ask for."""
 
@@ -128,6 +130,18 @@ class _Steps:
         self.stops(found)
         self.dry_joints(found)
         self.energy(found)
+
+    def wedges(self) -> Array:
+        """Steps (T,) from where the run tells of a wedge until everything is out of it."""
+        rows, going_on = self.rows, np.zeros(len(self.time), dtype=bool)
+        way = np.minimum(rows.q - rows.model.lower, rows.model.upper - rows.q)
+        out = np.minimum(way.min(axis=1), rows.gap.min(axis=1, initial=0.0)) >= -TOUCHING
+        for event in rows.run.events:
+            if event.kind is EventKind.WEDGED:
+                begin = int(np.argmin(np.abs(self.time - event.time)))
+                ends = np.flatnonzero(out[begin + 1 : -1])
+                going_on[begin : begin + 1 + ends[0] if len(ends) else None] = True
+        return going_on
 
     def balance(self, found: Findings) -> None:
         momentum = np.einsum("tij,tj->ti", self.matrix, self.after - self.before)
@@ -153,7 +167,8 @@ class _Steps:
     def arrives(self, found: Findings, law: str, gap: Array, speed: Array, free: Array) -> Array:
         """Judge where the positions go in split steps; tell whose impact each of them is."""
         after = gap + self.h * speed
-        deep = np.where(self.split[:, None], -after, 0.0)
+        left = np.where(self.wedged[:, None], np.minimum(gap, 0.0), 0.0)
+        deep = np.where(self.split[:, None], left - after, 0.0)
         found.look(f"{law}: moved into it", deep / (1.0 + np.abs(gap)), MOTION, self.time)
         touches = after <= TOUCHING
         touched = np.concatenate((gap[:1] <= TOUCHING, touches[:-1]))
@@ -168,13 +183,15 @@ class _Steps:
         The second array tells where rounding decides whether it asks; `mine` tells who takes part
         in the impacts of split steps.
         """
+        held = self.wedged[:, None] & (gap < TOUCHING)
         if mine is not None:
             whole = np.where(mine, -bounce * before, -np.inf)
             least = np.where(self.split[:, None], whole, -gap / self.h)
+            held |= (self.split & self.wedged)[:, None] & mine
             near = self.split[:, None] & (np.abs(gap) < 2.0 * TOUCHING)
-            return least, near
+            return np.where(held, -np.inf, least), near | held
         if self.scheme in BOUND:
-            return -gap / self.h, np.zeros(gap.shape, dtype=bool)
+            return np.where(held, -np.inf, -gap / self.h), held
         foreseen, least = gap, np.zeros_like(gap)
         if self.scheme is Scheme.MOREAU_JEAN:
             foreseen, least = gap + 0.5 * self.h * before, -bounce * before
@@ -212,7 +229,14 @@ class _Steps:
             moved, free = (rates(self.jacobian, v)[..., 0] for v in (self.moved, self.free))
             mine = self.arrives(found, "contact", self.gap, moved, free)
         least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
-        # Of the force of two faces only where it acts is known, and what it does.
+        # Of the force of two faces only where it acts is known, and what it does. What is asked of
+        # either face is: to push out of the ground, and to bounce.
+        came = np.linalg.norm(rates(self.jacobian, self.before), axis=-1)
+        asked = rows.measured.restitution[:-1] * came
+        if self.scheme in BOUND:
+            asked = asked + np.maximum(-self.gap, 0.0) / self.h
+        pressed = np.where(self.cornered, asked * np.abs(self.impulse).sum(axis=-1), 0.0)
+        self.asked_for += pressed.sum(axis=1)
         impulse = np.where(self.cornered[..., None], 0.0, self.impulse)
         near = near | self.cornered
         self.normals(
@@ -252,7 +276,8 @@ class _Steps:
             world = rows.poses.jacobian(rows.model.contact_link, rows.center)[:-1]
             left = np.diff(rows.center, axis=0) - self.h * rates(world, self.moved)
             explained = np.where(self.cornered, np.linalg.norm(left, axis=-1), explained)
-        deep = -rows.gap[1:] - explained
+        left = np.where(self.wedged[:, None], np.maximum(-rows.gap[:-1], 0.0), 0.0)
+        deep = -rows.gap[1:] - explained - left
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 
     def stops(self, found: Findings) -> None:
