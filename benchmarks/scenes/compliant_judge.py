@@ -64,6 +64,7 @@ class _Samples:
         self.size = rows.metric.of_velocity(rows.v)
 
     def judge(self, found: Findings) -> None:
+        self.rows.ties.judge(found, self.rows.smooth)
         self.momentum(found)
         self.balance(found)
         self.contacts(found)
@@ -97,7 +98,7 @@ class _Samples:
         metric = rows.metric
         known = metric.of_force(rows.smooth + self.pushed)
         weight = metric.weight(rows.jacobian)
-        acted = (np.abs(rows.force) * weight).sum(axis=(1, 2))
+        acted = (np.abs(rows.force) * weight).sum(axis=(1, 2)) + metric.of_force(rows.ties.force())
         joint = np.abs(rows.run.stop_torque) + np.abs(rows.run.friction_torque)
         return self.h * (known + acted + (joint * metric.joint_weight()).sum(axis=1))
 
@@ -111,6 +112,7 @@ class _Samples:
         middle = np.where(rows.cornered[:-1, :, None, None], rows.acting[:-1], own)
         acted = generalised(middle, rows.force[:-1])
         acted += rows.run.stop_torque[:-1] + rows.run.friction_torque[:-1]
+        acted += rows.ties.mean_force()
         matrix = 0.5 * (rows.matrix[:-1] + rows.matrix[1:])
         change = np.diff(rows.v, axis=0)
         left = np.einsum("tij,tj->ti", matrix, change) - self.h * (mean + acted)

@@ -107,7 +107,7 @@ class EventRows:
         self.rows, self.start = rows, start
         time, run = rows.time, rows.run
         edges = [edge for one in run.pushes for edge in (one.start, one.end)]
-        self.edges = np.array(sorted(edges))
+        self.edges = np.sort(np.concatenate((edges, rows.ties.switches())))
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -165,6 +165,7 @@ class EventRows:
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
+        self.rows.ties.judge(found, self.known, smooth=self.smooth)
         self.forces(found)
         self.impacts(found)
         self.intervals(found)
@@ -256,7 +257,7 @@ class EventRows:
         size = self.force_size[:, None]
         time, names = rows.time, rows.joints
         speed = np.abs(rows.v) / (weight * self.speed_size[:, None] + 1e-9)
-        stop = run.stop_torque * weight / size
+        stop = np.where(rows.ties.latched, 0.0, run.stop_torque * weight / size)
         for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
             gap = side * (rows.q - limit)
             found.look(f"{name} stop: beyond it", np.nan_to_num(-gap), DEPTH, time, names)
@@ -357,7 +358,7 @@ class EventRows:
             matrix = rows.matrix[a]
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
-            left -= self.couple(k, left, p)
+            left -= rows.ties.explained(a, left, self.couples(k, p))
             unexplained = rows.metric_of(one).of_force(left[None])
             unexplained -= BRIEF * self.force_size[a] * self.resting(b)
             found.look("balance of an impact", unexplained / size, JUMP, time)
@@ -393,18 +394,15 @@ class EventRows:
         """Instant at which the bridge that begins at instant k ends."""
         return self.at(self.instant[k] + self.bridges[k][0])
 
-    def couple(self, k: int, left: Array, p: Array) -> Array:
-        """Part of a generalised impulse that couples on discs in corners explain.
+    def couples(self, k: int, p: Array) -> Array:
+        """Rows (c, n) of the couples that discs in corners may feel in an instant.
 
         An event has the resultant of both faces, and not the moment of friction on the other one.
         """
-        rows, row = self.rows, self.first[k]
+        rows = self.rows
         discs = self.cornered(k) & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
-        if not discs.any():
-            return np.zeros_like(left)
-        turns = rows.tree.turn[np.unique(rows.model.contact_link[discs])].T
-        weighed = np.linalg.solve(rows.matrix[row], turns)
-        return turns @ np.linalg.lstsq(turns.T @ weighed, weighed.T @ left, rcond=None)[0]
+        out: Array = rows.tree.turn[np.unique(rows.model.contact_link[discs])]
+        return out
 
     def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
         """What holds at the end of the bridge that begins at instant k."""
@@ -523,7 +521,7 @@ class EventRows:
             kick = self.kick.get(k + 1)
             jump = np.zeros(n)
             if kick is not None and np.any(kick):
-                jump = np.linalg.solve(rows.matrix[b], kick)
+                jump = rows.ties.allowed(b, np.linalg.solve(rows.matrix[b], kick))
             change = rows.v[b] - rows.v[a] - jump
             matrix = rows.matrix[a]
             forced = span * (self.force_size[a] + self.force_size[b])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenes.findings import Findings
 from scenes.mechanics import Metric, Poses, Tree, generalised, rates
 from scenes.terrain import Terrain
+from scenes.ties.judged import JudgedTies
 from scenes.wedge import excess_over_cones
 
 Array = NDArray[Any]
@@ -50,6 +51,8 @@ class Rows:
         Distances from the centres of the contact discs to the ground.
     metric : Metric
         Sizes of velocities and forces.
+    ties : JudgedTies
+        Loops, couplings, brakes and latches.
     smooth : (T, n) float
         Generalised force of motors, springs and dampers, less H; pushes are not in it.
     """
@@ -75,6 +78,7 @@ class Rows:
             self.acting = self.along(self.poses.jacobian(model.contact_link, acts))
         self.matrix = self.poses.mass_matrix()
         self.metric = Metric(self.matrix)
+        self.ties = JudgedTies(run, self.poses, self.metric)
         self.speed = rates(self.jacobian, self.v)
         self.smooth = -self.poses.bias_force(self.v)
         self.smooth -= model.damping * self.v + model.stiffness * (self.q - model.rest)
@@ -116,8 +120,8 @@ class Rows:
         return total
 
     def contact_force(self) -> Array:
-        """Generalised force (T, n) of the recorded forces of contacts, stops and dry joints."""
-        pushed = generalised(self.acting, self.force)
+        """Generalised force (T, n) of the recorded forces of contacts, joints and ties."""
+        pushed = generalised(self.acting, self.force) + self.ties.force()
         return pushed + self.run.stop_torque + self.run.friction_torque
 
     def bias_acceleration(self) -> Array:

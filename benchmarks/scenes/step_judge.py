@@ -106,6 +106,7 @@ class _Steps:
         self.jacobian, self.acting = rows.jacobian[:-1], rows.acting[:-1]
         self.impulse = self.h * rows.force[:-1]
         self.stop, self.dry = self.h * run.stop_torque[:-1], self.h * run.friction_torque[:-1]
+        self.tied = self.h * rows.ties.force()[:-1]
         self.known = known
         size = self.metric.of_velocity
         self.size = size(self.before) + size(self.after) + self.h * self.metric.of_force(known)
@@ -116,14 +117,15 @@ class _Steps:
         self.split = np.zeros(len(self.time), dtype=bool)
         """Steps whose positions move with another velocity than the one behind them."""
         if self.scheme is Scheme.IMPACT_RESOLVED:
-            apart = np.abs(self.moved - self.after) * self.h / (1.0 + np.abs(rows.q[1:]))
-            self.split = np.any(apart > MOTION, axis=1)
+            self.split = np.any(self.missed(self.after) > MOTION, axis=1)
+            self.moved = np.where(self.split[:, None], rows.ties.straight(self.h), self.after)
         self.wedged = self.wedges()
         """Whether a wedge is going on, in which steps may leave in the ground what is there."""
         self.asked_for = np.zeros(len(self.time))
         """Energy that the bounds b of the normal velocities ask for."""
 
     def judge(self, found: Findings) -> None:
+        self.rows.ties.judge(found, self.rows.smooth, self.h, exact=not self.split.any())
         self.balance(found)
         self.motion(found)
         self.contacts(found)
@@ -145,10 +147,17 @@ class _Steps:
 
     def balance(self, found: Findings) -> None:
         momentum = np.einsum("tij,tj->ti", self.matrix, self.after - self.before)
-        acted = generalised(self.acting, self.impulse) + self.stop + self.dry
+        acted = generalised(self.acting, self.impulse) + self.stop + self.dry + self.tied
         left = momentum - self.h * self.known - acted
         unexplained = self.metric.of_force(left) / self.size
         found.look("balance", unexplained, BALANCE, self.time)
+
+    def missed(self, velocity: Array) -> Array:
+        """How far (T, n) positions are from where a velocity leads in a step."""
+        q = self.rows.q
+        there = self.rows.ties.put_back(q[:-1] + self.h * velocity)
+        missed: Array = np.abs(q[1:] - there) / (1.0 + np.abs(q[1:]))
+        return missed
 
     def motion(self, found: Findings) -> None:
         velocity = self.after
@@ -158,8 +167,7 @@ class _Steps:
             velocity = self.before
         elif self.scheme is Scheme.MOREAU_JEAN:
             velocity = 0.5 * (self.before + self.after)
-        q = self.rows.q
-        left = np.abs(q[1:] - q[:-1] - self.h * velocity) / (1.0 + np.abs(q[1:]))
+        left = self.missed(velocity)
         found.look("teleport", left, MOTION, self.time, self.rows.joints)
         dt = np.abs(np.diff(self.rows.time) - self.h)
         found.look("length of a step", dt, 1e-9, self.time)
@@ -291,10 +299,11 @@ class _Steps:
             if self.scheme is Scheme.IMPACT_RESOLVED:
                 mine = self.arrives(found, f"{name} stop", gap, side * self.moved, side * self.free)
             least, near = self.bound(gap, side * self.before, nothing, mine)
+            pressed = np.where(rows.ties.latched[:-1], 0.0, np.maximum(side * self.stop, 0.0))
+            near = near | rows.ties.latched[:-1]
             self.normals(
-                f"{name} stop", found, np.maximum(side * self.stop, 0.0), side * self.after,
-                weight, least, near, rows.joints,
-            )  # fmt: skip
+                f"{name} stop", found, pressed, side * self.after, weight, least, near, rows.joints
+            )
 
     def dry_joints(self, found: Findings) -> None:
         model, names = self.rows.model, self.rows.joints
@@ -311,6 +320,7 @@ class _Steps:
         gained = 0.5 * (size(self.after) ** 2 - size(self.free) ** 2)
         unit = 0.5 * self.size**2
         unasked = (gained - self.asked_for) / unit
+        unasked -= np.maximum(np.sum(self.tied * self.after, axis=1), 0.0) / unit
         found.look("energy made in contact", unasked, LAW, self.time)
         kinetic, potential = self.rows.energy()
         top = max(float(kinetic.max()), 1e-12)
@@ -318,7 +328,7 @@ class _Steps:
         # Work over a step: impulses times the mean velocity, as for an exact jump.
         mean = 0.5 * (self.before + self.after)
         model, run = self.rows.model, self.rows.run
-        acted = generalised(self.acting, self.impulse) + self.stop + self.dry
+        acted = generalised(self.acting, self.impulse) + self.stop + self.dry + self.tied
         motors = np.zeros_like(mean)
         motors[:, model.actuator_joint] = run.torque[:-1]
         forces = motors + self.pushed - model.damping * self.before
