@@ -11,6 +11,7 @@ from heelstrike.analysis.actuation import actuator_power
 from heelstrike.analysis.intervals import (
     brake_impulse,
     event_impulse,
+    friction_work,
     impulses_in_events,
     mean_over_intervals,
     stop_impulse,
@@ -106,7 +107,8 @@ def energy_balance(run: Run) -> EnergyBalance:
     stop_work = mean_over_intervals(run, run.stop_torque) * held[:, None] + stop_impulse(run)
     damper_power = -(mean * mean_over_intervals(run, run.velocity)) @ model.damping
 
-    brake_work = mean_over_intervals(run, run.brake_torque) * held[:, None] + brake_impulse(run)
+    brake_work = friction_work(run, run.brake_torque, run.velocity[:, model.brake_joint])
+    brake_work = brake_work + brake_impulse(run) * mean[:, model.brake_joint]
 
     def summed(work: Floats) -> Floats:
         return np.concatenate(([0.0], np.cumsum(work)))[: len(run.time)]
@@ -119,10 +121,8 @@ def energy_balance(run: Run) -> EnergyBalance:
         dampers=summed(damper_power * held),
         contacts=summed(contact_work),
         stops=summed((stop_work * mean).sum(axis=1)),
-        dry_friction=summed(
-            (mean_over_intervals(run, run.friction_torque) * mean).sum(axis=1) * held
-        ),
-        brakes=summed((brake_work * mean[:, model.brake_joint]).sum(axis=1)),
+        dry_friction=summed(friction_work(run, run.friction_torque, run.velocity).sum(axis=1)),
+        brakes=summed(brake_work.sum(axis=1)),
         pushes=summed(_push_work(run, mean)),
     )
 

@@ -36,6 +36,18 @@ def mean_over_intervals(run: Run, values: Floats) -> Floats:
     return values[:-1]
 
 
+def friction_work(run: Run, torque: Floats, velocity: Floats) -> Floats:
+    """Work of dry friction in joints from each row to the next, (nt − 1, n), in J.
+
+    `torque` and `velocity`, (nt, n), are those of the joints at the rows. In an instant the torque
+    jumps where the joint comes to rest or turns round; its power is zero on both sides of that.
+    """
+    held = np.diff(run.time)[:, None]
+    if impulses_in_events(run):
+        return mean_over_intervals(run, torque * velocity) * held
+    return np.asarray(torque[:-1] * 0.5 * (velocity[:-1] + velocity[1:]) * held)
+
+
 def event_impulse(run: Run) -> Floats:
     """Impulse (x, z) of impacts that only the events know, (nt − 1, nc, 2), in N s.
 

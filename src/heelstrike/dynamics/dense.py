@@ -115,15 +115,13 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
 
     Returns the rank; unknowns that the equations leave free are zero.
     """
-    largest = 0.0
     for i in range(size):
         column[i] = i
         unknown[i] = 0.0
-        for j in range(size):
-            largest = max(largest, abs(system[i, j]))
+    smallest = 0.0  # known with the first pivot, which is the largest entry
     rank = size
     for k in range(size):
-        best = NO_PIVOT * largest
+        best = smallest
         row = -1
         place = -1
         for i in range(k, size):
@@ -135,6 +133,8 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
         if row < 0:
             rank = k
             break
+        if k == 0:
+            smallest = NO_PIVOT * best
         if row != k:
             for j in range(size + 1):
                 system[k, j], system[row, j] = system[row, j], system[k, j]
@@ -153,6 +153,60 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
             total -= system[k, j] * unknown[column[j]]
         unknown[column[k]] = total / system[k, k]
     return rank
+
+
+@kernel
+def shorten(
+    first: int, size: int, rank: int, unit: Floats, lean: Floats, column: Integers, system: Floats,
+    unknown: Floats,
+) -> None:  # fmt: skip
+    """Choose among the solutions of equations that :func:`solve_to_rank` left open the shortest.
+
+    Which unknowns that leaves free, and zero, hangs on rounding where pivots tie; the shortest
+    solution does not, and changes no faster than the equations do. Unknowns from `first` on count
+    for their length, each for that of a force with `lean` as much across it; those before follow.
+
+    Parameters
+    ----------
+    first, size, rank : int
+        First unknown that counts, number of unknowns, rank of the equations.
+    unit : (size,) float
+        What an unknown of the system stands for in `unknown`.
+    lean : (size - first,) float
+    column : (size,) int
+    system : (size, size + 1) float
+        What elimination left. Out: the free directions in the rows from `rank` on.
+    unknown : (size,) float
+        A solution. Out: the shortest.
+    """
+    for free in range(rank, size):
+        direction = system[free]
+        for other in range(rank, size):
+            direction[column[other]] = 1.0 if other == free else 0.0
+        for k in range(rank - 1, -1, -1):
+            total = -system[k, free]
+            for j in range(k + 1, rank):
+                total -= system[k, j] * direction[column[j]]
+            direction[column[k]] = total / system[k, k]
+        for i in range(size):
+            direction[i] *= unit[i]
+        for earlier in range(rank, free):
+            _remove(first, size, lean, system[earlier], direction)
+        _remove(first, size, lean, direction, unknown)
+
+
+@kernel
+def _remove(first: int, size: int, lean: Floats, direction: Floats, vector: Floats) -> None:
+    """Make a vector orthogonal to a direction, as :func:`shorten` reckons lengths."""
+    along = 0.0
+    length = 0.0
+    for i in range(first, size):
+        weighted = (1.0 + lean[i - first] * lean[i - first]) * direction[i]
+        along += weighted * vector[i]
+        length += weighted * direction[i]
+    if length > 0.0:
+        for i in range(size):
+            vector[i] -= along / length * direction[i]
 
 
 @dissolved_kernel

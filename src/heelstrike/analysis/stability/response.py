@@ -217,12 +217,9 @@ def disturbance_response(
 
     Parameters
     ----------
-    robot : Robot
-        A robot that is free to move along the ground.
-    state : State or Snapshot
-        Where the walk begins.
-    controller : object with ``torque(t, state, contacts)``, or None
-        One in Python must take part in snapshots.
+    robot, state, controller, ground, method, control_period, settling, returns, longest_step
+        The walk, how it is simulated and how long it is looked at, as of
+        :func:`~heelstrike.floquet_multipliers`.
     disturbances : mapping of str to (callable, float)
         By name: ``disturb(simulation, size)``, which is called in the middle of a step and changes
         what comes then, by ``simulation.apply(push)``, ``simulation.ground = ...`` or
@@ -231,18 +228,8 @@ def disturbance_response(
         Takes the :class:`~heelstrike.Run` of a return, with a row every ten steps of the method and
         all events, and returns one or more numbers, which must not depend on when it began; the
         duration of a step by default, for which `method` must not have a fixed step.
-    ground : Ground
-        Level or sloping ground; ``Ground()`` by default.
-    method : Method
-        Way through time; ``TimeStepping()`` by default.
-    control_period : float, optional
-        As of :func:`~heelstrike.simulate`.
-    settling, returns : int
-        Steps before anything is disturbed; returns over which the differences are averaged.
     disturbance : float, optional
         Size of the errors that are put in, as of :func:`~heelstrike.floquet_multipliers`.
-    longest_step : float
-        Seconds after which a step without touchdown has failed.
 
     Returns
     -------
@@ -250,10 +237,8 @@ def disturbance_response(
 
     Raises
     ------
-    LimitCycleError
-        If the walk, or a disturbed one, falls, takes no steps or stands otherwise one return later.
-    SimulationError, ControllerError
-        If an argument is not usable, or a controller cannot be kept.
+    LimitCycleError, SimulationError, ControllerError
+        As of :func:`~heelstrike.floquet_multipliers`.
 
     Notes
     -----

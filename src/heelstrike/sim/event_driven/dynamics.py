@@ -11,7 +11,7 @@ import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.dynamics.dense import shorten, solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -178,10 +178,11 @@ def watch_geometry(
 ) -> None:  # fmt: skip
     """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
-    That of a point that is let pass below the ground is its depth.
+    That of a point that is let pass below the ground is its depth. On ground with corners the
+    second rate of an open point bounds how fast it moves.
     """
-    value, rate = phase.value, phase.rate
-    if has_corners(ground):
+    value, rate, corners = phase.value, phase.rate, has_corners(ground)
+    if corners:
         watch_corners(model, ground, contacts, phase, value)
         if phase.watched > phase.first_second:
             watch_second_faces(model, tree, phase)
@@ -205,6 +206,8 @@ def watch_geometry(
             side = 1.0 - 2.0 * phase.passing[contact]
             value[2 * contact] = side * contacts.gap[contact]
             rate[2 * contact] = side * normal
+            if corners:
+                rate[2 * contact + 1] = abs(normal) + abs(tangent)
         elif phase.slide[contact] != 0 and phase.group[contact] == contact:
             value[2 * contact + 1] = phase.slide[contact] * tangent
 
@@ -282,6 +285,11 @@ def hold_by_saddle_point(
         saddle.system[nv + k, nv + size] = -saddle.bias[phase.row[k]]
     rank = solve_saddle_point(nv + size, saddle)
     phase.deficient = 1 if rank < nv + size else 0
+    if phase.deficient == 1:
+        shorten(
+            nv, nv + size, rank, saddle.scale, phase.lean, saddle.order, saddle.system,
+            saddle.unknown,
+        )  # fmt: skip
     saddle.needed = 1
     for i in range(nv):
         rate[i] = saddle.unknown[i]
@@ -333,6 +341,8 @@ def hold_closed(
         hold_by_saddle_point(size, count, model, state, memory, phase)
         return
     phase.deficient = 1 if rank < size else 0
+    if phase.deficient == 1:
+        shorten(0, size, rank, phase.scale, phase.lean, phase.column, phase.system, phase.unknown)
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
         if phase.lean[i] != 0.0:

@@ -34,7 +34,12 @@ from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
-from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
+from heelstrike.sim.event_driven.corners import (
+    impulse_of,
+    is_struck,
+    log_impulse,
+    show_forces,
+)
 from heelstrike.sim.event_driven.dynamics import evaluate, is_in_place, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
@@ -46,7 +51,13 @@ from heelstrike.sim.event_driven.faces import (
 )
 from heelstrike.sim.event_driven.gaps import gap_now, gap_velocity
 from heelstrike.sim.event_driven.impact import REST, SHORTEST_BOUNCE, collide, heading, strike
-from heelstrike.sim.event_driven.location import GAP_NOISE, TOGETHER, integrate, shortest_step
+from heelstrike.sim.event_driven.location import (
+    EVENT_TIME,
+    GAP_NOISE,
+    TOGETHER,
+    integrate,
+    shortest_step,
+)
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
 from heelstrike.sim.event_driven.phase import Phase, allocate_phase
 from heelstrike.sim.event_driven.rows import (
@@ -73,8 +84,9 @@ PAINLEVE = int(EventKind.PAINLEVE)
 ON_THE_GROUND = 1e-6
 # Feet nearer to each other than this (m) are beside each other.
 BESIDE = 1e-6
-# Speed (m/s) of approach that makes a sliding point without consistent force collide.
-NUDGE = 1e-10
+# Speed (m/s) of approach that makes a sliding point without consistent force collide. As near to a
+# pole of the forces as steps get that may be too little, and it is more each time, up to a most.
+NUDGE, HARDER, HARDEST = 1e-10, 10.0, 1e-7
 # Torque (relative) that a controller may change between two looks at the same instant.
 JUMP = 1e-7
 # An event is followed by another in the same instant when less than this (s) lies between.
@@ -299,7 +311,7 @@ def is_unclear(ahead: float, phase: Phase) -> bool:
 
 
 @kernel
-def jump(model: Model, memory: Memory, phase: Phase, record: Record) -> bool:
+def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Record) -> bool:
     """Let velocities jump without a collision (Painlevé's paradox); return success."""
     begin, before = phase.begin, phase.end
     for i in range(begin.shape[0]):
@@ -307,7 +319,7 @@ def jump(model: Model, memory: Memory, phase: Phase, record: Record) -> bool:
     for contact in range(phase.watched):
         phase.hit[contact] = 0
         phase.plastic[contact] = phase.closed[contact]
-    solved, _ = collide(model, NUDGE, memory, phase, phase.begin)
+    solved, _ = collide(model, nudge, memory, phase, phase.begin)
     for contact in range(phase.watched):
         phase.plastic[contact] = 0
     for contact in range(phase.first_dry):
@@ -317,8 +329,7 @@ def jump(model: Model, memory: Memory, phase: Phase, record: Record) -> bool:
             joint = phase.stop_joint[contact - model.nc]
             log_event(phase.time, JOINT_STOP, joint, phase.impulse[contact, 0], 0.0, record)
         elif contact < model.nc and is_struck(contact, phase):
-            normal, tangent = impulse_of(contact, memory.contacts, phase)
-            log_event(phase.time, PAINLEVE, contact, normal, tangent, record)
+            log_impulse(PAINLEVE, contact, memory.contacts, phase, record)
     if not solved:
         for i in range(begin.shape[0]):
             begin[i] = before[i]
@@ -409,6 +420,7 @@ def decide_modes(
     model = scene.model
     forced, jammed = phase.forced == 1, phase.jammed == 1
     ahead = FIRST_LOOK if forced else 0.0
+    nudge = NUDGE
     for _ in range(LOOKS):
         extrapolate(model, ahead, phase.begin, phase.slopes[0], phase.trial)
         time = phase.time + ahead
@@ -435,8 +447,9 @@ def decide_modes(
         if phase.last_row < phase.time:
             write_row(scene, phase.time, phase.begin, False, control, memory, phase, record)
         evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[1])
-        if not jump(model, memory, phase, record):
+        if not jump(model, nudge, memory, phase, record):
             return False
+        nudge = min(HARDER * nudge, HARDEST)
     return False
 
 
@@ -833,6 +846,19 @@ def move_over(
 
 
 @kernel
+def jam(model: Model, phase: Phase) -> bool:
+    """Leave it to a jump of the velocity to end forces that grow without bound before a pole.
+
+    Only a sliding point has such; returns whether there is one.
+    """
+    for contact in range(model.nc):
+        if phase.slide[contact] != 0:
+            phase.jammed = 1
+            phase.undecided = 1
+    return phase.jammed == 1
+
+
+@kernel
 def move(
     scene: Scene, control: Control, memory: Memory, phase: Phase, record: Record, clock: Clock
 ) -> int:
@@ -853,13 +879,8 @@ def move(
         if phase.bridging == 1:
             return move_over(scene, stop, control, memory, phase, record, clock)
         if not integrate(scene, stop, control, memory, phase):
-            # Forces that grow without bound before a sliding point end in a jump of velocity.
-            for contact in range(model.nc):
-                if phase.slide[contact] != 0:
-                    phase.jammed = 1
-                    phase.undecided = 1
             phase.burst += 1
-            if phase.jammed == 0 or phase.burst > INSISTENT:
+            if not jam(model, phase) or phase.burst > INSISTENT:
                 phase.bridging = 1
             phase.next_length = 1e-6
             return DONE
@@ -875,7 +896,10 @@ def move(
         evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
         meet_event(False, model, ground, memory, phase, record)
     if phase.allowance < 0.0:
-        phase.bridging = 1
+        if phase.has_fired == 0 and phase.length < EVENT_TIME and jam(model, phase):
+            phase.allowance = EVENTS_A_BRIDGE
+        else:
+            phase.bridging = 1
     show_state(model, phase, memory)
     return DONE
 

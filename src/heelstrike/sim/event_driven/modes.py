@@ -25,8 +25,10 @@ from heelstrike.sim.record.recording import (
 
 REVERSAL = int(EventKind.SLIP_REVERSAL)
 
-# Two normals are one when the sine of the angle between them is below this.
+# Two normals are one when the sine of the angle between them is below this, and two points are on
+# one line along them when they are no further (m) apart across it.
 PARALLEL = 1e-9
+ALIGNED = 1e-8
 
 
 @kernel
@@ -102,8 +104,12 @@ def link_of(contact: int, model: Model, phase: Phase) -> int:
 
 @kernel
 def join_group(model: Model, contacts: Contacts, contact: int, phase: Phase) -> None:
-    """Let a closed point join the group of its link and direction, if there is one before it."""
+    """Let a closed point join the group of its link and line, if there is one before it.
+
+    Points on two steps of a stair move alike too, but a tangential force acts on another line.
+    """
     x, z = normal_of(contact, contacts, phase)
+    height = place_along(contact, -z, x, contacts, phase)
     link = link_of(contact, model, phase)
     for other in range(contact):
         if phase.closed[other] == 0 or phase.group[other] != other:
@@ -111,7 +117,9 @@ def join_group(model: Model, contacts: Contacts, contact: int, phase: Phase) -> 
         if model.nc <= other < phase.first_second or link_of(other, model, phase) != link:
             continue
         its_x, its_z = normal_of(other, contacts, phase)
-        if abs(its_x * z - its_z * x) < PARALLEL and its_x * x + its_z * z > 0.0:
+        if abs(its_x * z - its_z * x) > PARALLEL or its_x * x + its_z * z < 0.0:
+            continue
+        if abs(place_along(other, -z, x, contacts, phase) - height) < ALIGNED:
             phase.group[contact] = other
             return
 
