@@ -118,7 +118,9 @@ class _Steps:
         """Steps whose positions move with another velocity than the one behind them."""
         if self.scheme is Scheme.IMPACT_RESOLVED:
             self.split = np.any(self.missed(self.after) > MOTION, axis=1)
-            self.moved = np.where(self.split[:, None], rows.ties.straight(self.h), self.after)
+            self.moved = self.after.copy()
+            split = np.flatnonzero(self.split)
+            self.moved[split] = rows.ties.straight(self.h, split)
         self.wedged = self.wedges()
         """Whether a wedge is going on, in which steps may leave in the ground what is there."""
         self.asked_for = np.zeros(len(self.time))
