@@ -117,7 +117,7 @@ class EventRows:
         """Rows that show what follows their instant, not what went before."""
         # Where a push begins or ends at the instant of an event, its last row shows what follows.
         events = np.array([event.time for event in run.events])
-        met = np.abs(time[:, None] - events).min(axis=1, initial=np.inf) <= INSTANT
+        met = _distance(time, events) <= INSTANT
         follows = (met & self.settled)[:, None]
         # Without an event nobody knows which side of such an instant its row shows.
         edge = np.abs(time[:, None] - self.edges).min(axis=1, initial=np.inf) <= INSTANT
@@ -137,9 +137,9 @@ class EventRows:
         """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
         for event in run.events:
             if event.kind is EventKind.BRIDGE:
-                self.bridges[int(np.argmin(np.abs(self.instant - event.time)))] = event.impulse
+                self.bridges[self.at(event.time)] = event.impulse
         self.jams = {
-            int(np.argmin(np.abs(self.instant - event.time)))
+            self.at(event.time)
             for event in run.events
             if event.kind is EventKind.PAINLEVE and event.impulse[0] > 0.0
         }
@@ -150,6 +150,18 @@ class EventRows:
         ahead = np.append(np.diff(self.instant), 1.0)
         self.ahead = np.repeat(ahead, self.last - self.first + 1)
         """Time from a row to the next instant."""
+        count = self.last - self.first + 1
+        self.next = np.repeat(np.append(self.first[1:], len(time) - 1), count)
+        """First row of the next instant."""
+        calm = ~self.eventful() | (count > 1)
+        self.goes_on = np.repeat(np.append(calm[1:], False), count)
+        """Whether that row shows what went before it, and not what an event has made of it."""
+
+    def at(self, time: float) -> int:
+        """Instant nearest to a time."""
+        after = int(np.searchsorted(self.instant, time))
+        near = range(max(after - 1, 0), min(after + 1, len(self.instant)))
+        return min(near, key=lambda k: abs(self.instant[k] - time))
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
@@ -226,12 +238,18 @@ class EventRows:
         found.look("sticking point slides off", loose, LAW, rows.time, rows.contacts)
 
     def seen(self, into: Array) -> Array:
-        """Whether an acceleration into a limit lasts long enough to lead anywhere.
+        """Whether an acceleration (T, p) into a limit lasts long enough to lead anywhere.
 
         At the height of a bounce too small to see, a point as near to the ground as if it were held
-        on it falls freely.
+        on it falls freely. One that leaves under a force that vanishes may do so a moment early:
+        with an acceleration that changes evenly from a to a' over a time T it is deepest at its
+        end, or at ``t = 2 T a / (a − a')``, by ``t² (a / 2 + (a' − a) t / 6 T)``.
         """
-        return 0.5 * into * self.ahead[:, None] ** 2 > CLOSED
+        change = np.where(self.goes_on[:, None], into[self.next] - into, 0.0)
+        ahead = self.ahead[:, None]
+        turns = np.divide(-2.0 * into, change, where=change < 0.0, out=np.ones_like(into))
+        part = np.clip(turns, 0.0, 1.0)
+        return (part * ahead) ** 2 * (into / 2.0 + change * part / 6.0) > CLOSED
 
     def joints(self, found: Findings) -> None:
         rows, model, run = self.rows, self.rows.model, self.rows.run
@@ -277,7 +295,7 @@ class EventRows:
         gains: set[int] = set()
         seen: dict[tuple[int, int, int], int] = {}
         for event in self.rows.run.events:
-            k = int(np.argmin(np.abs(self.instant - event.time)))
+            k = self.at(event.time)
             if event.kind is EventKind.ENERGY_GAIN:
                 gains.add(k)
             stop = event.kind is EventKind.JOINT_STOP
@@ -374,7 +392,7 @@ class EventRows:
 
     def end_of(self, k: int) -> int:
         """Instant at which the bridge that begins at instant k ends."""
-        return int(np.argmin(np.abs(self.instant - self.instant[k] - self.bridges[k][0])))
+        return self.at(self.instant[k] + self.bridges[k][0])
 
     def couples(self, k: int, p: Array) -> Array:
         """Rows (c, n) of the couples that discs in corners may feel in an instant.
@@ -571,9 +589,9 @@ class EventRows:
         for event in self.rows.run.events:
             if event.kind is EventKind.ZENO:  # says when the bounces would have ended: it rests
                 continue
-            near = np.abs(self.instant - event.time) <= INSTANT
-            if np.any(near):
-                changes |= near
+            near = self.at(event.time)
+            if abs(self.instant[near] - event.time) <= INSTANT:
+                changes[near] = True
             elif not np.any(np.abs(self.edges - event.time) <= EDGE):
                 # It has no row of its own, as at the edges of pushes: nothing may be integrated
                 # across it.
@@ -606,6 +624,13 @@ class EventRows:
         """Whether a push begins or ends between instants k and k + 1."""
         begin, end = self.instant[k] - INSTANT, self.instant[k + 1] + INSTANT
         return bool(np.any((self.edges > begin) & (self.edges < end)))
+
+
+def _distance(time: Array, others: Array) -> Array:
+    """Distance of each time from the nearest of others, which are in order; infinite without."""
+    among = np.concatenate(([-np.inf], others, [np.inf]))
+    after = np.searchsorted(among, time).clip(1)
+    return np.minimum(among[after] - time, time - among[after - 1])
 
 
 def _size(matrix: Array, v: Array) -> float:

@@ -392,6 +392,11 @@ class SteppingConstraints(Law):
     ------
     ControllerError
         If gains do not fit the robot, or a number is out of its range.
+
+    Notes
+    -----
+    Joints near the ends of those ranges at up to 100/s. Called less often than every 5 ms they do
+    by no more than half of what is left from call to call, since torques are held meanwhile.
     """
 
     def __init__(

@@ -487,7 +487,7 @@ def cross(
             phase.closed[contact] = 0
         phase.carrier[contact] = 0
         phase.holder[contact] = 0
-    # The faces stay: the impulses just reported are in the frame that this row has.
+    leave_faces(model, phase)
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows
