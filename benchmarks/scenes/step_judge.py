@@ -98,7 +98,8 @@ class _Steps:
             if controller is not None and self.scheme is Scheme.LINEARLY_IMPLICIT:
                 stiffness[model.actuator_joint] += controller.parameters.kp
                 damping[model.actuator_joint] += controller.parameters.kd
-            matrix = matrix + np.diag(ahead * damping + ahead**2 * stiffness)
+            rows.ties.added = ahead * damping + ahead**2 * stiffness
+            matrix = matrix + np.diag(rows.ties.added)
             known = known - ahead * stiffness * self.before
         self.metric = Metric(matrix)
         self.matrix = matrix

@@ -59,11 +59,14 @@ class JudgedTies:
         Coordinates that a brake which does not slip holds.
     latched : (T, n) bool
         Coordinates that are where a latch may hold them.
+    added : (n,) float
+        What a scheme of time stepping adds to the diagonal of the mass matrix.
     """
 
     def __init__(self, run: Any, poses: Any, metric: Metric) -> None:
         model, q = run.robot.model, run.position
         self.run, self.metric, self.tree = run, metric, poses.tree
+        self.added = np.zeros(q.shape[1])
         self.tied = Tied(model, poses, q, run.velocity)
         loops = run.loop_force.reshape(len(q), 2 * len(model.loop_link))
         self.along = np.concatenate((loops, run.coupling_force), axis=1)
@@ -138,7 +141,8 @@ class JudgedTies:
             stayed = q[left] - self.run.position[at]
             away = np.concatenate((tied.displacement, np.where(self.held[at], stayed, 0.0)), axis=1)
             rows = self._with_brakes(tied.jacobian, at)
-            q[left] -= torn(rows, Metric(poses.mass_matrix()), 0.0 * stayed, -away)
+            metric = Metric(poses.mass_matrix() + np.diag(self.added))
+            q[left] -= torn(rows, metric, 0.0 * stayed, -away)
             left = left[np.abs(away).max(axis=1) > CLOSED]
             if len(left) == 0:
                 break
@@ -154,7 +158,7 @@ class JudgedTies:
         if not self.along.shape[1] or len(steps) == 0:
             return u
         rows = self._with_brakes(self.tied.jacobian[steps], steps)
-        before = Metric(self.metric.matrix[steps])
+        before = Metric(self.metric.matrix[steps] + np.diag(self.added))
         along = np.concatenate((self.chord(step)[steps], 0.0 * u), axis=1)
         for _ in range(ATTEMPTS):
             u = u - torn(rows, before, u, along)
