@@ -9,8 +9,9 @@ does not ask for modes. At its end, contacts that touch must not approach, other
 with a_f the acceleration that the known forces lead to. It is kept as short as suffices: each
 further one without progress is longer. The impulses act at its beginning, as those of an impact;
 then the robot moves on freely to its end, where a smooth phase begins again. Impulses that make
-energy are refused, with restitution first and then without. Two bridges of half the length tell how
-far a bridge may be wrong: its order is one.
+energy are refused, with restitution first and then without. Bridges of a half and of a quarter of
+the length tell how far a bridge may be wrong: its order is one. The ends compared are those on
+their constraints, from which the motion goes on.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
 from heelstrike.sim.event_driven.corners import is_cornered, is_struck, joined
-from heelstrike.sim.event_driven.dynamics import evaluate
+from heelstrike.sim.event_driven.dynamics import evaluate, project
 from heelstrike.sim.event_driven.faces import locate, stand_on_face
 from heelstrike.sim.event_driven.gaps import (
     free_gap_acceleration,
@@ -44,6 +45,7 @@ from heelstrike.sim.event_driven.gaps import (
     gap_velocity,
 )
 from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
+from heelstrike.sim.event_driven.modes import form_groups
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.frame import Scene
@@ -64,12 +66,13 @@ TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
 # Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
 SLOW = 1e-3
-# The two halves of a bridge of order one are half as wrong as the whole, so that it is twice as
-# wrong as they are apart; and what puts its end on the ground afterwards, which they do not know
-# of, moves it up to as far again in most cases.
-SAFETY = 4.0
+# What a bridge of order one is wrong by grows with the square of its length: its halves together
+# are half as wrong as the whole, its quarters a quarter. So it is this many times as wrong as the
+# whole is apart from the halves, and as these are from the quarters; what these two estimates
+# differ by is how far the first may be wrong itself.
+FROM_HALVES, FROM_QUARTERS = 2.0, 4.0
 # Slopes of the step to come, where states can be kept until then.
-HERE, HALVED = 2, 3
+HERE, HALVED, QUARTERED = 2, 3, 4
 
 
 @kernel
@@ -247,68 +250,6 @@ def copy_state(source: Floats, state: Floats) -> None:
 
 
 @kernel
-def halves_end(
-    scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase,
-    end: Floats,
-) -> bool:  # fmt: skip
-    """Write where two bridges of half the length end; return whether there are such."""
-    here = phase.slopes[HERE]
-    copy_state(phase.begin, here)
-    found = True
-    for _ in range(2):
-        found = found and find_impulses(scene, 0.5 * length, bouncing, control, memory, phase)
-        copy_state(phase.end, phase.begin)
-    copy_state(phase.begin, end)
-    copy_state(here, phase.begin)
-    return found
-
-
-@kernel
-def find_bridge(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
-) -> tuple[bool, float]:
-    """Find a bridge of some length; return success, and how far its end may be wrong."""
-    other = phase.slopes[HALVED]
-    for attempt in range(2):
-        bouncing = attempt == 0
-        sure = halves_end(scene, length, bouncing, control, memory, phase, other)
-        if find_impulses(scene, length, bouncing, control, memory, phase):
-            wrong = 0.0
-            for i in range(other.shape[0]):
-                apart = phase.end[i] - (other[i] if sure else phase.begin[i])
-                wrong = max(wrong, SAFETY * abs(apart))
-            return True, wrong
-    return False, 0.0
-
-
-@kernel
-def report_impulses(
-    model: Model, wrong: float, contacts: Contacts, phase: Phase, reported: Reported, record: Record
-) -> None:
-    """Append the bridge to the events, and the impulses of the contacts."""
-    log_event(phase.time, BRIDGE, 0, phase.length, wrong, record)
-    for contact in range(phase.first_dry):
-        normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
-        struck = normal > 0.0
-        if contact < model.nc and is_cornered(contact, phase):
-            struck = is_struck(contact, phase)
-            normal, tangent = joined(contact, phase.impulse, contacts, phase)
-        if not struck:
-            continue
-        if contact >= model.nc:
-            joint = phase.stop_joint[contact - model.nc]
-            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
-            reported.closed[contact] = 1
-            continue
-        kind = IMPACT
-        if reported.closed[contact] == 0:
-            kind = TOUCHDOWN
-            reported.closed[contact] = 1
-            reported.slipping[contact] = 0
-        log_event(phase.time, kind, contact, normal, tangent, record)
-
-
-@kernel
 def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -> None:
     """Let the contacts do at the end of the bridge what it found."""
     tree, contacts, mode = memory.equations.tree, memory.contacts, memory.reaction.mode
@@ -337,6 +278,113 @@ def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -
 
 
 @kernel
+def keep_modes(phase: Phase) -> None:
+    """Remember what is closed, and on which faces, where marks of impacts have no use now."""
+    for contact in range(phase.watched):
+        phase.hit[contact] = phase.closed[contact]
+        phase.plastic[contact] = phase.face[contact]
+
+
+@kernel
+def restore_modes(phase: Phase) -> None:
+    """Go back to what :func:`keep_modes` remembered."""
+    for contact in range(phase.watched):
+        phase.closed[contact] = phase.hit[contact]
+        phase.face[contact] = phase.plastic[contact]
+        phase.hit[contact] = 0
+        phase.plastic[contact] = 0
+
+
+@kernel
+def end_of_parts(
+    scene: Scene, parts: int, length: float, bouncing: bool, control: Control, memory: Memory,
+    phase: Phase, end: Floats,
+) -> None:  # fmt: skip
+    """Write where so many bridges end that take some time together; where they begin without."""
+    here = phase.slopes[HERE]
+    copy_state(phase.begin, here)
+    copy_state(phase.begin, end)
+    found = True
+    for _ in range(parts):
+        found = found and find_impulses(scene, length / parts, bouncing, control, memory, phase)
+        copy_state(phase.end, phase.begin)
+    if found:
+        keep_modes(phase)
+        adopt_end(scene.model, scene.ground, memory, phase)
+        put_end_in_place(scene, memory, phase, end)
+        restore_modes(phase)
+    copy_state(here, phase.begin)
+
+
+@kernel
+def put_end_in_place(scene: Scene, memory: Memory, phase: Phase, end: Floats) -> None:
+    """Write the state behind a bridge, whose modes have been adopted, put on its constraints."""
+    model, tree = scene.model, memory.equations.tree
+    copy_state(phase.begin, end)
+    form_groups(model, tree, memory.contacts, memory.surface.friction, phase)
+    project(model, scene.ground, memory, phase, end)
+    for contact in range(phase.watched):
+        phase.carrier[contact] = 0
+        phase.holder[contact] = 0
+        phase.stuck[contact] = 0
+
+
+@kernel
+def find_bridge(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> bool:
+    """Find a bridge of some length, and where its halves and quarters end; return success."""
+    halved, quartered = phase.slopes[HALVED], phase.slopes[QUARTERED]
+    for attempt in range(2):
+        bouncing = attempt == 0
+        end_of_parts(scene, 2, length, bouncing, control, memory, phase, halved)
+        end_of_parts(scene, 4, length, bouncing, control, memory, phase, quartered)
+        if find_impulses(scene, length, bouncing, control, memory, phase):
+            return True
+    return False
+
+
+@kernel
+def estimate_error(scene: Scene, memory: Memory, phase: Phase) -> float:
+    """How far the end of a bridge may be wrong, once it has been adopted."""
+    end, halved, quartered = phase.slopes[HERE], phase.slopes[HALVED], phase.slopes[QUARTERED]
+    put_end_in_place(scene, memory, phase, end)
+    wrong = 0.0
+    for i in range(end.shape[0]):
+        first = FROM_HALVES * (end[i] - halved[i])
+        second = FROM_QUARTERS * (halved[i] - quartered[i])
+        wrong = max(wrong, abs(first) + abs(first - second))
+    return wrong
+
+
+@kernel
+def report_impulses(
+    model: Model, contacts: Contacts, phase: Phase, reported: Reported, record: Record
+) -> None:
+    """Append the bridge to the events, its error left open, and the impulses of the contacts."""
+    log_event(phase.time, BRIDGE, 0, phase.length, 0.0, record)
+    for contact in range(phase.first_dry):
+        normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
+        struck = normal > 0.0
+        if contact < model.nc and is_cornered(contact, phase):
+            struck = is_struck(contact, phase)
+            normal, tangent = joined(contact, phase.impulse, contacts, phase)
+        if not struck:
+            continue
+        if contact >= model.nc:
+            joint = phase.stop_joint[contact - model.nc]
+            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
+            reported.closed[contact] = 1
+            continue
+        kind = IMPACT
+        if reported.closed[contact] == 0:
+            kind = TOUCHDOWN
+            reported.closed[contact] = 1
+            reported.slipping[contact] = 0
+        log_event(phase.time, kind, contact, normal, tangent, record)
+
+
+@kernel
 def cross(
     scene: Scene, stop: float, control: Control, memory: Memory, phase: Phase, record: Record
 ) -> bool:
@@ -351,16 +399,16 @@ def cross(
         phase.series = phase.time
         phase.bridges = 0
     found = False
-    wrong = 0.0
     while not found and phase.bridges < MOST_BRIDGES:
         wish = SHORTEST_BRIDGE * LONGER**phase.bridges
         phase.length = min(wish, stop - phase.time)
-        found, wrong = find_bridge(scene, phase.length, control, memory, phase)
+        found = find_bridge(scene, phase.length, control, memory, phase)
         if phase.length == wish or not found:
             phase.bridges += 1
     if not found:
         return False
-    report_impulses(model, wrong, memory.contacts, phase, memory.reported, record)
+    bridge = record.events
+    report_impulses(model, memory.contacts, phase, memory.reported, record)
     for contact in range(phase.watched):
         if not phase.first_dry <= contact < phase.first_second:
             phase.closed[contact] = 0
@@ -378,5 +426,6 @@ def cross(
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
     adopt_end(model, scene.ground, memory, phase)
+    record.event_impulse[bridge, 1] = estimate_error(scene, memory, phase)
     phase.bridging = 0
     return True
