@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scenes.campaign import Task, campaign, results_in
+from scenes.campaign import Task, add_arguments, campaign, results_in
 from scenes.findings import Findings
 from scenes.mechanics import Poses, Tree
 from scenes.record import Rows
@@ -261,11 +261,6 @@ def words(result: dict[str, Any]) -> str:
     )
 
 
-def _seeds(text: str) -> range:
-    first, _, last = text.partition(":")
-    return range(int(first), int(last)) if last else range(int(first))
-
-
 def main() -> None:
     """Run falls, sum them up, or show one."""
     robots = hs.builtin_robots()
@@ -274,10 +269,7 @@ def main() -> None:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="run falls and append what comes out to a file")
-    run.add_argument("--out", type=Path, required=True, help="file of results, one a line")
-    run.add_argument("--robots", nargs="+", choices=robots, default=robots)
-    run.add_argument("--seeds", type=_seeds, default=range(100), help="FIRST:END or their number")
-    run.add_argument("--workers", type=int, choices=(1, 2), default=1)
+    add_arguments(run, 100, kept=True, of="robots", choices=robots)
     sums = commands.add_parser("table", help="sum a file of results up")
     sums.add_argument("results", type=Path)
     show = commands.add_parser("show", help="run and judge one fall")

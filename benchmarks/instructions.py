@@ -5,7 +5,8 @@ for the same code, compiler and step, whatever else the machine does. Kernels ar
 Haswell, since valgrind knows no AVX-512. A step is a millisecond of simulated time, also where a
 method chooses steps of its own.
 
-What slips, or lies on joint stops, is held beside the same robot sticking.
+What slips, or lies on joint stops, is held beside the same robot sticking; a law that is not of the
+package beside the same law that is.
 
 Counts are kept in benchmarks/instructions.json. A count that grew by more than 2 % fails the run;
 whoever means it writes the new counts down with --update and commits them.
@@ -30,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from speed import page
+from speed import page, users_law
 from speed.scenarios import falling, plank, standing, walk_gait
 
 import heelstrike as hs
@@ -75,7 +76,8 @@ class Counted:
     controller : controller, optional
         Instead of the scenario's own law.
     beside : str
-        Scenario of the same robot that only sticks, whose count this one's is held against.
+        Scenario whose count this one's is held against: of the same robot that only sticks, or
+        under the same law of the package.
     """
 
     scenario: Scenario
@@ -102,6 +104,10 @@ def scenarios(gait: hs.Gait | None = None) -> dict[str, Counted]:
         "standing, walker2d": Counted(standing("walker2d"), 100, 500),
         "standing, plank on 8 points": Counted(at_reference(eight), 100, 500),
         "walking, computed torque": Counted(walk, 0, 1000, controller=law),
+        "walking, computed torque of a user": Counted(
+            walk, 0, 1000, controller=users_law.ComputedTorque(robot, gait),
+            beside="walking, computed torque",
+        ),
         "walking, event driven": Counted(walk, 20, 200, hs.EventDriven(), law),
         "walking, compliant": Counted(walk, 20, 900, hs.Compliant(), law),
         "falling": Counted(falling("bravo7"), 0, 400),

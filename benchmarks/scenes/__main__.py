@@ -3,9 +3,11 @@
     python benchmarks/scenes run --out scenes.jsonl --methods event_driven --seeds 0:300
     python benchmarks/scenes page scenes.jsonl --out benchmarks/scenes/baseline.md
     python benchmarks/scenes show event_driven 38
+    python benchmarks/scenes run --out tied.jsonl --family tied --seeds 0:100
     python benchmarks/scenes energy --seeds 4000:4100
 
-`run` goes on where a file of results ends; `show` judges one scene and prints what is wrong.
+`run` goes on where a file of results ends; `show` judges one scene and prints what is wrong. Of
+the family `tied` scenes have closed loops, coupled joints, latches and brakes (scenes/ties).
 `energy`, `twins`, `orders` and `bridges` put one question each to many scenes (scenes/checks):
 a line of JSON a scene, then what they add up to; with --out FILE they go on where it ends, too.
 """
@@ -16,21 +18,17 @@ import argparse
 import json
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 
 # Run as a folder, its modules would be on the path and not the package.
 sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
-from scenes.campaign import Task, campaign, results_in  # noqa: E402
+from scenes.campaign import Task, add_arguments, campaign, results_in  # noqa: E402
 from scenes.checks.commands import CHECKS, check  # noqa: E402
 from scenes.methods import METHODS  # noqa: E402
-from scenes.running import prepare, run_scene  # noqa: E402
+from scenes.running import FAMILIES, prepare, run_scene  # noqa: E402
 from scenes.table import page  # noqa: E402
-
-
-def _seeds(text: str) -> range:
-    first, _, last = text.partition(":")
-    return range(int(first), int(last)) if last else range(int(first))
 
 
 def main() -> None:
@@ -40,11 +38,9 @@ def main() -> None:
     )
     commands = parser.add_subparsers(dest="command", required=True)
     run = commands.add_parser("run", help="run scenes and append what comes out to a file")
-    run.add_argument("--out", type=Path, required=True, help="file of results, one a line")
-    run.add_argument("--methods", nargs="+", choices=METHODS, default=METHODS)
-    run.add_argument("--seeds", type=_seeds, default=range(300), help="FIRST:END or their number")
-    run.add_argument("--workers", type=int, choices=(1, 2), default=1)
+    add_arguments(run, 300, kept=True, of="methods", choices=METHODS)
     run.add_argument("--without-twins", action="store_true")
+    run.add_argument("--family", choices=FAMILIES, default="free", help="tied: loops, brakes …")
     sums = commands.add_parser("page", help="sum a file of results up")
     sums.add_argument("results", type=Path)
     sums.add_argument("--out", type=Path)
@@ -52,11 +48,10 @@ def main() -> None:
     show = commands.add_parser("show", help="run and judge one scene")
     show.add_argument("method", choices=METHODS)
     show.add_argument("seed", type=int)
+    show.add_argument("--family", choices=FAMILIES, default="free")
     for name, (_, words) in CHECKS.items():
         asks = commands.add_parser(name, help=words)
-        asks.add_argument("--seeds", type=_seeds, default=range(100), help="FIRST:END or number")
-        asks.add_argument("--out", type=Path, help="file of results, one a line")
-        asks.add_argument("--workers", type=int, choices=(1, 2), default=1)
+        add_arguments(asks, 100, kept=False)
     options = parser.parse_args()
     if options.command in CHECKS:
         with tempfile.TemporaryDirectory() as folder:
@@ -64,12 +59,15 @@ def main() -> None:
             check(options.command, options.seeds, out, options.workers)
     elif options.command == "run":
         twins = not options.without_twins
+        others = {one.get("family", "free") for one in results_in(options.out)}
+        if others - {options.family}:
+            parser.error(f"{options.out} has scenes of another family: {', '.join(sorted(others))}")
         for one in campaign(
             options.out,
             options.methods,
             options.seeds,
             workers=options.workers,
-            task=Task(run_scene, prepare),
+            task=Task(partial(run_scene, family=options.family), prepare),
             twins=twins,
         ):
             found = one.get("objections", []) + one.get("twins", {}).get("objections", [])
@@ -82,7 +80,7 @@ def main() -> None:
         else:
             options.out.write_text(text)
     else:
-        print(json.dumps(run_scene(options.method, options.seed), indent=2))
+        print(json.dumps(run_scene(options.method, options.seed, family=options.family), indent=2))
 
 
 if __name__ == "__main__":

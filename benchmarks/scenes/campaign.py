@@ -7,6 +7,7 @@ Results are appended to a file as they come; what is in it is not run again.
 
 from __future__ import annotations
 
+import argparse
 import json
 import multiprocessing
 import multiprocessing.connection
@@ -32,6 +33,28 @@ def _limit_processor_time(seconds: float) -> None:
         _, hard = resource.getrlimit(resource.RLIMIT_CPU)
         soft = hard if seconds == float("inf") else int(time.process_time() + seconds + 1.0)
         resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
+
+
+def seeds(text: str) -> range:
+    """Return the seeds of FIRST:END, or so many from zero on."""
+    first, _, last = text.partition(":")
+    return range(int(first), int(last)) if last else range(int(first))
+
+
+def add_arguments(
+    parser: argparse.ArgumentParser, count: int, *, kept: bool, of: str = "", choices: Any = ()
+) -> None:
+    """Have a command of many scenes ask for the file of results, the seeds and the workers.
+
+    And for what the scenes are of, if there is a choice.
+    """
+    parser.add_argument("--out", type=Path, required=kept, help="file of results, one a line")
+    if of:
+        parser.add_argument(f"--{of}", nargs="+", choices=choices, default=choices)
+    parser.add_argument(
+        "--seeds", type=seeds, default=range(count), help="FIRST:END or their number"
+    )
+    parser.add_argument("--workers", type=int, choices=(1, 2), default=1)
 
 
 @dataclass(frozen=True)

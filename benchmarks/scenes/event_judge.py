@@ -73,6 +73,8 @@ BRIEF = 1e-8
 known forces do in it."""
 INSTANT = 1e-14
 """Rows and events closer than this (s) are of one time."""
+SAME = 4.0 * float(np.finfo(float).eps)
+"""Rows and events closer than this part of their time are of one instant of the simulator, too."""
 EDGE = 1e-12
 """An event this near (s) to where a push begins or ends happens there."""
 
@@ -105,7 +107,7 @@ class EventRows:
         self.rows, self.start = rows, start
         time, run = rows.time, rows.run
         edges = [edge for one in run.pushes for edge in (one.start, one.end)]
-        self.edges = np.array(sorted(edges))
+        self.edges = np.sort(np.concatenate((edges, rows.ties.switches())))
         # One time after the other: first and last row of each instant.
         new = np.concatenate(([True], np.diff(time) > INSTANT))
         self.first = np.flatnonzero(new)
@@ -115,7 +117,7 @@ class EventRows:
         """Rows that show what follows their instant, not what went before."""
         # Where a push begins or ends at the instant of an event, its last row shows what follows.
         events = np.array([event.time for event in run.events])
-        met = np.abs(time[:, None] - events).min(axis=1, initial=np.inf) <= INSTANT
+        met = _distance(time, events) <= INSTANT
         follows = (met & self.settled)[:, None]
         # Without an event nobody knows which side of such an instant its row shows.
         edge = np.abs(time[:, None] - self.edges).min(axis=1, initial=np.inf) <= INSTANT
@@ -135,9 +137,9 @@ class EventRows:
         """Length of each bridge and how far it may be wrong, by the instant at which it begins."""
         for event in run.events:
             if event.kind is EventKind.BRIDGE:
-                self.bridges[int(np.argmin(np.abs(self.instant - event.time)))] = event.impulse
+                self.bridges[self.at(event.time)] = event.impulse
         self.jams = {
-            int(np.argmin(np.abs(self.instant - event.time)))
+            self.at(event.time)
             for event in run.events
             if event.kind is EventKind.PAINLEVE and event.impulse[0] > 0.0
         }
@@ -148,9 +150,22 @@ class EventRows:
         ahead = np.append(np.diff(self.instant), 1.0)
         self.ahead = np.repeat(ahead, self.last - self.first + 1)
         """Time from a row to the next instant."""
+        count = self.last - self.first + 1
+        self.next = np.repeat(np.append(self.first[1:], len(time) - 1), count)
+        """First row of the next instant."""
+        calm = ~self.eventful() | (count > 1)
+        self.goes_on = np.repeat(np.append(calm[1:], False), count)
+        """Whether that row shows what went before it, and not what an event has made of it."""
+
+    def at(self, time: float) -> int:
+        """Instant nearest to a time."""
+        after = int(np.searchsorted(self.instant, time))
+        near = range(max(after - 1, 0), min(after + 1, len(self.instant)))
+        return min(near, key=lambda k: abs(self.instant[k] - time))
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
+        self.rows.ties.judge(found, self.known, smooth=self.smooth)
         self.forces(found)
         self.impacts(found)
         self.intervals(found)
@@ -223,12 +238,18 @@ class EventRows:
         found.look("sticking point slides off", loose, LAW, rows.time, rows.contacts)
 
     def seen(self, into: Array) -> Array:
-        """Whether an acceleration into a limit lasts long enough to lead anywhere.
+        """Whether an acceleration (T, p) into a limit lasts long enough to lead anywhere.
 
         At the height of a bounce too small to see, a point as near to the ground as if it were held
-        on it falls freely.
+        on it falls freely. One that leaves under a force that vanishes may do so a moment early:
+        with an acceleration that changes evenly from a to a' over a time T it is deepest at its
+        end, or at ``t = 2 T a / (a − a')``, by ``t² (a / 2 + (a' − a) t / 6 T)``.
         """
-        return 0.5 * into * self.ahead[:, None] ** 2 > CLOSED
+        change = np.where(self.goes_on[:, None], into[self.next] - into, 0.0)
+        ahead = self.ahead[:, None]
+        turns = np.divide(-2.0 * into, change, where=change < 0.0, out=np.ones_like(into))
+        part = np.clip(turns, 0.0, 1.0)
+        return (part * ahead) ** 2 * (into / 2.0 + change * part / 6.0) > CLOSED
 
     def joints(self, found: Findings) -> None:
         rows, model, run = self.rows, self.rows.model, self.rows.run
@@ -236,7 +257,7 @@ class EventRows:
         size = self.force_size[:, None]
         time, names = rows.time, rows.joints
         speed = np.abs(rows.v) / (weight * self.speed_size[:, None] + 1e-9)
-        stop = run.stop_torque * weight / size
+        stop = np.where(rows.ties.latched, 0.0, run.stop_torque * weight / size)
         for side, limit, name in ((1.0, model.lower, "lower"), (-1.0, model.upper, "upper")):
             gap = side * (rows.q - limit)
             found.look(f"{name} stop: beyond it", np.nan_to_num(-gap), DEPTH, time, names)
@@ -272,14 +293,11 @@ class EventRows:
         joint: dict[int, Array] = {}
         most: dict[int, int] = {}
         gains: set[int] = set()
-        late: set[int] = set()
         seen: dict[tuple[int, int, int], int] = {}
         for event in self.rows.run.events:
-            k = int(np.argmin(np.abs(self.instant - event.time)))
+            k = self.at(event.time)
             if event.kind is EventKind.ENERGY_GAIN:
                 gains.add(k)
-            if event.kind is EventKind.BRIDGE:
-                late.add(k)
             stop = event.kind is EventKind.JOINT_STOP
             if event.impulse == (0.0, 0.0) or not (stop or event.kind in IMPULSIVE):
                 continue
@@ -294,23 +312,20 @@ class EventRows:
                     side * event.impulse[0]
                 )
             else:
-                impulse = self.in_first_frame(
-                    k, event, event.kind is EventKind.PAINLEVE or k in late
-                )
                 contact.setdefault(k, np.zeros((len(self.rows.contacts), 2)))[event.contact] += (
-                    impulse
+                    self.in_first_frame(k, event)
                 )
         return contact, joint, most, gains
 
-    def in_first_frame(self, k: int, event: Any, late: bool) -> Array:
-        """Impulse of an event in the frame that the first row of its instant has.
+    def in_first_frame(self, k: int, event: Any) -> Array:
+        """Impulse of an event in the frame of the first of the rows that are one instant here.
 
-        A point that meets a second face does so in the frame of that one, which is that of the row
-        before; jams and bridges after it are in the frame of the row behind.
+        It is told in that of the first row of its own instant: events told apart by rounding are
+        together here.
         """
         rows, low, high = self.rows, self.first[k], self.last[k]
-        same = np.flatnonzero(rows.time[low : high + 1] == event.time) + low
-        row = high if late else (same[0] if len(same) else low)
+        same = np.abs(rows.time[low : high + 1] - event.time) <= SAME * max(event.time, 1e-3)
+        row = low + int(np.argmax(same))
         x, z = rows.normal[row, event.contact]
         to_x, to_z = rows.normal[low, event.contact]
         along, across = event.impulse
@@ -343,7 +358,7 @@ class EventRows:
             matrix = rows.matrix[a]
             size = _size(matrix, before) + _size(matrix, after) + ROW * self.force_size[a]
             left = matrix @ (after - before) - kicked
-            left -= self.couple(a, left, p)
+            left -= rows.ties.explained(a, left, self.couples(k, p))
             unexplained = rows.metric_of(one).of_force(left[None])
             unexplained -= BRIEF * self.force_size[a] * self.resting(b)
             found.look("balance of an impact", unexplained / size, JUMP, time)
@@ -364,24 +379,35 @@ class EventRows:
         stops = (near <= TOGETHER) & (np.abs(rows.v[row]) <= RESTING)
         return int(points.sum() + stops.sum())
 
-    def couple(self, row: int, left: Array, p: Array) -> Array:
-        """Part of a generalised impulse that couples on discs in corners explain.
+    def cornered(self, k: int) -> Array:
+        """Which points may be hit by both faces of a corner in an instant.
+
+        On a bridge these are also those that come to the second face by its end.
+        """
+        row, cornered = self.first[k], self.rows.cornered
+        if k not in self.bridges:
+            return cornered[row]
+        end = self.end_of(k)
+        return cornered[row] | cornered[self.first[end] : self.last[end] + 1].any(axis=0)
+
+    def end_of(self, k: int) -> int:
+        """Instant at which the bridge that begins at instant k ends."""
+        return self.at(self.instant[k] + self.bridges[k][0])
+
+    def couples(self, k: int, p: Array) -> Array:
+        """Rows (c, n) of the couples that discs in corners may feel in an instant.
 
         An event has the resultant of both faces, and not the moment of friction on the other one.
         """
         rows = self.rows
-        discs = rows.cornered[row] & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
-        if not discs.any():
-            return np.zeros_like(left)
-        turns = rows.tree.turn[np.unique(rows.model.contact_link[discs])].T
-        weighed = np.linalg.solve(rows.matrix[row], turns)
-        return turns @ np.linalg.lstsq(turns.T @ weighed, weighed.T @ left, rcond=None)[0]
+        discs = self.cornered(k) & (rows.model.contact_radius > 0.0) & np.any(p != 0.0, axis=1)
+        out: Array = rows.tree.turn[np.unique(rows.model.contact_link[discs])]
+        return out
 
     def bridge_law(self, found: Findings, k: int, one: slice, p: Array, size: float) -> None:
         """What holds at the end of the bridge that begins at instant k."""
         rows, (length, wrong) = self.rows, self.bridges[k]
-        end = int(np.argmin(np.abs(self.instant - self.instant[k] - length)))
-        time = rows.time[one]
+        end, time = self.end_of(k), rows.time[one]
         apart = abs(self.instant[end] - self.instant[k] - length)
         found.look("bridge: row at its end", np.array([apart]), INSTANT, time)
         begin, last, after = self.first[k], self.last[k], self.first[end]
@@ -409,7 +435,7 @@ class EventRows:
         found.look("bridge: speed into the ground", into, 1.0, time, names)
         bounce = rows.measured.restitution[one] * np.maximum(-came[..., 0], 0.0)
         off = np.maximum(went[..., 0] - bounce, 0.0) / loose[..., 0]
-        one_face = ~rows.cornered[one]
+        one_face = ~self.cornered(k)[None]
         off = np.where(on & one_face & (pressed > LAW), off, 0.0)
         found.look("bridge: pressed and leaves", off, 1.0, time, names)
         cone = np.where(one_face, excess_over_cone(p[None], high) / unit[..., 1], 0.0)
@@ -495,7 +521,7 @@ class EventRows:
             kick = self.kick.get(k + 1)
             jump = np.zeros(n)
             if kick is not None and np.any(kick):
-                jump = np.linalg.solve(rows.matrix[b], kick)
+                jump = rows.ties.allowed(b, np.linalg.solve(rows.matrix[b], kick))
             change = rows.v[b] - rows.v[a] - jump
             matrix = rows.matrix[a]
             forced = span * (self.force_size[a] + self.force_size[b])
@@ -525,7 +551,7 @@ class EventRows:
             return
         at = np.array(times)
         found.look("balance", np.array(momentum), BALANCE, at)
-        found.look("teleport", np.array(motion), MOTION, at, rows.joints)
+        found.look("teleport between rows", np.array(motion), MOTION, at, rows.joints)
         top = max(float(kinetic.max()), float(np.ptp(potential)), 1e-9)
         found.look("energy", np.array(work) / top, ENERGY, at)
 
@@ -563,9 +589,9 @@ class EventRows:
         for event in self.rows.run.events:
             if event.kind is EventKind.ZENO:  # says when the bounces would have ended: it rests
                 continue
-            near = np.abs(self.instant - event.time) <= INSTANT
-            if np.any(near):
-                changes |= near
+            near = self.at(event.time)
+            if abs(self.instant[near] - event.time) <= INSTANT:
+                changes[near] = True
             elif not np.any(np.abs(self.edges - event.time) <= EDGE):
                 # It has no row of its own, as at the edges of pushes: nothing may be integrated
                 # across it.
@@ -598,6 +624,13 @@ class EventRows:
         """Whether a push begins or ends between instants k and k + 1."""
         begin, end = self.instant[k] - INSTANT, self.instant[k + 1] + INSTANT
         return bool(np.any((self.edges > begin) & (self.edges < end)))
+
+
+def _distance(time: Array, others: Array) -> Array:
+    """Distance of each time from the nearest of others, which are in order; infinite without."""
+    among = np.concatenate(([-np.inf], others, [np.inf]))
+    after = np.searchsorted(among, time).clip(1)
+    return np.minimum(among[after] - time, time - among[after - 1])
 
 
 def _size(matrix: Array, v: Array) -> float:

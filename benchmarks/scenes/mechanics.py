@@ -102,6 +102,10 @@ class Poses:
         """World positions (T, p, 2) of points of links."""
         return self.origin[:, link] + turned(self.angle[:, link], np.asarray(local))
 
+    def local(self, link: int, position: Array) -> Array:
+        """Where a world position (2,) is on a link in the first state, in its frame."""
+        return turned(-self.angle[0, link], position - self.origin[0, link])
+
     def jacobian(self, link: Array, position: Array) -> Array:
         """Jacobians (T, p, 2, n) of points of links that are now at `position` (T, p, 2)."""
         arm = position[:, :, None] - self.origin[:, None]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import heelstrike as hs
-from heelstrike.sim import BristleFriction, RegularisedFriction, Run, Scheme
+from heelstrike.sim import BristleFriction, RegularisedFriction, Run, RunStatus, Scheme
 from scenes.compliant_judge import judge_compliant
 from scenes.event_judge import judge_events
 from scenes.findings import Findings
@@ -47,7 +47,7 @@ def method_of(name: str, scene: Scene, rows: float | None = STEP, **settings: fl
 
 def bounces(name: str) -> bool:
     """Whether a method knows restitution; the others get the scene's ground without."""
-    return name in ("moreau_jean", "event_driven")
+    return name in ("moreau_jean", "impact_resolved", "event_driven")
 
 
 @dataclass(frozen=True)
@@ -68,16 +68,26 @@ class Setting:
     ) -> Run:  # fmt: skip
         """Simulate the scene, from its start or from another state at a time `begin`."""
         scene, robot = self.scene, self.robot
-        return hs.simulate(
-            robot,
-            scene.controller(robot),
-            state=scene.state(robot) if state is None else state,
-            duration=duration,
-            method=method_of(name, scene, rows, **settings),
-            ground=scene.ground(restitution=bounces(name)),
-            pushes=scene.pushes(begin),
-            stop_when_fallen=False,
-        )
+        joints = tuple(link.name for link in scene.links)
+        setup: dict[str, Any] = {
+            "state": scene.state(robot) if state is None else state,
+            "method": method_of(name, scene, rows, **settings),
+            "ground": scene.ground(restitution=bounces(name)),
+            "pushes": scene.pushes(begin),
+            "braked": scene.ties.braked(begin, joints),
+            "stop_when_fallen": False,
+        }
+        controller = scene.controller(robot)
+        switched = [time for time in scene.ties.switched() if begin < time < begin + duration]
+        if not switched:
+            return hs.simulate(robot, controller, duration=duration, **setup)
+        simulation = hs.Simulation(robot, controller, **setup)
+        for time in switched:
+            if simulation.advance(time - begin) is not RunStatus.COMPLETED:
+                return simulation.record
+            simulation.braked = scene.ties.braked(time, joints)
+        simulation.advance(duration)
+        return simulation.record
 
     def judge(self, name: str, run: Run) -> Findings:
         """Let the judge of a method look at a run."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenes.findings import Findings
 from scenes.mechanics import Metric, Poses, Tree, generalised, rates
 from scenes.terrain import Terrain
+from scenes.ties.judged import JudgedTies
 from scenes.wedge import excess_over_cones
 
 Array = NDArray[Any]
@@ -31,10 +32,10 @@ class Rows:
     run : heelstrike.sim.Run
         The record. Of the robot only its numbers are read.
     corners : float
-        How near (m) a point has to come to a second face by the next row, for its force to be that
-        of both.
+        How near (m) a point has to be to a second face, for its force to be that of both.
     instants : bool
-        Whether forces are those of the instant, and not of the time to the next row.
+        Whether forces are those of the instant, and not of the time to the next row. If not, a
+        point may come that near by then.
 
     Attributes
     ----------
@@ -50,6 +51,8 @@ class Rows:
         Distances from the centres of the contact discs to the ground.
     metric : Metric
         Sizes of velocities and forces.
+    ties : JudgedTies
+        Loops, couplings, brakes and latches.
     smooth : (T, n) float
         Generalised force of motors, springs and dampers, less H; pushes are not in it.
     """
@@ -65,7 +68,7 @@ class Rows:
         self.terrain = Terrain(ground.vertices, ground.friction, ground.restitution)
         self.center = self.poses.points(model.contact_link, model.contact_position)
         self.measured = self.terrain.measure(self.center)
-        beside = self.terrain.to_corner(self.center, instants=instants)
+        beside = self.terrain.to_corner(self.center, *(() if instants else self.ahead()))
         self.cornered = beside - model.contact_radius <= corners
         self.point = self.center - model.contact_radius[:, None] * self.normal
         world = self.poses.jacobian(model.contact_link, self.point)
@@ -75,6 +78,7 @@ class Rows:
             self.acting = self.along(self.poses.jacobian(model.contact_link, acts))
         self.matrix = self.poses.mass_matrix()
         self.metric = Metric(self.matrix)
+        self.ties = JudgedTies(run, self.poses, self.metric)
         self.speed = rates(self.jacobian, self.v)
         self.smooth = -self.poses.bias_force(self.v)
         self.smooth -= model.damping * self.v + model.stiffness * (self.q - model.rest)
@@ -82,6 +86,15 @@ class Rows:
         self.low, self.high = self.measured.lowest_friction, self.measured.highest_friction
         self.contacts = tuple(run.robot.contact_names)
         self.joints = tuple(run.robot.joint_names)
+
+    def ahead(self) -> tuple[Array, Array]:
+        """Where the discs are at the next row, and where they would be had they gone straight.
+
+        The last row has none and stays where it is.
+        """
+        moved = np.diff(self.q, axis=0, append=self.q[-1:])
+        straight = rates(self.poses.jacobian(self.model.contact_link, self.center), moved)
+        return np.concatenate((self.center[1:], self.center[-1:])), self.center + straight
 
     def metric_of(self, some: slice) -> Metric:
         """Sizes at some of the rows only."""
@@ -107,8 +120,8 @@ class Rows:
         return total
 
     def contact_force(self) -> Array:
-        """Generalised force (T, n) of the recorded forces of contacts, stops and dry joints."""
-        pushed = generalised(self.acting, self.force)
+        """Generalised force (T, n) of the recorded forces of contacts, joints and ties."""
+        pushed = generalised(self.acting, self.force) + self.ties.force()
         return pushed + self.run.stop_torque + self.run.friction_torque
 
     def bias_acceleration(self) -> Array:

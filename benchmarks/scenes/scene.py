@@ -45,6 +45,7 @@ from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.sim import Push
 from scenes.mechanics import Poses, Tree
 from scenes.terrain import Terrain
+from scenes.ties.description import Ties
 
 Array = NDArray[Any]
 Pair = tuple[float, float]
@@ -126,6 +127,8 @@ class Scene:
         ``root_pitch``.
     kp, kd, target, torque : dict of str to float
         Control of the motors: ``torque + kp (target − q) − kd v``.
+    ties : Ties
+        Closed loops, coupled joints, brakes and latches (:mod:`scenes.ties.scene`).
     """
 
     seed: int
@@ -143,6 +146,7 @@ class Scene:
     target: dict[str, float] = field(default_factory=dict)
     torque: dict[str, float] = field(default_factory=dict)
     shoves: tuple[Shove, ...] = ()
+    ties: Ties = field(default_factory=Ties)
 
     def robot(self) -> hs.Robot:
         """Build the robot."""
@@ -167,6 +171,7 @@ class Scene:
         for contact in self.contacts:
             link = self.links[contact.link]
             builder.contact(link.name, contact.at, radius=contact.radius)
+        self.ties.add_to(builder, tuple(link.name for link in self.links))
         return builder.build()
 
     def state(self, robot: hs.Robot) -> hs.State:

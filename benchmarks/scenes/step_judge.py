@@ -31,7 +31,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.sim import Scheme
+from heelstrike.sim import EventKind, Scheme
 from scenes.findings import Findings
 from scenes.mechanics import Metric, generalised, rates
 from scenes.record import Rows, excess_over_cone, friction_that_does_not_oppose
@@ -106,6 +106,7 @@ class _Steps:
         self.jacobian, self.acting = rows.jacobian[:-1], rows.acting[:-1]
         self.impulse = self.h * rows.force[:-1]
         self.stop, self.dry = self.h * run.stop_torque[:-1], self.h * run.friction_torque[:-1]
+        self.tied = self.h * rows.ties.force()[:-1]
         self.known = known
         size = self.metric.of_velocity
         self.size = size(self.before) + size(self.after) + self.h * self.metric.of_force(known)
@@ -116,12 +117,15 @@ class _Steps:
         self.split = np.zeros(len(self.time), dtype=bool)
         """Steps whose positions move with another velocity than the one behind them."""
         if self.scheme is Scheme.IMPACT_RESOLVED:
-            apart = np.abs(self.moved - self.after) * self.h / (1.0 + np.abs(rows.q[1:]))
-            self.split = np.any(apart > MOTION, axis=1)
+            self.split = np.any(self.missed(self.after) > MOTION, axis=1)
+            self.moved = np.where(self.split[:, None], rows.ties.straight(self.h), self.after)
+        self.wedged = self.wedges()
+        """Whether a wedge is going on, in which steps may leave in the ground what is there."""
         self.asked_for = np.zeros(len(self.time))
         """Energy that the bounds b of the normal velocities ask for."""
 
     def judge(self, found: Findings) -> None:
+        self.rows.ties.judge(found, self.rows.smooth, self.h, exact=not self.split.any())
         self.balance(found)
         self.motion(found)
         self.contacts(found)
@@ -129,12 +133,31 @@ class _Steps:
         self.dry_joints(found)
         self.energy(found)
 
+    def wedges(self) -> Array:
+        """Steps (T,) from where the run tells of a wedge until everything is out of it."""
+        rows, going_on = self.rows, np.zeros(len(self.time), dtype=bool)
+        way = np.minimum(rows.q - rows.model.lower, rows.model.upper - rows.q)
+        out = np.minimum(way.min(axis=1), rows.gap.min(axis=1, initial=0.0)) >= -TOUCHING
+        for event in rows.run.events:
+            if event.kind is EventKind.WEDGED:
+                begin = int(np.argmin(np.abs(self.time - event.time)))
+                ends = np.flatnonzero(out[begin + 1 : -1])
+                going_on[begin : begin + 1 + ends[0] if len(ends) else None] = True
+        return going_on
+
     def balance(self, found: Findings) -> None:
         momentum = np.einsum("tij,tj->ti", self.matrix, self.after - self.before)
-        acted = generalised(self.acting, self.impulse) + self.stop + self.dry
+        acted = generalised(self.acting, self.impulse) + self.stop + self.dry + self.tied
         left = momentum - self.h * self.known - acted
         unexplained = self.metric.of_force(left) / self.size
         found.look("balance", unexplained, BALANCE, self.time)
+
+    def missed(self, velocity: Array) -> Array:
+        """How far (T, n) positions are from where a velocity leads in a step."""
+        q = self.rows.q
+        there = self.rows.ties.put_back(q[:-1] + self.h * velocity)
+        missed: Array = np.abs(q[1:] - there) / (1.0 + np.abs(q[1:]))
+        return missed
 
     def motion(self, found: Findings) -> None:
         velocity = self.after
@@ -144,8 +167,7 @@ class _Steps:
             velocity = self.before
         elif self.scheme is Scheme.MOREAU_JEAN:
             velocity = 0.5 * (self.before + self.after)
-        q = self.rows.q
-        left = np.abs(q[1:] - q[:-1] - self.h * velocity) / (1.0 + np.abs(q[1:]))
+        left = self.missed(velocity)
         found.look("teleport", left, MOTION, self.time, self.rows.joints)
         dt = np.abs(np.diff(self.rows.time) - self.h)
         found.look("length of a step", dt, 1e-9, self.time)
@@ -153,7 +175,8 @@ class _Steps:
     def arrives(self, found: Findings, law: str, gap: Array, speed: Array, free: Array) -> Array:
         """Judge where the positions go in split steps; tell whose impact each of them is."""
         after = gap + self.h * speed
-        deep = np.where(self.split[:, None], -after, 0.0)
+        left = np.where(self.wedged[:, None], np.minimum(gap, 0.0), 0.0)
+        deep = np.where(self.split[:, None], left - after, 0.0)
         found.look(f"{law}: moved into it", deep / (1.0 + np.abs(gap)), MOTION, self.time)
         touches = after <= TOUCHING
         touched = np.concatenate((gap[:1] <= TOUCHING, touches[:-1]))
@@ -168,13 +191,15 @@ class _Steps:
         The second array tells where rounding decides whether it asks; `mine` tells who takes part
         in the impacts of split steps.
         """
+        held = self.wedged[:, None] & (gap < TOUCHING)
         if mine is not None:
             whole = np.where(mine, -bounce * before, -np.inf)
             least = np.where(self.split[:, None], whole, -gap / self.h)
+            held |= (self.split & self.wedged)[:, None] & mine
             near = self.split[:, None] & (np.abs(gap) < 2.0 * TOUCHING)
-            return least, near
+            return np.where(held, -np.inf, least), near | held
         if self.scheme in BOUND:
-            return -gap / self.h, np.zeros(gap.shape, dtype=bool)
+            return np.where(held, -np.inf, -gap / self.h), held
         foreseen, least = gap, np.zeros_like(gap)
         if self.scheme is Scheme.MOREAU_JEAN:
             foreseen, least = gap + 0.5 * self.h * before, -bounce * before
@@ -212,7 +237,14 @@ class _Steps:
             moved, free = (rates(self.jacobian, v)[..., 0] for v in (self.moved, self.free))
             mine = self.arrives(found, "contact", self.gap, moved, free)
         least, near = self.bound(self.gap, before, rows.measured.restitution[:-1], mine)
-        # Of the force of two faces only where it acts is known, and what it does.
+        # Of the force of two faces only where it acts is known, and what it does. What is asked of
+        # either face is: to push out of the ground, and to bounce.
+        came = np.linalg.norm(rates(self.jacobian, self.before), axis=-1)
+        asked = rows.measured.restitution[:-1] * came
+        if self.scheme in BOUND:
+            asked = asked + np.maximum(-self.gap, 0.0) / self.h
+        pressed = np.where(self.cornered, asked * np.abs(self.impulse).sum(axis=-1), 0.0)
+        self.asked_for += pressed.sum(axis=1)
         impulse = np.where(self.cornered[..., None], 0.0, self.impulse)
         near = near | self.cornered
         self.normals(
@@ -252,7 +284,8 @@ class _Steps:
             world = rows.poses.jacobian(rows.model.contact_link, rows.center)[:-1]
             left = np.diff(rows.center, axis=0) - self.h * rates(world, self.moved)
             explained = np.where(self.cornered, np.linalg.norm(left, axis=-1), explained)
-        deep = -rows.gap[1:] - explained
+        left = np.where(self.wedged[:, None], np.maximum(-rows.gap[:-1], 0.0), 0.0)
+        deep = -rows.gap[1:] - explained - left
         found.look("sunk at a corner", np.maximum(deep, 0.0), SINK, self.time, rows.contacts)
 
     def stops(self, found: Findings) -> None:
@@ -266,10 +299,11 @@ class _Steps:
             if self.scheme is Scheme.IMPACT_RESOLVED:
                 mine = self.arrives(found, f"{name} stop", gap, side * self.moved, side * self.free)
             least, near = self.bound(gap, side * self.before, nothing, mine)
+            pressed = np.where(rows.ties.latched[:-1], 0.0, np.maximum(side * self.stop, 0.0))
+            near = near | rows.ties.latched[:-1]
             self.normals(
-                f"{name} stop", found, np.maximum(side * self.stop, 0.0), side * self.after,
-                weight, least, near, rows.joints,
-            )  # fmt: skip
+                f"{name} stop", found, pressed, side * self.after, weight, least, near, rows.joints
+            )
 
     def dry_joints(self, found: Findings) -> None:
         model, names = self.rows.model, self.rows.joints
@@ -286,6 +320,7 @@ class _Steps:
         gained = 0.5 * (size(self.after) ** 2 - size(self.free) ** 2)
         unit = 0.5 * self.size**2
         unasked = (gained - self.asked_for) / unit
+        unasked -= np.maximum(np.sum(self.tied * self.after, axis=1), 0.0) / unit
         found.look("energy made in contact", unasked, LAW, self.time)
         kinetic, potential = self.rows.energy()
         top = max(float(kinetic.max()), 1e-12)
@@ -293,7 +328,7 @@ class _Steps:
         # Work over a step: impulses times the mean velocity, as for an exact jump.
         mean = 0.5 * (self.before + self.after)
         model, run = self.rows.model, self.rows.run
-        acted = generalised(self.acting, self.impulse) + self.stop + self.dry
+        acted = generalised(self.acting, self.impulse) + self.stop + self.dry + self.tied
         motors = np.zeros_like(mean)
         motors[:, model.actuator_joint] = run.torque[:-1]
         forces = motors + self.pushed - model.damping * self.before

@@ -110,7 +110,7 @@ def _kind(law: str) -> str:
         return "twins"
     if law in BALANCE:
         return "balance"
-    if law in ("teleport", "length of a step", "time runs back"):
+    if law in ("teleport", "teleport between rows", "length of a step", "time runs back"):
         return "teleport"
     if "energy" in law:
         return "energy"

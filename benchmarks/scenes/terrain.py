@@ -52,20 +52,20 @@ class Terrain:
         foot = self.corner[:-1] + held[..., None] * self.tangent
         return np.linalg.norm(point[..., None, :] - foot, axis=-1), foot, held != along
 
-    def to_corner(self, point: Array, *, instants: bool = False) -> Array:
-        """How near points (T, n, 2) come, by the next row, to a second face of a concave corner.
+    def to_corner(self, point: Array, *ahead: Array) -> Array:
+        """How near points (T, n, 2) are to a second face of a concave corner.
 
-        Infinite where there is none. The last row is as near as it is, and so are all where
-        `instants` asks for how near they are.
+        Infinite where there is none. Where they go from there may be told in `ahead`, of the same
+        shape: what counts is how near they ever come to that face.
         """
         distance, _, _ = self._feet(point)
         beside = self._beside(point, distance)
-        if instants:
-            return beside.min(axis=-1)
         second = np.argmin(beside, axis=-1)[..., None]
-        now = np.take_along_axis(beside, second, -1)[..., 0]
-        then = np.take_along_axis(np.concatenate((distance[1:], distance[-1:])), second, -1)[..., 0]
-        return np.where(np.isfinite(now), then, np.inf)
+        nearest = np.take_along_axis(beside, second, -1)[..., 0]
+        for place in ahead:
+            then = np.take_along_axis(self._feet(place)[0], second, -1)[..., 0]
+            nearest = np.where(np.isfinite(nearest), np.minimum(nearest, then), np.inf)
+        return nearest
 
     def faces(self, point: Array) -> list[int]:
         """Segment nearest to a point (2,), and one that makes a concave corner with it, if any."""
@@ -77,7 +77,8 @@ class Terrain:
     def _beside(self, point: Array, distance: Array) -> Array:
         """Distances (..., s) to what makes a concave corner with the nearest segment, or infinity.
 
-        Its neighbours do where the ground turns upwards between them, others if they face it.
+        Its neighbours do where the ground turns upwards between them, others if they face it. To
+        the line through a neighbour that a point is below, it is negative.
         """
         nearest = np.argmin(distance, axis=-1)
         place = np.arange(len(self.length))
@@ -85,7 +86,9 @@ class Terrain:
         own = self.normal[nearest]
         turn = own[..., None, 0] * self.normal[:, 1] - own[..., None, 1] * self.normal[:, 0]
         height = np.einsum("...sc,sc->...s", point[..., None, :] - self.corner[:-1], self.normal)
-        faces = np.where(np.abs(away) == 1, turn * away > 1e-9, height >= 0.0) & (away != 0)
+        joined = np.abs(away) == 1
+        faces = np.where(joined, turn * away > 1e-9, height >= 0.0) & (away != 0)
+        distance = np.where(joined & (height < 0.0), height, distance)
         return np.where(faces, distance, np.inf)
 
     def measure(self, point: Array) -> Measurement:

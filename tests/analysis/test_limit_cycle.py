@@ -299,3 +299,74 @@ def test_ctrl_c_ends_the_search() -> None:
             ground=hs.Ground(friction=3.0, slope=-0.08),
         )
     assert len(calls) == 1
+
+
+def test_a_walk_that_goes_on_repeats_after_two_steps() -> None:
+    """By samples of no kind: how long it lasts is found, too. Multipliers are those of one squared.
+
+    From a start that is a hundredth too fast.
+    """
+    robot, ground = mechanisms.compass_gait(), hs.Ground(friction=3.0, slope=-SLOPE)
+    setup: dict[str, Any] = {"ground": ground, "method": PASSIVE}
+    step = hs.find_limit_cycle(robot, compass_state(-0.2, 0.34, 1.05, 0.35), **setup)
+    begin = hs.State(step.state.q, 1.01 * step.state.v)
+    found = hs.find_limit_cycle(robot, begin, afresh=False, **setup)
+    assert found.steps == 2
+    assert found.period == pytest.approx(step.period, abs=1e-9)
+    assert found.step_length == pytest.approx(step.step_length, abs=1e-9)
+    multipliers = np.sort_complex(found.multipliers)
+    np.testing.assert_allclose(multipliers, np.sort_complex(step.multipliers**2), atol=1e-6)
+    assert "in 2 steps: stable" in repr(found)
+    again = hs.find_limit_cycle(robot, found.snapshot, afresh=False, **setup)  # type: ignore[arg-type]
+    assert again.period == pytest.approx(step.period, abs=1e-9)
+
+
+def test_footstep_feedback_repeats_with_its_samples_and_its_memory() -> None:
+    """Time stepping at 1 ms, the controller called at every step.
+
+    The walk found is the same after three returns, but for what rounding grows to, and errors die
+    in it as those of a walk that has settled are measured to.
+    """
+    gait, method = walking.gait(), hs.TimeStepping()
+    robot, law = walking.bravo7(), hs.FootstepFeedback(walking.bravo7(), gait)
+    cycle = hs.find_limit_cycle(robot, gait.initial_state, law, afresh=False, method=method)
+    assert cycle.residual <= 1e-10
+    assert cycle.steps == 2
+    assert cycle.period * 2.0e3 == pytest.approx(round(cycle.period * 2.0e3), abs=1e-6)
+    assert cycle.snapshot is not None
+    simulation = hs.Simulation(robot, law, state=cycle.snapshot, method=method)
+    simulation.advance(simulation.time + 6.0 * cycle.period)
+    np.testing.assert_allclose(simulation.state.q[1:], cycle.state.q[1:], atol=1e-9)
+    np.testing.assert_allclose(simulation.state.v, cycle.state.v, atol=1e-8)
+    for size in (1e-5, 1e-4):  # less than what moves in a sample
+        settled = hs.floquet_multipliers(
+            robot, cycle.snapshot, law, method=method, settling=0, returns=1, disturbance=size
+        )
+        largest = float(np.abs(cycle.multipliers[0]))
+        assert settled.largest**2 == pytest.approx(largest, rel=5e-3)
+        assert settled.along == pytest.approx(1.0, abs=1e-6)
+    with pytest.raises(hs.LimitCycleError, match=r"too large for the samples.*disturbance=1e-05"):
+        hs.floquet_multipliers(
+            robot, cycle.snapshot, law, method=method, settling=0, returns=1, disturbance=2e-3
+        )
+
+
+def test_a_walk_that_does_not_keep_step_with_its_samples() -> None:
+    """The wheel takes a spoke in 1.035 s, and its filter is called every 0.1 s."""
+    gravity, slope, inertia = 9.81, 0.08, 0.5
+    speed, _ = wheel_cycle(gravity, slope, inertia)
+    with pytest.raises(hs.LimitCycleError, match=r"every 0.1 s: it does not keep step with them"):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=inertia, gravity=gravity), wheel_state(slope, speed),
+            listens(), ground=hs.Ground(friction=3.0, slope=-slope), control_period=0.1,
+            afresh=False,
+        )  # fmt: skip
+
+
+def test_arguments_of_controllers_that_begin_afresh() -> None:
+    robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
+    with pytest.raises(hs.SimulationError, match="landing is of controllers that begin afresh"):
+        hs.find_limit_cycle(robot, state, landing=[0], afresh=False)
+    kept = hs.Simulation(robot, state=state).snapshot()
+    with pytest.raises(hs.SimulationError, match="afresh=False it goes on from a Snapshot"):
+        hs.find_limit_cycle(robot, kept)

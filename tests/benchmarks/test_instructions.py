@@ -78,9 +78,19 @@ def test_no_count_hangs_on_rounding(name: str) -> None:
     assert np.abs(ends[1] - ends[0]).max() <= 1e-9
 
 
-def test_each_is_held_against_the_same_robot_sticking() -> None:
+def test_each_is_held_against_the_same_robot() -> None:
     counted = instructions.scenarios()
     beside = {name: each for name, each in counted.items() if each.beside}
-    assert len(beside) == 6
+    assert len(beside) == 7
     for each in beside.values():
         assert counted[each.beside].scenario.robot.name == each.scenario.robot.name
+
+
+def test_a_users_law_does_what_the_stock_one_does(runs: dict[str, hs.Run]) -> None:
+    stock, users = (runs[f"walking, computed torque{whose}"] for whose in ("", " of a user"))
+    laws = [
+        instructions.scenarios()[f"walking, computed torque{whose}"].controller
+        for whose in ("", " of a user")
+    ]
+    assert [law.function.is_ours for law in laws] == [True, False]
+    np.testing.assert_allclose(users.position[-1], stock.position[-1], atol=1e-9)

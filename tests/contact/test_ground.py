@@ -153,3 +153,22 @@ def test_convex_ground_has_no_second_face() -> None:
         ground.model().concave for ground in (Ground(), Ground(slope=0.2), roof, FLOOR_AND_CURB)
     ]
     assert concave == [0, 0, 0, 1]
+
+
+def test_second_face_is_not_the_line_through_one_that_the_disc_has_rolled_past() -> None:
+    """A ramp that turns up a little and then falls away: over its edge the ramp's line is nothing.
+
+    The disc pivots on the edge at (1, 1.1), so far down that the line of the first ramp is nearer
+    than the disc's radius.
+    """
+    ramps = Ground(profile=[[-1.0, -1.0], [0.0, 0.0], [1.0, 1.1], [1.4, 0.0], [3.0, 0.0]])
+    x, z = 1.0 + 0.3 * np.sin(0.6), 1.1 + 0.3 * np.cos(0.6)
+    assert (x - z) / np.sqrt(2.0) > -0.3
+    for ground, at in ((ramps, x), (mirrored(ramps), -x)):
+        assert other_face(ground, at, z, 0.3)[0] > 0.3
+        assert other_face(ground, at, z)[0] > 0.3
+
+
+def mirrored(ground: Ground) -> Ground:
+    """The same ground, seen from behind."""
+    return Ground(profile=ground.model().vertices[::-1] * [-1.0, 1.0])

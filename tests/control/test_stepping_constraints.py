@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 import heelstrike as hs
 from heelstrike import dynamics
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.control import stepping_constraints as law_module
+from heelstrike.control.bearable import nearing
 from heelstrike.control.stepping_constraints import Memory, follow, shift_at_end, take_up
 from heelstrike.gait.phased.surface import Surface
 from heelstrike.sim import Contacts
@@ -151,8 +153,12 @@ def test_it_asks_no_more_of_the_ground_than_that_can_bear(swing: float) -> None:
     assert room[hs.SteppingConstraints] > -1e-6 * robot.weight
 
 
-def test_a_joint_is_braked_before_the_end_of_its_range() -> None:
-    """Without gains nothing else would: it goes on at 8 rad/s, a tenth of a radian before it."""
+@pytest.mark.parametrize(("period", "rate"), [(0.0, 100.0), (1e-2, 50.0)])
+def test_a_joint_is_braked_before_the_end_of_its_range(period: float, rate: float) -> None:
+    """Without gains nothing else would: it goes on at 8 rad/s, a tenth of a radian before it.
+
+    Called every 10 ms it is braked less: what is held so long would throw it back.
+    """
     first, last = family().gait.phase_range
     robot = family().gait.robot
     state = on_the_walk(first + 0.3 * (last - first))
@@ -163,14 +169,32 @@ def test_a_joint_is_braked_before_the_end_of_its_range() -> None:
         hs.SteppingConstraints(family(), kp=0.0, kd=0.0, friction=5.0),
     ):
         law.torque(0.0, state, in_the_air(state))  # the step has begun
+        assert law._asked is not None
+        law._asked.numbers.control.robot.period = period
         q, v = state.q.copy(), state.v.copy()
         q[knee], v[knee] = law_module._bounds(family(), 0.6).upper[-1] - 0.1, 8.0
-        torque = law.torque(0.0, hs.State(q, v), in_the_air(state))
+        torque = law.torque(1e-3, hs.State(q, v), in_the_air(state))
         motion = hs.contact_forward_dynamics(robot, q, v, torque, ground=hs.Ground(friction=50.0))
         braked[type(law)] = -motion.acceleration[knee]
     assert braked[hs.VirtualConstraints] < 0.0
-    # It may come nearer as exp(-100 t) does, twice over.
-    assert braked[hs.SteppingConstraints] == pytest.approx(2.0 * 100.0 * 8.0 - 100.0**2 * 0.1)
+    # It may come nearer as exp(-rate t) does, twice over.
+    assert braked[hs.SteppingConstraints] == pytest.approx(2.0 * rate * 8.0 - rate**2 * 0.1)
+
+
+@pytest.mark.parametrize("period", [1e-3, 5e-3, 1e-2, 3e-2, 0.1])
+def test_a_joint_that_is_braked_from_call_to_call_comes_to_rest_within_its_range(
+    period: float,
+) -> None:
+    """It is slow enough at first, brakes as hard as it must and holds that until the next call."""
+    rate = uncompiled(nearing)(period)
+    place, speed = -1.0, 0.5 * rate
+    for _ in range(int(100.0 / (rate * period)) + 1):
+        acceleration = min(-2.0 * rate * speed - rate**2 * place, 0.0)
+        place += period * speed + 0.5 * period**2 * acceleration
+        speed += period * acceleration
+        assert place < 1e-9
+        assert speed > -1e-9
+    assert place == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_multipliers_with_feedback() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyval
 
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.gait.polynomials import (
     Instants,
     coefficients,
@@ -13,6 +14,8 @@ from heelstrike.gait.polynomials import (
     evaluated,
     gauss,
     lobatto,
+    motion_in_piece,
+    place_in_step,
     shape_functions,
 )
 
@@ -112,3 +115,16 @@ def test_quadrature_is_exact_for_polynomials_of_its_degree() -> None:
         assert abs(weights @ nodes**exact - 1.0 / (exact + 1)) > 1e-9
     assert lobatto(6)[0][0] == 0.0
     assert lobatto(6)[0][-1] == 1.0
+
+
+@pytest.mark.parametrize("time", [-0.1, 0.0, 0.2, 0.3, 0.65, 0.7, 0.75, 0.9])
+def test_what_laws_follow_is_the_gait_until_it_stops(time: float) -> None:
+    """Pieces that do not fit together, so that it shows which one is taken; still beyond 0.77 s."""
+    breakpoints, latest = np.array([0.0, 0.2, 0.3, 0.7]), 0.77
+    pieces = DRAW.normal(size=(3, 5, 2))
+    piece, inside, moves = uncompiled(place_in_step)(time, latest, breakpoints)
+    for joint in range(2):
+        found = uncompiled(motion_in_piece)(pieces[piece], joint, inside, moves)
+        for order in range(3):
+            expected = evaluated(pieces, breakpoints, np.array(min(time, latest)), order)[joint]
+            assert found[order] == pytest.approx(expected if order == 0 or time < latest else 0.0)

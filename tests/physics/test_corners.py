@@ -93,3 +93,47 @@ def test_a_disc_pivots_on_an_edge() -> None:
     energy = 0.5 * MASS * (1.0 + gyration / RADIUS**2) * speed + MASS * G * z
     np.testing.assert_allclose(energy, energy[0], rtol=1e-8)
     assert not [event for event in run.events if event.kind is EventKind.BRIDGE]
+
+
+@pytest.mark.parametrize("beyond", [1e-6, 5e-5])
+def test_a_puck_that_hops_lands_just_before_the_edge(beyond: float) -> None:
+    """And would have dipped into the ground and out, between two samples that both see it rise.
+
+    It hops with u from a height z: it is back after (u + √(u² + 2 g z)) / g, and lands on the flat
+    as long as the edge is farther than that.
+    """
+    up, height, begin = 0.012, 2e-6, -0.5
+    lands = (up + np.sqrt(up**2 + 2.0 * G * height)) / G
+    edge = begin + SPEED * lands + beyond
+    run = hs.simulate(
+        puck(),
+        state=hs.State([begin, height], [SPEED, up]),
+        duration=0.01,
+        method=hs.EventDriven(output_period=None),
+        ground=hs.Ground(friction=0.0, profile=[[-1.0, 0.0], [edge, 0.0], [1.0, edge - 1.0]]),
+    )
+    assert run.status is RunStatus.COMPLETED, run.message
+    ((time, impulse),) = impulses(run)
+    assert time == pytest.approx(lands, abs=1e-11)
+    assert impulse == pytest.approx(MASS * (G * lands - up), rel=1e-8)
+    assert np.min(run.gap) > -1e-12
+
+
+def test_a_face_ends_where_it_ends() -> None:
+    """Not where the dense output of a long step has it: a spring drives the puck over the edge."""
+    builder = hs.RobotBuilder("swing", gravity=G)
+    rail = builder.slide("x", None, direction=(1, 0), mass=0.0, stiffness=400.0, rest=0.0)
+    builder.contact(builder.slide("z", rail, direction=(0, 1), mass=MASS), (0.0, 0.0))
+    rate = np.sqrt(400.0 / MASS)
+    for edge in (0.0, 0.03, 0.07):
+        run = hs.simulate(
+            builder.build(),
+            state=hs.State([-TURN, 0.0], [0.0, 0.0]),
+            duration=0.3,
+            method=hs.EventDriven(rtol=1e-6, atol=1e-8),
+            ground=hs.Ground(friction=0.0, profile=[[-1.0, 0.0], [edge, 0.0], [1.0, edge - 1.0]]),
+        )
+        (leaves,) = [e.time for e in run.events if e.kind is EventKind.LIFTOFF]
+        at = np.flatnonzero(run.time == leaves)[0]
+        assert run.position[at, 0] == pytest.approx(edge, abs=1e-11)
+        assert leaves == pytest.approx(np.arccos(-edge / TURN) / rate, abs=1e-6)

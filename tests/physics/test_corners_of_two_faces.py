@@ -323,3 +323,23 @@ def test_a_run_in_a_corner_is_read_back_as_it_was_saved(tmp_path: Any) -> None:
     np.testing.assert_array_equal(run.contact_force, read.contact_force)
     np.testing.assert_array_equal(run.contact_normal, read.contact_normal)
     assert [event.impulse for event in run.events] == [event.impulse for event in read.events]
+
+
+def test_the_floor_pushes_where_it_is_when_a_disc_meets_a_wall() -> None:
+    """The row before the impact has the wall's frame; the floor's force still acts at the bottom.
+
+    Without friction no force has a moment about the centre of the disc.
+    """
+    radius = 0.1
+    run = simulated(
+        body([(0.0, 0.0)], 0.01, radius), [-0.2, radius, 0.0], [1.0, 0.0, 0.0], 0.15, WALL
+    )
+    (met,) = [event for event in run.events if event.kind is EventKind.IMPACT]
+    row = int(np.flatnonzero(run.time == met.time)[0])
+    normal = run.contact_normal[row, 0]
+    np.testing.assert_allclose(normal, [-1.0, 0.0], atol=1e-12)
+    along, across = run.contact_force[row, 0]
+    force = along * normal + across * np.array([normal[1], -normal[0]])
+    np.testing.assert_allclose(force, [0.0, MASS * G], atol=1e-6)
+    arm = run.contact_point[row, 0] - run.position[row, :2]
+    assert arm[1] * force[0] - arm[0] * force[1] == pytest.approx(0.0, abs=1e-8)

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes.event_judge import judge_events
+from scenes.event_judge import CLOSED, EventRows, judge_events
 from scenes.findings import Findings
+from scenes.running import BETWEEN_ROWS
+from scenes.table import _kind
 from synthetic_runs import make_run
 
 import heelstrike as hs
@@ -128,8 +130,11 @@ def test_impact_in_the_air() -> None:
     assert "impact: without touch" in broken(judge_events(run))
 
 
-@pytest.mark.parametrize("row", [20, 101, 150])
-def test_teleport(row: int) -> None:
+@pytest.mark.parametrize(
+    ("row", "law"),
+    [(20, "teleport between rows"), (102, "teleport"), (150, "teleport between rows")],
+)
+def test_teleport(row: int, law: str) -> None:
     """Also at the impact itself, whose two rows are one place."""
     run = bouncing()
     shift = np.zeros_like(run.position)
@@ -137,7 +142,32 @@ def test_teleport(row: int) -> None:
     run = dataclasses.replace(
         run, position=run.position + shift, contact_point=run.contact_point + shift[:, None]
     )
-    assert broken(judge_events(run)) == {"teleport"}
+    assert broken(judge_events(run)) == {law}
+
+
+def test_only_what_is_between_rows_is_looked_at_with_more_of_them() -> None:
+    """A toe that spins up and down within a millisecond moves as only its own steps tell."""
+    assert {"balance", "energy", "teleport between rows"} == BETWEEN_ROWS
+    kinds = [_kind(law) for law in ("teleport", "teleport between rows")]
+    assert kinds == ["teleport", "teleport"]
+
+
+def deepest(begin: float, end: float, time: float) -> float:
+    """Depth under an acceleration that changes evenly, by double integration."""
+    t = np.linspace(0.0, time, 20001)
+    depth = 0.5 * begin * t**2 + (end - begin) * t**3 / (6.0 * time)
+    return float(depth.max())
+
+
+@pytest.mark.parametrize("end", [2.0, 1.0, 0.3, -0.5, -4.0, -50.0])
+@pytest.mark.parametrize("share", [0.99, 1.01])
+def test_how_far_an_acceleration_leads_until_the_next_row(end: float, share: float) -> None:
+    """Of two rows, at which a point at rest accelerates into the ground by 1 and `end` m/s²."""
+    time = float(np.sqrt(share * CLOSED / deepest(1.0, end, 1.0)))
+    rows = EventRows.__new__(EventRows)
+    rows.ahead, rows.next = np.array([time, 1.0]), np.array([1, 1])
+    rows.goes_on = np.array([True, False])
+    assert rows.seen(np.array([[1.0], [end]]))[0, 0] == (share > 1.0)
 
 
 def test_velocity_that_nothing_explains() -> None:

@@ -62,3 +62,13 @@ def test_normals(
 ) -> None:
     wrong = terrain.measure(np.array(point)).disagreement(np.array(normal))
     assert (wrong < 1e-9) == right
+
+
+def test_how_near_a_second_face_is() -> None:
+    """The floor beside the wall: 0.1 m from it, 0.02 m a step later; in both, 3 cm deep."""
+    at = np.array([[[-0.1, 0.05]], [[-0.02, 0.05]], [[-0.3, 0.05]]])
+    assert STEP.to_corner(at)[:, 0] == pytest.approx([0.1, 0.05, 0.3])
+    assert STEP.to_corner(at[:1], at[1:2]) == pytest.approx(0.02)
+    assert STEP.to_corner(at[1:2], at[2:]) == pytest.approx(0.05)
+    assert STEP.to_corner(np.array([[[0.01, -0.03]]])) == pytest.approx(-0.01)
+    assert RIDGE.to_corner(np.array([[[0.2, 0.1]]])) == np.inf

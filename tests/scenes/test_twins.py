@@ -9,7 +9,14 @@ import pytest
 from scenes.mechanics import Poses, Tree
 from scenes.methods import Setting
 from scenes.scene import random_scene
-from scenes.twins import Twin, compare_twins, mirrored, renumbered, twins_of
+from scenes.twins import (
+    Twin,
+    compare_twins,
+    is_another_solution,
+    mirrored,
+    renumbered,
+    twins_of,
+)
 
 SEED = 10
 """Falls onto the ground within the time that is simulated here."""
@@ -93,3 +100,22 @@ def test_a_wrong_mirror_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     found = compare_twins(setting, "gap_linearised", run)
     assert "twin: mirrored" in found.broken() or found.figures["twins with another solution"] > 0
+
+
+def test_two_solutions_of_one_state_are_named() -> None:
+    """A disc on a slope of friction 2.2, held against it by stops, may stick as well as leave."""
+    setting = Setting.of(random_scene(6084))
+    run = setting.run("event_driven", duration=0.4)
+    assert not setting.judge("event_driven", run).objections
+    found = compare_twins(setting, "event_driven", run)
+    assert not found.objections
+    assert found.figures["twins with another solution"] > 0
+    # Another motion from there is none of them if it does not begin with other forces.
+    twin = twins_of(setting)[2]
+    row = int(np.argmin(np.abs(run.time - 0.3)))
+    state = twin.there(run.position[row], run.velocity[row])
+    other = setting.run("event_driven", state=state, begin=float(run.time[row]), duration=0.01)
+    assert is_another_solution("event_driven", run, row, twin, state, other)
+    same = dataclasses.replace(other, contact_force=other.contact_force.copy())
+    same.contact_force[0] = run.contact_force[row]
+    assert not is_another_solution("event_driven", run, row, twin, state, same)

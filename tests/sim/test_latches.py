@@ -70,6 +70,25 @@ def test_a_controller_in_python_lets_go_what_it_does_not_name(method: Any) -> No
     assert 0.3 - run.position[-1, 0] == pytest.approx(fallen, rel=0.05)
 
 
+def test_a_controller_that_names_a_joint_without_a_latch_ends_the_run() -> None:
+    class Opens:
+        latched = ("hinge", "free")
+
+        def torque(self, t: float, state: hs.State, contacts: Any) -> Any:
+            return np.zeros(0)
+
+    build = RobotBuilder("gate")
+    hinge = build.hinge(
+        "hinge", None, mass=1.0, inertia=0.02, center_of_mass=(0, -0.5), limits=(-1.0, 0.3)
+    )
+    build.hinge("free", hinge, at=(0, -1.0), mass=1.0, inertia=0.02, center_of_mass=(0, -0.5))
+    build.latch("hinge", "upper")
+    robot = build.build()
+    run = hs.simulate(robot, Opens(), state=robot.state({"hinge": 0.3}), duration=0.01)
+    assert run.status is hs.RunStatus.CONTROLLER_FAILED
+    assert "joint 'free' of robot 'gate' has no latch; hinge has" in run.message
+
+
 def test_without_a_latch_it_falls_back() -> None:
     robot = gate()
     free = Robot(

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.contact.solvers import certified_solve
 from heelstrike.robot import read_mjcf
 from heelstrike.sim import EventKind, RunStatus, Scheme
+from heelstrike.sim.memory import allocate_memory
+from heelstrike.sim.time_stepping.impact import allocate_impact, relax
 
 SOLVERS = ("lemke", "fischer_burmeister", "gauss_seidel")
 
@@ -101,3 +104,44 @@ def test_wedge_deeper_than_turning_explains_is_no_wedge() -> None:
         method=hs.TimeStepping(step=1e-3),
     )
     assert run.status is RunStatus.SOLVER_FAILED
+
+
+def test_wedge_that_goes_on_may_be_deeper() -> None:
+    """What lets nothing sink but by turning explains any depth in the step after."""
+    robot = read_mjcf(PRESSED.replace("LIMIT", "-1e-10"), name="wedge")
+    memory, impact = allocate_memory(robot), allocate_impact(robot)
+    memory.contacts.gap[:] = -2e-4
+    memory.assembly.candidate[0] = 0
+    memory.tally.steps = 7
+    left = uncompiled(relax)
+    for wedged, bounds_gaps, leaves in ((5, True, False), (6, True, True), (6, False, False)):
+        impact.wedged, impact.relaxed = wedged, 0
+        assert left(robot.model, bounds_gaps, 1, memory, impact) == leaves
+        assert impact.relaxed == leaves
+    impact.wedged, impact.relaxed = 6, 1  # nothing more can be left out
+    assert not left(robot.model, True, 1, memory, impact)
+
+
+def test_wedge_that_friction_holds_does_not_bounce() -> None:
+    """A point falls between two faces at 45° with friction 1.5: nothing takes it up again.
+
+    Newton's law has it leave both faces, and the friction on each is more than its push.
+    """
+    build = hs.RobotBuilder("puck")
+    rail = build.slide("x", None, direction=(1, 0), mass=0.0)
+    build.contact(build.slide("z", rail, direction=(0, 1), mass=2.0), (0.0, 0.0))
+    run = hs.simulate(
+        build.build(),
+        state=hs.State(np.array([0.0, 0.01]), np.zeros(2)),
+        duration=0.1,
+        method=hs.TimeStepping(step=1e-3, scheme=Scheme.MOREAU_JEAN),
+        ground=hs.Ground(
+            profile=[[-1.0, 1.0], [0.0, 0.0], [1.0, 1.0]], friction=1.5, restitution=0.5
+        ),
+        stop_when_fallen=False,
+    )
+    assert run.completed, run.message
+    assert EventKind.WEDGED in [event.kind for event in run.events]
+    np.testing.assert_allclose(run.velocity[-1], 0.0, atol=1e-12)
+    # What it fell in the step in which it arrived.
+    np.testing.assert_allclose(run.position[-1], 0.0, atol=0.5e-3)

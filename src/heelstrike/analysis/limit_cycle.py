@@ -15,12 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import Carried, Chart, PoincareMap, Section, derivative
+from heelstrike.analysis.stability.loop import ClosedLoop
+from heelstrike.analysis.stability.repeating import Repeating, repeating_walk
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.event_driven.method import EventDriven
+from heelstrike.sim.method import Method
+from heelstrike.sim.snapshot import Snapshot
 
 Floats = NDArray[np.float64]
 
@@ -41,14 +45,15 @@ class LimitCycle:
     ----------
     state : State
         State just after touchdown, relabelled so that the same foot stands at every step; the
-        first contact point that stands is level with the world's origin.
+        first contact point that stands is level with the world's origin. In the middle of a step,
+        and where the walk was found, if the controller goes on from step to step.
     period : float
         Duration of a step in s.
     step_length : float
         Distance along the ground (m) by which a step moves the robot on.
     multipliers : (m,) complex
-        Floquet multipliers of a step, largest first: factors by which small disturbances of the
-        state grow from one touchdown to the next. m is the number of disturbances that the feet
+        Floquet multipliers of `steps` steps, largest first: factors by which small disturbances of
+        the state grow from one touchdown to the next. m is the number of disturbances that the feet
         on the ground allow; shifts along the ground are not among them.
     residual : float
         Largest difference between `state` and its image one step later (m, rad, m/s, rad/s), and
@@ -57,6 +62,12 @@ class LimitCycle:
         Newton steps taken.
     memory : (k,) float
         What the controller remembers just after touchdown, of what is carried from step to step.
+    steps : int
+        Steps after which the walk repeats: one, as its legs are relabelled; two on two legs, of a
+        controller that goes on from step to step.
+    snapshot : Snapshot or None
+        Such a walk with all that its controller remembers, to be taken up as the `state` of a
+        simulation.
     """
 
     state: State
@@ -66,6 +77,8 @@ class LimitCycle:
     residual: float
     iterations: int
     memory: Floats = field(default_factory=lambda: np.zeros(0))
+    steps: int = 1
+    snapshot: Snapshot | None = None
 
     @property
     def stable(self) -> bool:
@@ -79,20 +92,22 @@ class LimitCycle:
 
     def __repr__(self) -> str:
         largest = np.abs(self.multipliers).max(initial=0.0)
+        after = f" in {self.steps} steps" if self.steps > 1 else ""
         return (
             f"LimitCycle({self.step_length:.9g} m in {self.period:.9g} s, largest multiplier "
-            f"{largest:.6g}: {'stable' if self.stable else 'unstable'})"
+            f"{largest:.6g}{after}: {'stable' if self.stable else 'unstable'})"
         )
 
 
 # More arguments than eight: what walks, and how its steps are told apart, are a user's to say.
 def find_limit_cycle(
     robot: Robot,
-    state: State,
+    state: State | Snapshot,
     controller: Controller | None = None,
     *,
+    afresh: bool = True,
     ground: Ground | None = None,
-    method: EventDriven | None = None,
+    method: Method | None = None,
     control_period: float | None = None,
     memory: Sequence[str] = (),
     relabelled: Callable[[Any, float], None] | None = None,
@@ -111,24 +126,30 @@ def find_limit_cycle(
     ----------
     robot : Robot
         The robot; its first two coordinates are the world position x, z of one of its points.
-    state : State
+    state : State or Snapshot
         Where to begin, anywhere in a step; the search starts at the first touchdown after it. A
         state up to 0.1 mm in the ground, such as time stepping leaves, is lifted out of it.
     controller : object with ``torque(t, state, contacts)``, or None
-        Begins afresh at every touchdown: at time 0, with the memory it starts with but for the
-        members that `memory` names.
+        What makes it walk.
+    afresh : bool
+        Whether the controller begins afresh at every touchdown: at time 0, with the memory it
+        starts with but for the members that `memory` names. Otherwise it goes on from step to step
+        with all that it remembers and on its own clock, as it does in simulations, and what repeats
+        is the middle of the same foot's step.
     ground : Ground
         Flat or sloping ground; ``Ground()`` by default.
-    method : EventDriven
-        Way through time, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default. Passive walkers
-        whose swing foot scuffs need ``swing_feet_pass=True``.
+    method : Method
+        Way through time, ``EventDriven(rtol=1e-12, atol=1e-13)`` by default, or any other of a
+        controller that goes on. Passive walkers whose swing foot scuffs need
+        ``swing_feet_pass=True``.
     control_period : float, optional
         Seconds between two calls of the controller, whose torques are held between them; counted
-        from every touchdown. By default that of the controller, or it acts continuously.
+        from every touchdown if it begins afresh there. By default that of the controller, or it
+        acts continuously.
     memory : sequence of str, optional
-        Members of the controller's memory that are carried from step to step: part of what repeats,
-        and of what is disturbed. In a shell they are named as in ``inside.filtered``,
-        ``own.joint_rate``.
+        With `afresh`, members of the controller's memory that are carried from step to step: part
+        of what repeats, and of what is disturbed. In a shell they are named as in
+        ``inside.filtered``, ``own.joint_rate``.
     relabelled : callable, optional
         ``relabelled(memory, time)`` changes the memory at the end of a step, which took a time, to
         that at the beginning of the next: legs exchanged, times counted from the touchdown.
@@ -160,12 +181,35 @@ def find_limit_cycle(
 
     Notes
     -----
+    A walk under a sampled controller that goes on repeats only if it keeps step with the samples.
+    If not, touchdowns fall between two calls as they come, and ``floquet_multipliers`` tells how
+    errors die. ``afresh=False`` takes some dozen returns of the walk for every number of the state
+    and the memory.
+
     Where the order of contacts is different for different disturbances - a flat foot comes down
     heel first or toe first - the map has a kink: multipliers are then those of a mean of its sides.
     """
     ground = Ground() if ground is None else ground
     method = EventDriven(rtol=1e-12, atol=1e-13) if method is None else method
-    _check(robot, ground, method)
+    if not afresh:
+        given = {"memory": memory, "relabelled": relabelled, "landing": landing}
+        for name, value in (given | {"symmetry": symmetry}).items():
+            if value:
+                raise SimulationError(
+                    f"{name} is of controllers that begin afresh at every touchdown; without "
+                    "afresh all memory is carried and no leg relabelled"
+                )
+        loop = ClosedLoop(
+            robot, controller, state, method=method, ground=ground, control_period=control_period,
+            record_every=1,
+        )  # fmt: skip
+        found = repeating_walk(
+            loop, longest_step=longest_step, tolerance=tolerance, max_iterations=max_iterations
+        )
+        return _going_on(found)
+    _check(robot, ground, state, method)
+    assert isinstance(state, State)
+    assert isinstance(method, EventDriven)
     section = Section(robot, ground)
     step = PoincareMap(
         section, controller, method, landing, symmetry, longest_step, control_period,
@@ -201,12 +245,33 @@ def find_limit_cycle(
     )
 
 
-def _check(robot: Robot, ground: Ground, method: Any) -> None:
-    """Refuse what has no limit cycles that are found here."""
+def _going_on(found: Repeating) -> LimitCycle:
+    """Tell of a walk that goes on from step to step."""
+    walk = found.walk
+    return LimitCycle(
+        state=walk.begins[0].state,
+        period=walk.duration / walk.steps,
+        step_length=walk.length / walk.steps,
+        multipliers=found.errors.multipliers,
+        residual=found.residual,
+        iterations=found.iterations,
+        steps=walk.steps,
+        snapshot=walk.begins[0],
+    )
+
+
+def _check(robot: Robot, ground: Ground, state: Any, method: Any) -> None:
+    """Refuse what has no limit cycles from touchdown to touchdown."""
+    if not isinstance(state, State):
+        raise SimulationError(
+            "a controller that begins afresh at every touchdown begins in a State; with "
+            "afresh=False it goes on from a Snapshot"
+        )
     if not isinstance(method, EventDriven):
         raise SimulationError(
-            f"limit cycles need the event-driven method, got {type(method).__name__}: no other "
-            "finds touchdowns sharply enough"
+            f"limit cycles from touchdown to touchdown need the event-driven method, got "
+            f"{type(method).__name__}: no other finds touchdowns sharply enough. afresh=False "
+            "finds those of a controller that goes on from step to step, by any method"
         )
     if len(ground.model().friction) > 1:
         raise SimulationError("limit cycles need flat or sloping ground, the same at every step")

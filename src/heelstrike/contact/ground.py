@@ -449,6 +449,19 @@ def faces_it(ground: GroundModel, own: int, segment: int, x: float, z: float) ->
 
 
 @kernel
+def is_off_far_end(ground: GroundModel, own: int, neighbour: int, x: float, z: float) -> bool:
+    """Whether a place has left its own face over the end that is not the neighbour's.
+
+    A disc that pivots there has gone past what the line through the neighbour bounds.
+    """
+    begin, end = ground.vertices[own], ground.vertices[own + 1]
+    run, rise = end[0] - begin[0], end[1] - begin[1]
+    if neighbour < own:
+        return own < ground.friction.shape[0] - 1 and (x - end[0]) * run + (z - end[1]) * rise > 0.0
+    return own > 0 and (x - begin[0]) * run + (z - begin[1]) * rise < 0.0
+
+
+@kernel
 def second_contact(
     ground: GroundModel, x: float, z: float, radius: float, normal: Floats
 ) -> tuple[float, float, float]:
@@ -467,8 +480,9 @@ def second_contact(
         begin, end = ground.vertices[segment], ground.vertices[segment + 1]
         run, rise = end[0] - begin[0], end[1] - begin[1]
         along = ((x - begin[0]) * run + (z - begin[1]) * rise) / (run * run + rise * rise)
-        before = along < 0.0 and segment > 0 and segment != own + 1
-        behind = along > 1.0 and segment < segments - 1 and segment != own - 1
+        joined = abs(segment - own) == 1 and not is_off_far_end(ground, own, segment, x, z)
+        before = along < 0.0 and segment > 0 and not (joined and segment > own)
+        behind = along > 1.0 and segment < segments - 1 and not (joined and segment < own)
         if before or behind:
             corner = segment + 1 if behind else segment
             dx, dz = x - ground.vertices[corner, 0], z - ground.vertices[corner, 1]

@@ -26,8 +26,9 @@ GROUND_ROWS = 3
 JOINT_ROWS = 4
 # In which order they are given up if not all can be kept: the greatest first.
 RANGE_LEVEL, PRESS_LEVEL, CONE_LEVEL, MOTOR_LEVEL = 4, 3, 2, 1
-# A joint may near the end of its range at this rate (1/s).
-NEARING = 100.0
+# A joint may near the end of its range at this rate (1/s), and at no more than this part of what is
+# left from call to call: torques that are held for longer than 1/NEARING would overshoot.
+NEARING, NEARER = 100.0, 0.5
 # What a motor without a limit has (N m).
 ENDLESS = 1e9
 
@@ -90,12 +91,19 @@ def ground_rows(robot: ControlledRobot, normal: Floats, friction: float, torque:
 
 
 @kernel
+def nearing(period: float) -> float:
+    """Rate (1/s) at which a joint may near the end of its range, by the time between two calls."""
+    return NEARING if NEARING * period <= NEARER else NEARER / period
+
+
+@kernel
 def borne(
     state: ControlState, robot: ControlledRobot, normal: Floats, turning: float, bounds: Bounds,
     bearable: Bearable,
 ) -> bool:  # fmt: skip
     """Whether what is wanted, whose force is in `robot.force`, can be had; write the bounds."""
     bound, torque, model = bearable.program.bound, bearable.torque, robot.model
+    rate = nearing(robot.period)
     up, ahead, behind = ground_rows(robot, normal, bounds.friction, torque)
     bound[0], bound[1], bound[2] = bounds.press - up, -ahead, -behind
     for i in range(robot.nu):
@@ -103,9 +111,9 @@ def borne(
         bound[row] = max(model.torque_lower[i], -ENDLESS) - torque[i]
         bound[row + 1] = torque[i] - min(model.torque_upper[i], ENDLESS)
         place, speed = state.joint_position[i], state.joint_velocity[i]
-        free = bearable.wanted[i] + turning * bearable.slope[i] + 2.0 * NEARING * speed
-        bound[row + 2] = NEARING**2 * (bounds.lower[i] - place) - free
-        bound[row + 3] = NEARING**2 * (place - bounds.upper[i]) + free
+        free = bearable.wanted[i] + turning * bearable.slope[i] + 2.0 * rate * speed
+        bound[row + 2] = rate**2 * (bounds.lower[i] - place) - free
+        bound[row + 3] = rate**2 * (place - bounds.upper[i]) + free
     worst = 0.0
     for row in range(bound.shape[0]):
         worst = max(worst, bound[row])
@@ -147,8 +155,8 @@ def write_rows(robot: ControlledRobot, normal: Floats, friction: float, bearable
 
 
 @kernel
-def find_nearest(program: Program) -> None:
-    """Solve for the least change that keeps the rows, or as many of them as can be."""
+def prepare(program: Program) -> None:
+    """Write what stays: the change is to be the least, and in which order rows are given up."""
     for i in range(program.x.shape[0]):
         program.gradient[i] = 0.0
         for k in range(program.x.shape[0]):
@@ -158,6 +166,11 @@ def find_nearest(program: Program) -> None:
         ends = (row - GROUND_ROWS) % JOINT_ROWS >= 2
         program.level[row] = RANGE_LEVEL if ends else MOTOR_LEVEL
     program.level[0], program.level[1], program.level[2] = PRESS_LEVEL, CONE_LEVEL, CONE_LEVEL
+
+
+@kernel
+def find_nearest(program: Program) -> None:
+    """Solve for the least change that keeps the rows, or as many of them as can be."""
     solve_or_relax(program)
     if program.status != SOLVED:
         for i in range(program.x.shape[0]):

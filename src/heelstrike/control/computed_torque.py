@@ -23,6 +23,7 @@ from heelstrike.dynamics.queries.loops import loop_jacobian
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -296,28 +297,13 @@ def computed_torque(
         seen = robot.estimate
 
     # Reference of this instant (eq. 41); past the end of a late step it goes on, then rests.
-    phase = t - memory.start
-    latest = parameters.latest
-    late = phase > latest
-    if late:
-        phase = latest
-    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
-    piece = 0
-    while piece < coefficients.shape[1] - 1 and phase >= breakpoints[piece + 1]:
-        piece += 1
-    phase -= breakpoints[piece]
+    piece, inside, moves = place_in_step(
+        t - memory.start, parameters.latest, parameters.breakpoints
+    )
+    terms = parameters.coefficients[foot, piece]
     acceleration, kp, kd = memory.acceleration, parameters.kp, parameters.kd
     for i in range(robot.nu):
-        position = 0.0
-        velocity = 0.0
-        feedforward = 0.0
-        for k in range(coefficients.shape[2] - 1, -1, -1):
-            feedforward = feedforward * phase + 2.0 * velocity
-            velocity = velocity * phase + position
-            position = position * phase + coefficients[foot, piece, k, i]
-        if late:
-            velocity = 0.0
-            feedforward = 0.0
+        position, velocity, feedforward = motion_in_piece(terms, i, inside, moves)
         if encoders:
             seen.joint_velocity[i] = velocity
             if memory.samples >= 2:

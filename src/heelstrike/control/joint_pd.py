@@ -25,6 +25,7 @@ from heelstrike.control.computed_torque import (
 )
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
@@ -98,23 +99,15 @@ def joint_pd(
     """Joint torques of the law above."""
     restart_at_touchdown(t, contacts, robot, parameters, memory)
     landed = has_landed(t, state, contacts, robot, parameters, memory)
-    phase = min(t - memory.start, parameters.latest)
-    late = t - memory.start > parameters.latest
-    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
-    piece = 0
-    while piece < coefficients.shape[1] - 1 and phase >= breakpoints[piece + 1]:
-        piece += 1
-    phase -= breakpoints[piece]
+    piece, inside, moves = place_in_step(
+        t - memory.start, parameters.latest, parameters.breakpoints
+    )
+    terms = parameters.coefficients[memory.stance, piece]
     for i in range(robot.nu):
-        position, velocity, acceleration = 0.0, 0.0, 0.0
-        for k in range(coefficients.shape[2] - 1, -1, -1):
-            acceleration = acceleration * phase + 2.0 * velocity
-            velocity = velocity * phase + position
-            position = position * phase + coefficients[memory.stance, piece, k, i]
-        moves = 0.0 if late else 1.0
+        position, velocity, acceleration = motion_in_piece(terms, i, inside, moves)
         memory.position[i] = position
-        memory.velocity[i] = moves * velocity
-        memory.acceleration[i] = moves * parameters.motion * acceleration
+        memory.velocity[i] = velocity
+        memory.acceleration[i] = parameters.motion * acceleration
         torque[i] = 0.0
     if parameters.weight == 1:
         seen = state

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike
 from heelstrike.compiler.bundle import Bundle, array, cell, number, part
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import gains_of, must_be, number_of
-from heelstrike.control.bearable import GROUND_ROWS, JOINT_ROWS, Bearable, Bounds, bear
+from heelstrike.control.bearable import GROUND_ROWS, JOINT_ROWS, Bearable, Bounds, bear, prepare
 from heelstrike.control.computed_torque import LANDED_SPEED, approaching_speed
 from heelstrike.control.virtual_constraints import series
 from heelstrike.errors import ControllerError
@@ -336,6 +336,8 @@ def stepping_constraints(
     memory: Memory, torque: Floats,
 ) -> None:  # fmt: skip
     """Joint torques that follow the gait of a family which brings the energy back."""
+    if memory.begun == 0:
+        prepare(memory.bearable.program)
     if memory.begun == 0 or lands(state, contacts, robot, parameters, memory):
         memory.stance = memory.stance if memory.begun == 0 else 1 - memory.stance
         begin_step(state, contacts, robot, parameters, memory)
@@ -390,6 +392,11 @@ class SteppingConstraints(Law):
     ------
     ControllerError
         If gains do not fit the robot, or a number is out of its range.
+
+    Notes
+    -----
+    Joints near the ends of those ranges at up to 100/s. Called less often than every 5 ms they do
+    by no more than half of what is left from call to call, since torques are held meanwhile.
     """
 
     def __init__(

@@ -120,15 +120,13 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
 
     Returns the rank; unknowns that the equations leave free are zero.
     """
-    largest = 0.0
     for i in range(size):
         column[i] = i
         unknown[i] = 0.0
-        for j in range(size):
-            largest = max(largest, abs(system[i, j]))
+    smallest = 0.0  # known with the first pivot, which is the largest entry
     rank = size
     for k in range(size):
-        best = NO_PIVOT * largest
+        best = smallest
         row = -1
         place = -1
         for i in range(k, size):
@@ -140,6 +138,8 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
         if row < 0:
             rank = k
             break
+        if k == 0:
+            smallest = NO_PIVOT * best
         if row != k:
             for j in range(size + 1):
                 system[k, j], system[row, j] = system[row, j], system[k, j]

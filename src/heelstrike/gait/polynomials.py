@@ -11,6 +11,8 @@ from numpy.polynomial import Legendre, Polynomial, legendre
 from numpy.polynomial.polynomial import polyder, polyval, polyvander
 from numpy.typing import NDArray
 
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
+
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
@@ -97,6 +99,35 @@ def evaluated(pieces: Floats, breakpoints: Floats, t: Floats, order: int) -> Flo
     local = (t - breakpoints[piece])[..., None]
     terms = np.moveaxis(polyder(pieces, order, axis=1), 1, 0)
     return np.asarray(polyval(local, terms[:, piece], tensor=False), np.float64)
+
+
+@kernel
+def place_in_step(time: float, latest: float, breakpoints: Floats) -> tuple[int, float, float]:
+    """Where a law that follows pieces is in them: the piece, the time since its beginning, and 1.
+
+    Or, beyond a latest time, where it stops, 0: nothing moves any more.
+    """
+    reached = latest if time > latest else time
+    piece = 0
+    while piece < breakpoints.shape[0] - 2 and reached >= breakpoints[piece + 1]:
+        piece += 1
+    return piece, reached - breakpoints[piece], 0.0 if time > latest else 1.0
+
+
+@dissolved_kernel
+def motion_in_piece(
+    terms: Floats, joint: int, inside: float, moves: float
+) -> tuple[float, float, float]:
+    """Position, velocity and acceleration of a joint in a piece (terms, joints), lowest first.
+
+    The latter two count `moves` times.
+    """
+    position, velocity, acceleration = 0.0, 0.0, 0.0
+    for k in range(terms.shape[0] - 1, -1, -1):
+        acceleration = acceleration * inside + 2.0 * velocity
+        velocity = velocity * inside + position
+        position = position * inside + terms[k, joint]
+    return position, moves * velocity, moves * acceleration
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,8 @@ class EventKind(enum.IntEnum):
     ``WEDGED``
         It is in the ground, by so little as rounding and turning explain, and neither it nor a
         joint can be pushed out without the other being pressed in: from here on they are left where
-        they are until that ends.
+        they are until that ends. Or friction between two faces of the ground lets nothing out of a
+        corner, so that it does not bounce either.
     ``JOINT_RELEASE``
         A latch let go of a joint, whose index the event's `contact` is.
     ``JOINT_BRAKE``

@@ -22,7 +22,7 @@ from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import EventKind, RunStatus
 from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
-from heelstrike.sim.contacts.latches import latches_at, several
+from heelstrike.sim.contacts.latches import latches_at, latches_of
 from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
 from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
@@ -517,7 +517,7 @@ class Simulation:
         if braked is not None and brakes_of(self.robot, braked) != brakes_on(self._memory.loops):
             self.braked = braked
         if latched is not None:
-            named = {self.robot.joint_index(joint) for joint in several("latched", latched)}
+            named = latches_of(self.robot, latched)
             kept = [joint for joint in self.latched if self.robot.joint_index(joint) in named]
             if len(kept) < len(self.latched):
                 self.latched = kept

@@ -32,3 +32,11 @@ def test_what_a_sample_takes_away_of_being_late_is_an_error_like_others() -> Non
     found = Across.of([returned(0.2)], 1.0, 3, smooth=True)
     assert found.along == 1.0
     assert np.abs(found.multipliers) == pytest.approx([0.5, 0.2, 0.1])
+
+
+def test_larger_errors_of_a_walk_that_keeps_step_with_its_samples() -> None:
+    """That what a sample takes away does not stay is known, whatever the size."""
+    found = Across.of([returned(0.2)], 1.0, 3, smooth=False, in_step=True)
+    assert np.abs(found.multipliers) == pytest.approx([0.5, 0.2, 0.1])
+    found = Across.of([returned(0.2)], 1.0, 3, smooth=False)
+    assert np.abs(found.multipliers) == pytest.approx([0.5, 0.1])

@@ -93,6 +93,52 @@ def test_a_higher_foothold_is_that_of_the_linearised_step() -> None:
     assert np.abs(wanted).max() > 1e-2
 
 
+def test_doubts_are_what_numbers_are_wrong_by() -> None:
+    """Of central differences of size h the error is c h², of half that size c h²/4: 3/4 of it.
+
+    By pushes that are simulated and by heights from saltation matrices, neither of which knows of
+    these sizes; they are so large that differences are wrong by more than simulations are.
+    """
+    robot, cycle = compass()
+    coarse = hs.disturbance_response(
+        robot, cycle.state, disturbances={"push": (pushed, 2e-2), "height": (raised, 1e-3)},
+        ground=RAMP, method=METHOD, settling=0, returns=1, disturbance=1e-3,
+    )  # fmt: skip
+    change = (durations(1e-4, 30) - durations(-1e-4, 30)) / 2e-4
+    step = hs.monodromy(robot, cycle.state, ground=RAMP, method=METHOD)
+    height, error = step.step_height, step.step_height.state
+    seen = []
+    for _ in range(30):
+        seen.append(height.duration_state @ error)
+        error = step.matrix @ step.matrix @ error
+    for name, wanted in (("push", np.linalg.norm(change)), ("height", np.linalg.norm(seen))):
+        wrong, doubt = abs(coarse.norms[name] - wanted), coarse.doubts[name]
+        assert wrong == pytest.approx(4.0 / 3.0 * doubt, rel=0.2)
+        assert measured().doubts[name] < 0.05 * doubt
+    assert "push 0.1313 ±" in repr(coarse)
+
+
+def test_what_there_is_to_doubt() -> None:
+    """One return has no others to differ from; a push one way may do what its opposite does not."""
+    robot, cycle = compass()
+    found = measured()
+    assert found.repeats
+    assert found.residual <= found.disturbance == 1e-5
+    assert found.along == pytest.approx(1.0, abs=1e-5)
+    assert found.one_sided == found.switched == ()
+    assert np.isnan(found.error)
+
+    def kicked(simulation: hs.Simulation, size: float) -> None:
+        pushed(simulation, abs(size))
+
+    twice = hs.disturbance_response(
+        robot, cycle.state, disturbances={"kick": (kicked, 1e-3)}, ground=RAMP, method=METHOD,
+        settling=0, returns=2,
+    )  # fmt: skip
+    assert twice.one_sided == ("kick",)
+    assert twice.error < 1e-5
+
+
 def test_multipliers_are_those_of_the_walk() -> None:
     _, cycle = compass()
     values = np.sort_complex(np.linalg.eigvals(measured().A))

@@ -166,3 +166,19 @@ def test_a_robot_that_no_bridge_helps_is_given_up_in_words() -> None:
     assert run.status is RunStatus.SOLVER_FAILED
     assert run.time[-1] == pytest.approx(0.01)
     assert "each four times as long as the one before" in run.message
+
+
+# Random scenes on ground with corners in which an impulse was told in one frame and shown in
+# another: a bridge, or a second impact, followed an impact in the same instant.
+TWO_FRAMES = ((6311, 0.7363), (6884, 0.6266))
+# Those that ended a bridge beside the ground, with speeds that its rows had no more: what came down
+# there was stopped without an impulse, and friction drove what was still to come to rest.
+OFF_THE_GROUND = ((6726, 0.7786), (6877, 0.7408))
+
+
+@pytest.mark.parametrize(("seed", "duration"), TWO_FRAMES + OFF_THE_GROUND)
+def test_bridges_and_impacts_of_one_instant_balance(seed: int, duration: float) -> None:
+    setting = Setting.of(random_scene(seed))
+    run = setting.run("event_driven", duration=duration)
+    assert run.status is RunStatus.COMPLETED
+    assert not setting.judge("event_driven", run).objections

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import heelstrike as hs
+from heelstrike.compiler.compilation import uncompiled
 from heelstrike.sim import EventKind
-from heelstrike.sim.event_driven.location import NO_EVENT, lowest_place
+from heelstrike.sim.event_driven.location import NO_EVENT, lowest_place, may_cross
 from heelstrike.sim.event_driven.rows import is_inside
 
 GRAVITY, STIFFNESS = 9.81, 1e4
@@ -65,6 +68,39 @@ def test_the_lowest_place_of_a_cubic_is_found_where_it_is_below_zero() -> None:
         elif cubic[place] > 0.0:
             assert found == NO_EVENT
     assert below > 50
+
+
+def test_no_gap_is_passed_over_that_a_cubic_takes_below_zero() -> None:
+    """Of two open points with the same ends; one far above what its rates take away is."""
+    draw = np.random.default_rng(4)
+    part, span, below, passed = np.linspace(0.0, 1.0, 2001), 2.5e-3, 0, 0
+    phase = SimpleNamespace(watched=2, closed=[0, 0], slide=[0, 0])
+    for _ in range(300):
+        before, value = draw.uniform(0.0, 0.4, size=2)
+        rate, later = draw.normal(size=2)
+        rise = value - before
+        cubic = before + part * (rate + part * (3.0 * rise - 2.0 * rate - later))
+        cubic += part**3 * (rate + later - 2.0 * rise)
+        phase.before, phase.sample = [9.0, 1.0, before, 1.0], [9.0, 1.0, value, 1.0]
+        phase.before_rate = [rate / span, 0.0, rate / span, 0.0]
+        phase.sample_rate = [later / span, 0.0, later / span, 0.0]
+        asked = uncompiled(may_cross)(2, span, phase)
+        assert asked or cubic.min() > 0.8 * min(before, value)
+        below += cubic.min() < 0.0
+        passed += not asked
+        assert not uncompiled(may_cross)(0, span, phase)
+        assert not uncompiled(may_cross)(1, span, phase)
+    assert below > 30
+    assert passed > 30
+
+
+def test_what_is_not_above_zero_at_both_samples_is_looked_at() -> None:
+    phase = SimpleNamespace(watched=1, closed=[1], slide=[0])
+    phase.before_rate = phase.sample_rate = [0.0, 0.0]
+    for before, value in [(-1e-12, 1.0), (0.0, 1.0), (1.0, 0.0), (1.0, -1e-12), (1.0, np.nan)]:
+        phase.before, phase.sample = [before, before], [value, value]
+        assert uncompiled(may_cross)(0, 1.0, phase)
+        assert uncompiled(may_cross)(1, 1.0, phase)
 
 
 def test_a_stop_touched_and_left_between_two_samples_is_seen() -> None:

@@ -55,12 +55,16 @@ class Across:
     along: float | None
 
     @classmethod
-    def of(cls, found: list[Disturbed], early: float, of_robot: int, *, smooth: bool) -> Across:
+    def of(
+        cls, found: list[Disturbed], early: float, of_robot: int, *, smooth: bool,
+        in_step: bool = False,
+    ) -> Across:  # fmt: skip
         """Look at returns whose first so many coordinates are the robot's.
 
         `early` is what is left of being early: all of it, or less if a clock drives the walk.
         Disturbances that are `smooth`, less than what moves in a sample, tell by themselves what is
-        remembered of being early by as little, and whether that stays.
+        remembered of being early by as little, and whether that stays. Of a walk that is known to
+        be kept `in_step` with its samples it does not.
         """
         kept, inert = _with_consequence([each.matrix for each in found], of_robot)
         square = np.ix_(kept, kept)
@@ -68,6 +72,8 @@ class Across:
         same = tuple(np.eye(len(kept)) for _ in range(len(found) + 1))
         if not abs(early - 1.0) <= STAYS:
             return cls(tuple(kept), tuple(inert), matrices, matrices, same, None)
+        if in_step:
+            return cls(tuple(kept), tuple(inert), matrices, matrices, same, early)
         ways = [each[kept] for each in (found[0].begins, *(each.ends for each in found))]
         if smooth:
             m = sum(i < of_robot for i in kept)

@@ -17,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk
-from heelstrike.analysis.stability.returns import Disturbed, returned, stays_early
-from heelstrike.analysis.stability.section import Section
+from heelstrike.analysis.stability.loop import ClosedLoop
+from heelstrike.analysis.stability.measurement import measure
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -29,9 +28,6 @@ from heelstrike.sim.method import Method
 from heelstrike.sim.snapshot import Snapshot
 
 Floats = NDArray[np.float64]
-
-LESS = 0.25
-"""Part of a disturbance that is tried where a walk that nobody chose it for falls."""
 
 SURE = 2.0
 """A factor is told from one by so many standard errors."""
@@ -181,7 +177,8 @@ def floquet_multipliers(
         a part of how much it varies). By default 1e-5; twice the seconds between two samples if
         an event-driven simulation calls the controller only then, as touchdowns are felt up to a
         sample late, and the map is uneven at the scale of what moves meanwhile; ten times the
-        time step if steps of the integration fall otherwise in every return.
+        time step if steps of the integration fall otherwise in every return. 1e-5 again of a walk
+        that keeps step with the calls of its controller.
     memory : sequence of str, optional
         Numbers of the controller's memory that are disturbed; by default all that matter.
     longest_step : float
@@ -194,7 +191,9 @@ def floquet_multipliers(
     Raises
     ------
     LimitCycleError
-        If the walk, or a disturbed one, falls, takes no steps or stands otherwise one return later.
+        If the walk, or a disturbed one, falls, takes no steps or stands otherwise one return later;
+        if disturbances are so large that touchdowns of a walk that keeps step with the calls of its
+        controller fall between others.
     SimulationError, ControllerError
         If an argument is not usable, or a controller cannot be kept.
 
@@ -228,47 +227,23 @@ def floquet_multipliers(
     loop = ClosedLoop(
         robot, controller, state, method=method, ground=ground, control_period=control_period
     )
-    if disturbance is not None and not 0.0 < disturbance < 1.0:
-        raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)
-    size = loop.usual_disturbance(walk) if disturbance is None else float(disturbance)
-    section = Section(loop, walk, size, memory)
-    try:
-        found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    except LimitCycleError:
-        if disturbance is not None or loop.even(walk):
-            raise
-        size *= LESS  # what steps make uneven is large for it, and it falls
-        found = [returned(loop, section, walk, k, size) for k in range(returns)]
-    errors = Across.of(
-        found, stays_early(loop, section, walk), section.of_robot, smooth=size <= SMOOTH
-    )
-    return _combined(walk, section, size, found, errors)
-
-
-def _combined(
-    walk: Walk, section: Section, size: float, found: list[Disturbed], errors: Across
-) -> Floquet:
-    """Put returns together."""
-    driven = errors.along is None
-    names = section.names
-    one_sided = {name for each in found for name in each.one_sided}
-    switched = {name for each in found for name in each.switched}
-    missed = [each.residual if driven else each.residual_but_late for each in found]
+    found = measure(loop, walk, disturbance, memory=memory)
+    errors, names = found.errors, found.section.names
     return Floquet(
         matrix=np.mean(errors.matrices, axis=0),
         each=errors.matrices,
         coordinates=tuple(names[i] for i in errors.kept),
-        directions=section.directions,
+        directions=found.section.directions,
         steps=walk.steps,
         period=walk.duration / walk.steps,
         step_length=walk.length / walk.steps,
         along=errors.along,
         multipliers=errors.multipliers,
-        disturbance=size,
-        residual=max(missed),
+        disturbance=found.size,
+        residual=found.residual,
         neutral=tuple(names[i] for i in errors.inert),
-        one_sided=tuple(names[i] for i in errors.kept if names[i] in one_sided),
-        switched=tuple(sorted(switched)),
+        one_sided=found.one_sided,
+        switched=found.switched,
         _errors=errors,
     )

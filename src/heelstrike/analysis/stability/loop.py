@@ -83,6 +83,8 @@ class ClosedLoop:
         record_every: int = FEW_ROWS,
     ) -> None:  # fmt: skip
         self.robot, self.controller, self.ground = robot, controller, ground or Ground()
+        if isinstance(state, Snapshot):  # rows are counted on
+            record_every = int(state.identity.get("record_every", record_every))
         self._setup: dict[str, Any] = {
             "state": state, "method": method, "ground": ground, "control_period": control_period,
             "record_every": record_every,
@@ -97,9 +99,23 @@ class ClosedLoop:
         self.simulation = self.fresh()
         self.grid = self.simulation.control_period
 
-    def fresh(self) -> Simulation:
-        """Return a simulation at the beginning of the walk."""
-        return Simulation(self.robot, self.controller, **self._setup)
+    def fresh(self, farther: float = 0.0) -> Simulation:
+        """Return a simulation at the beginning of the walk, or so many metres along the ground."""
+        setup = self._setup
+        if farther:
+            q = setup["state"].q.copy()
+            q[:2] += farther * self.along
+            setup = setup | {"state": State(q, setup["state"].v)}
+        return Simulation(self.robot, self.controller, **setup)
+
+    @property
+    def can_be_moved(self) -> bool:
+        """Whether the walk can begin elsewhere: a snapshot knows where its feet stand."""
+        return isinstance(self._setup["state"], State)
+
+    def sampled(self, seconds: float) -> float:
+        """Round to whole samples, if there are any."""
+        return round(seconds / self.grid) * self.grid if self.grid > 0.0 else seconds
 
     def usual_disturbance(self, walk: Walk) -> float:
         """How large disturbances are if nobody says."""
@@ -144,11 +160,11 @@ class ClosedLoop:
                 f"the feet of {self.robot.name!r} do not come down in turn, so that no step repeats"
             )
         simulation, begins = self.fresh(), []
+        middle = self.sampled(0.5 * (landings[first][0] + landings[first + 1][0]))
         for place in chosen:
-            middle = 0.5 * (landings[place][0] + landings[place + 1][0])
-            if self.grid > 0.0:
-                middle = round(middle / self.grid) * self.grid
-            self.advanced(simulation, middle, "the undisturbed walk does not go on")
+            # Whole samples apart: of a walk that keeps step with them all returns have as many.
+            gone = self.sampled(landings[place][0] - landings[first][0])
+            self.advanced(simulation, middle + gone, "the undisturbed walk does not go on")
             begins.append(simulation.snapshot())
         way = (begins[-1].state.q[:2] - begins[0].state.q[:2]) @ self.along
         return Walk(

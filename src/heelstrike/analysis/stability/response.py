@@ -11,16 +11,16 @@ with disturbances e, from return to return.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heelstrike.analysis.stability.across import Across
-from heelstrike.analysis.stability.loop import SMOOTH, ClosedLoop, Walk, steps_of
-from heelstrike.analysis.stability.returns import returned, stays_early
+from heelstrike.analysis.stability.loop import ClosedLoop, Walk, steps_of
+from heelstrike.analysis.stability.measurement import Measurement, measure
+from heelstrike.analysis.stability.returns import DIFFERENT, returned
 from heelstrike.analysis.stability.section import Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
 from heelstrike.contact.ground import Ground
@@ -38,6 +38,9 @@ from heelstrike.sim.whole_run import whole
 Floats = NDArray[np.float64]
 ROWS = 10
 """Steps of the method between two rows of a return that an indicator is told from."""
+
+UNEVEN = 1e-8
+"""What is left of a disturbance either way that differs by less is not told apart."""
 
 Disturb = Callable[[Simulation, float], None]
 Indicator = Callable[[Run], ArrayLike]
@@ -67,6 +70,26 @@ def step_duration(run: Run) -> float:
     return steps[-1][0] - steps[-2][0]
 
 
+@dataclass(frozen=True, eq=False)
+class _Response:
+    """x⁺ = A x + B e, g = C x + D e, of one return or the mean of some."""
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+    @classmethod
+    def mean(cls, several: Sequence[_Response]) -> _Response:
+        parts = ([each.A, each.B, each.C, each.D] for each in several)
+        return cls(*(np.mean(part, axis=0) for part in zip(*parts, strict=True)))
+
+    def norm(self, place: int | None = None) -> float:
+        """Gait sensitivity norm, of one disturbance or of all together."""
+        chosen = slice(None) if place is None else [place]
+        return gait_sensitivity_norm(self.A, self.B[:, chosen], self.C, self.D[:, chosen])
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DisturbanceResponse:
     """How a walk responds to disturbances, from return to return.
@@ -85,6 +108,19 @@ class DisturbanceResponse:
         Their names.
     steps : int
         Steps of a return.
+    doubts : dict of str to float
+        What it makes to each of `norms`, in the first return, if errors and disturbances are half
+        as large. Of differences that are smooth it is three quarters of what these are wrong by;
+        much more where thresholds, samples or rounding make them uneven.
+    disturbance, residual : float
+        Size of the errors that were put in, and the largest difference between two returns of the
+        walk itself, but for being early or late if no clock drives it, as of
+        :class:`~heelstrike.analysis.stability.floquet.Floquet`.
+    along : float or None
+        What the returns leave of being early; None of a walk that a clock drives.
+    one_sided, switched : tuple of str
+        Errors, or disturbances, that do different things either way, of which the mean counts;
+        whole numbers of the controller's memory that came out otherwise for some error.
     """
 
     A: Floats
@@ -93,6 +129,14 @@ class DisturbanceResponse:
     D: Floats
     disturbances: tuple[str, ...]
     steps: int
+    doubts: dict[str, float]
+    disturbance: float
+    residual: float
+    along: float | None
+    one_sided: tuple[str, ...]
+    switched: tuple[str, ...]
+
+    _each: tuple[_Response, ...]
 
     @cached_property
     def norm(self) -> float:
@@ -106,6 +150,29 @@ class DisturbanceResponse:
             name: gait_sensitivity_norm(self.A, self.B[:, [k]], self.C, self.D[:, [k]])
             for k, name in enumerate(self.disturbances)
         }
+
+    @cached_property
+    def error(self) -> float:
+        """Standard error of `norm`, by leaving out one return at a time; NaN of one alone."""
+        count = len(self._each)
+        if count < 2:
+            return float("nan")
+        left_out = [
+            _Response.mean(self._each[:k] + self._each[k + 1 :]).norm() for k in range(count)
+        ]
+        return float(np.sqrt((count - 1) * np.var(left_out)))
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the walk comes back to itself nearer than what it was disturbed by."""
+        return self.residual <= self.disturbance
+
+    def __repr__(self) -> str:
+        told = ", ".join(
+            f"{name} {size:.4g} ± {self.doubts[name]:.1g}" for name, size in self.norms.items()
+        )
+        differ = "" if self.repeats else f"; undecided, returns differ by {self.residual:.2g}"
+        return f"DisturbanceResponse({told}, over returns of {self.steps} steps{differ})"
 
     def after(self, name: str, returns: int) -> Floats:
         """Indicators after one disturbance of size one, in its return and those after it.
@@ -150,12 +217,9 @@ def disturbance_response(
 
     Parameters
     ----------
-    robot : Robot
-        A robot that is free to move along the ground.
-    state : State or Snapshot
-        Where the walk begins.
-    controller : object with ``torque(t, state, contacts)``, or None
-        One in Python must take part in snapshots.
+    robot, state, controller, ground, method, control_period, settling, returns, longest_step
+        The walk, how it is simulated and how long it is looked at, as of
+        :func:`~heelstrike.floquet_multipliers`.
     disturbances : mapping of str to (callable, float)
         By name: ``disturb(simulation, size)``, which is called in the middle of a step and changes
         what comes then, by ``simulation.apply(push)``, ``simulation.ground = ...`` or
@@ -164,19 +228,8 @@ def disturbance_response(
         Takes the :class:`~heelstrike.Run` of a return, with a row every ten steps of the method and
         all events, and returns one or more numbers, which must not depend on when it began; the
         duration of a step by default, for which `method` must not have a fixed step.
-    ground : Ground
-        Level or sloping ground; ``Ground()`` by default.
-    method : Method
-        Way through time; ``TimeStepping()`` by default.
-    control_period : float, optional
-        As of :func:`~heelstrike.simulate`.
-    settling, returns : int
-        Steps before anything is disturbed; returns over which the differences are averaged.
     disturbance : float, optional
-        Size of the errors that are put in, as of :func:`~heelstrike.floquet_multipliers`. Of a walk
-        that keeps step with the calls of its controller 1e-5 tells more than the usual size.
-    longest_step : float
-        Seconds after which a step without touchdown has failed.
+        Size of the errors that are put in, as of :func:`~heelstrike.floquet_multipliers`.
 
     Returns
     -------
@@ -184,15 +237,16 @@ def disturbance_response(
 
     Raises
     ------
-    LimitCycleError
-        If the walk, or a disturbed one, falls, takes no steps or stands otherwise one return later.
-    SimulationError, ControllerError
-        If an argument is not usable, or a controller cannot be kept.
+    LimitCycleError, SimulationError, ControllerError
+        As of :func:`~heelstrike.floquet_multipliers`.
 
     Notes
     -----
     A ground that is higher in the end counts as level: errors are seen from it. What a disturbance
     has changed is as before in the next return. A return is two steps, of a robot with two legs.
+
+    How exact it is: `doubts` compares with differences of half the size, `error` with the other
+    returns, `repeats` and `one_sided` say what there is to doubt beside.
 
     Examples
     --------
@@ -226,33 +280,53 @@ def disturbance_response(
             "disturbances: simulate with method=hs.EventDriven(), or give an indicator= that "
             "does not count steps"
         )
-    if disturbance is not None and not 0.0 < disturbance < 1.0:
-        raise SimulationError(f"a disturbance must lie between 0 and 1, got {disturbance!r}")
     walk = loop.follow(settling, returns, longest_step)
-    size = loop.usual_disturbance(walk) if disturbance is None else float(disturbance)
-    section = Section(loop, walk, size, None)
-    found = [returned(loop, section, walk, k, size, indicator) for k in range(returns)]
-    errors = Across.of(
-        found, stays_early(loop, section, walk), section.of_robot, smooth=size <= SMOOTH
-    )
-    kept = list(errors.kept)
-    into, through = [], []
-    for name, (disturb, amount) in disturbances.items():
-        after = [
-            _responded(loop, section, walk, k, name, disturb, amount, indicator)
-            for k in range(returns)
-        ]
-        into.append(np.mean([errors.bases[k + 1].T @ e[kept] for k, (e, _) in enumerate(after)], 0))
-        through.append(np.mean([seen for _, seen in after], axis=0))
-    seen = [each.seen[:, kept] @ errors.bases[k] for k, each in enumerate(found)]
+    found = measure(loop, walk, disturbance, indicator=indicator)
+    each, sided = _responses(loop, walk, found, disturbances, indicator)
+    half = returned(loop, found.section, walk, 0, 0.5 * found.size, indicator)
+    smaller = {name: (disturb, 0.5 * size) for name, (disturb, size) in disturbances.items()}
+    (again,), _ = _responses(loop, walk, replace(found, found=[half]), smaller, indicator)
+    mean = _Response.mean(each)
     return DisturbanceResponse(
-        A=np.mean(errors.across, axis=0),
-        B=np.array(into).T,
-        C=np.mean(seen, axis=0),
-        D=np.array(through).T,
+        A=mean.A,
+        B=mean.B,
+        C=mean.C,
+        D=mean.D,
         disturbances=tuple(disturbances),
         steps=walk.steps,
+        doubts={name: abs(each[0].norm(k) - again.norm(k)) for k, name in enumerate(disturbances)},
+        disturbance=found.size,
+        residual=found.residual,
+        along=found.errors.along,
+        one_sided=found.one_sided + sided,
+        switched=found.switched,
+        _each=tuple(each),
     )
+
+
+def _responses(
+    loop: ClosedLoop, walk: Walk, found: Measurement,
+    disturbances: Mapping[str, tuple[Disturb, float]], indicator: Indicator,
+) -> tuple[list[_Response], tuple[str, ...]]:  # fmt: skip
+    """Respond in every return; say which disturbances do different things either way."""
+    errors, responses, sided = found.errors, [], set()
+    kept = list(errors.kept)
+    for k, each in enumerate(found.found):
+        into, through = [], []
+        for name, (disturb, amount) in disturbances.items():
+            sides, seen = _responded(loop, found.section, walk, k, name, disturb, amount, indicator)
+            up, down = (errors.bases[k + 1].T @ side[kept] for side in sides)
+            sizes = float(np.linalg.norm(up)), float(np.linalg.norm(down))
+            apart = float(np.linalg.norm(up - down))
+            if apart > DIFFERENT * max(sizes) and apart * amount > UNEVEN:
+                sided.add(name)
+            into.append(0.5 * (up + down))
+            through.append(seen)
+        through_errors = each.seen[:, kept] @ errors.bases[k]
+        responses.append(
+            _Response(errors.across[k], np.array(into).T, through_errors, np.array(through).T)
+        )
+    return responses, tuple(name for name in disturbances if name in sided)
 
 
 def _check(disturbances: Mapping[str, tuple[Disturb, float]]) -> None:
@@ -273,10 +347,11 @@ def _check(disturbances: Mapping[str, tuple[Disturb, float]]) -> None:
 def _responded(
     loop: ClosedLoop, section: Section, walk: Walk, place: int, name: str, disturb: Disturb,
     amount: float, indicator: Indicator,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Errors and changes of the indicators after a disturbance of size one."""
+) -> tuple[tuple[Floats, Floats], Floats]:  # fmt: skip
+    """Errors after a disturbance either way, and changes of the indicators, by its size."""
     begin, end = walk.begins[place], walk.begins[place + 1]
-    sides = []
+    loop.simulation.restore(end)
+    usual, sides = section.read(loop.simulation), []
     for sign in (1.0, -1.0):
         simulation = loop.fresh()
         simulation.restore(begin)
@@ -290,9 +365,10 @@ def _responded(
         told = np.atleast_1d(np.asarray(indicator(whole(simulation.record)), np.float64))
         if not np.all(np.isfinite(told)):
             raise SimulationError(f"{doing}: the indicator is {told}, no finite numbers")
-        sides.append((np.concatenate((section.of(there), numbers)), told))
+        sides.append(((there, numbers), told))
     (up, seen_up), (down, seen_down) = sides
-    return (up - down) / (2.0 * amount), (seen_up - seen_down) / (2.0 * amount)
+    errors = section.error(up, usual) / amount, section.error(usual, down) / amount
+    return errors, (seen_up - seen_down) / (2.0 * amount)
 
 
 def _raised(loop: ClosedLoop, simulation: Simulation) -> float:

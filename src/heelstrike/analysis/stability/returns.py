@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,16 @@ from heelstrike.sim.snapshot import Snapshot
 from heelstrike.sim.whole_run import whole
 
 Floats = NDArray[np.float64]
+
+IN_STEP = 0.1
+"""A walk that is nearer to itself than it moves in this part of a sample, return by return, may be
+kept in step with them."""
+
+HARDLY = 1e-5
+"""Size of a disturbance that is less than what moves in any sample."""
+
+LOST = 0.5
+"""Being early has been taken away if less than this part of it is left."""
 
 DIFFERENT, NOTICEABLE = 0.5, 0.05
 """Errors of either sign do different things if they differ by so much of the larger, and that is
@@ -63,17 +74,16 @@ def returned(
     begin, end = walk.begins[place], walk.begins[place + 1]
     simulation = loop.simulation
     simulation.restore(end)
-    state, words = section.read(simulation)
+    usual = section.read(simulation)
     counts = section.words.counts(simulation)
     columns, told, one_sided, switched = [], [], set(), set()
-    for coordinate, name in enumerate(section.names):
+    for name, unit in zip(section.names, np.eye(len(section.names)), strict=True):
         sides, seen = [], []
         for sign in (1.0, -1.0):
-            section.disturb(simulation, begin, coordinate, sign * size)
+            section.disturb(simulation, begin, sign * size * unit)
             loop.advanced(simulation, end.time, f"a disturbance of {name} by {sign * size:.3g}")
             _same_feet(section, end, simulation.snapshot(), name, sign * size)
-            there, numbers = section.read(simulation)
-            error = np.concatenate((section.of(there - state), numbers - words))
+            error = section.error(section.read(simulation), usual)
             sides.append(error / (sign * size))
             if indicator is not None:
                 seen.append(np.atleast_1d(np.asarray(indicator(whole(simulation.record)))))
@@ -85,7 +95,7 @@ def returned(
             one_sided.add(name)
         columns.append(0.5 * (sides[0] + sides[1]))
         told.append((seen[0] - seen[1]) / (2.0 * size) if seen else np.zeros(0))
-    missed = section.flat(state - np.concatenate((begin.state.q, begin.state.v)))
+    missed = section.flat(usual[0] - np.concatenate((begin.state.q, begin.state.v)))
     return Disturbed(
         matrix=np.array(columns).T,
         seen=np.array(told).T,
@@ -96,6 +106,34 @@ def returned(
         one_sided=frozenset(one_sided),
         switched=frozenset(switched),
     )
+
+
+def keeps_step(loop: ClosedLoop, section: Section, walk: Walk) -> Floats | None:
+    """What a return makes of being early by hardly anything, (n,), if the samples take that away.
+
+    As a part of the rate of the walk. None of walks that are not kept in step with the calls of
+    their controller, or whose controller is not called at samples.
+    """
+    if loop.grid == 0.0:
+        return None
+    begin, end = walk.begins[:2]
+    rate = section.rate(begin)
+    moves = IN_STEP * loop.grid * section.size(section.flat(rate))
+    states = [np.concatenate((each.state.q, each.state.v)) for each in walk.begins]
+    if any(section.size(section.flat(b - a)) > moves for a, b in pairwise(states)):
+        return None
+    way = section.way(begin)
+    change, sides = HARDLY * way / np.abs(way).max(), []
+    for sign in (1.0, -1.0):
+        section.disturb(loop.simulation, begin, sign * change)
+        try:
+            loop.advanced(loop.simulation, end.time, "a walk that is hardly early")
+        except LimitCycleError:
+            return None
+        sides.append(section.read(loop.simulation))
+    left = section.error(*sides) * np.abs(way).max() / (2.0 * HARDLY)
+    robot = way[: section.of_robot]
+    return left if left[: len(robot)] @ robot <= LOST * (robot @ robot) else None
 
 
 def stays_early(loop: ClosedLoop, section: Section, walk: Walk) -> float:

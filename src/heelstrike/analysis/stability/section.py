@@ -45,7 +45,14 @@ INSTANT = 1e-5
 """Seconds over which a rate is seen where no fixed step is the least."""
 
 INSTANTS = 0.1
-"""Numbers that grow by what a return lasts, to this part of it, are instants."""
+"""Numbers that grow by what a return lasts, or as far as it goes, to this part of it, are instants
+or places."""
+
+GROWING = 0.01
+"""Part of the way of a return by which a place grows at least: heights do on a slope."""
+
+FARTHER = 0.125
+"""Metres along the ground by which places are told from instants."""
 
 STEADY = 1e-3
 """A number that varies by less has one as its unit."""
@@ -144,13 +151,36 @@ class Section:
         self.directions = scaled / self._scale[:, None]
         way = np.zeros(len(x))
         way[:2] = self._loop.along
-        # Beside the way along the ground, which is left out: errors behind it do not matter.
-        self._read = np.linalg.pinv(np.column_stack((way * self._scale, scaled)))[1:]
+        # The first is the way along the ground, which is left out: it does not matter.
+        self._read = np.linalg.pinv(np.column_stack((way * self._scale, scaled)))
 
     def of(self, difference: Floats) -> Floats:
         """Coordinates of a difference of two states (q, v)."""
-        coordinates: Floats = self._read @ (self._scale * difference)
+        coordinates: Floats = self._read[1:] @ (self._scale * difference)
         return coordinates
+
+    def error(self, one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> Floats:
+        """Coordinates of what one state (q, v), with its numbers, differs by from another.
+
+        Of a robot that stands elsewhere, places that are remembered are elsewhere by as much.
+        """
+        apart = one[0] - other[0]
+        moved = float(self._read[0] @ (self._scale * apart))
+        words = one[1] - other[1] - moved * self.words.places / self.words.unit
+        return np.concatenate((self.of(apart), words))
+
+    def missed(self, begin: Snapshot, end: Snapshot) -> Floats:
+        """Coordinates of what a walk misses that ends where it began, farther on and later."""
+        simulation = self._loop.simulation
+        simulation.restore(begin)
+        state, numbers = self.read(simulation)
+        simulation.restore(end)
+        there, later = self.read(simulation)
+        along = ((there - state)[:2] @ self._loop.along) * self._loop.along
+        there = state + self.flat(there - state)
+        there[:2] += along
+        later = later - (end.time - begin.time) * self.words.instants / self.words.unit
+        return self.error((there, later), (state, numbers))
 
     def flat(self, difference: Floats) -> Floats:
         """The difference of two states, but for the way along the ground and whole turns."""
@@ -160,21 +190,22 @@ class Section:
         moved[:2] -= (difference[:2] @ self._loop.along) * self._loop.along
         return moved
 
-    def disturb(self, simulation: Simulation, begin: Snapshot, place: int, amount: float) -> None:
-        """Take up a snapshot, with one coordinate changed."""
-        if place >= self.of_robot:
-            simulation.restore(begin)
-            self.words.add(simulation, place - self.of_robot, amount)
-            return
-        x = _vector(begin)
-        there = self._equations(x)
-        moved = x + amount * self.directions[:, place]
-        for _ in range(8):
-            change = (self._back @ (self._equations(moved) - there)) / self._scale
-            moved = moved - change
-            if np.abs(change).max() <= 1e-14:
-                break
-        simulation.restore(begin.moved(State(moved[: self._nq], moved[self._nq :])))
+    def disturb(self, simulation: Simulation, begin: Snapshot, coordinates: Floats) -> None:
+        """Take up a snapshot, with its coordinates changed."""
+        robot, words = coordinates[: self.of_robot], coordinates[self.of_robot :]
+        if robot.any():
+            x = _vector(begin)
+            there = self._equations(x)
+            moved = x + self.directions @ robot
+            for _ in range(8):
+                change = (self._back @ (self._equations(moved) - there)) / self._scale
+                moved = moved - change
+                if np.abs(change).max() <= 1e-14:
+                    break
+            begin = begin.moved(State(moved[: self._nq], moved[self._nq :]))
+        simulation.restore(begin)
+        for place in np.flatnonzero(words):
+            self.words.add(simulation, int(place), float(words[place]))
 
     def read(self, simulation: Simulation) -> tuple[Floats, Floats]:
         """State (q, v) now, and the numbers of the memory in their units."""
@@ -219,11 +250,14 @@ class Section:
         """Largest of the entries, those of velocities by the length they make in half a step."""
         return float(np.abs(self._scale * difference).max())
 
+    def ahead(self, difference: Floats, rate: Floats) -> float:
+        """Seconds by which a walk is ahead that differs so from another."""
+        weighted = self._scale**2 * self.flat(rate)
+        return float(weighted @ difference / (weighted @ self.flat(rate)))
+
     def but_late(self, difference: Floats, rate: Floats) -> Floats:
         """The difference of two states without what comes of being early or late."""
-        weight = self._scale**2
-        way = self.flat(rate)
-        left: Floats = difference - way * ((weight * way) @ difference) / ((weight * way) @ way)
+        left: Floats = difference - self.ahead(difference, rate) * self.flat(rate)
         return left
 
 
@@ -231,8 +265,17 @@ class Words:
     """Numbers that a controller remembers, of those on which it hangs how it goes on.
 
     A number that one call of the controller makes what it would have been anyway is scratch, and
-    none of them. Units are how much each varies in a return; of one that does not, one. Those that
-    grow by what a return lasts are instants.
+    none of them. Units are how much each varies in a return; of one that does not, one.
+
+    Attributes
+    ----------
+    names : list of n str
+    unit : (n,) float
+    instants : (n,) float
+        One for numbers that grow as time does: when a step began, say.
+    places : (n,) float
+        How far numbers are moved by a walk that begins a metre farther along the ground: where a
+        foot stands, say.
     """
 
     def __init__(
@@ -265,7 +308,7 @@ class Words:
                 self.names = [name for name in self.names if name not in self._whole]
             self.names = self._that_matter()
         self.unit = np.array([self._units[name] for name in self.names])
-        self.instants = self._instants(walk)
+        self.instants, self.places = self._growing(walk)
 
     def _all(self, simulation: Simulation) -> dict[str, float]:
         """All numbers that are no counts, by name."""
@@ -311,15 +354,31 @@ class Words:
         }
         return dict(zip(every, np.where(spread > STEADY, spread, 1.0).tolist(), strict=True))
 
-    def _instants(self, walk: Walk) -> Floats:
-        """One for numbers that are instants: when a step began, say. They grow as time does."""
-        simulation, seen = self._loop.simulation, []
+    def _growing(self, walk: Walk) -> tuple[Floats, Floats]:
+        """Tell what numbers are instants, and what places are.
+
+        What grows in a return by what it lasts is an instant, unless it is a place. Walks of 1 m/s
+        make no difference between the two, other than where they begin.
+        """
+        simulation, seen, there = self._loop.simulation, [], []
         for each in walk.begins:
             simulation.restore(each)
             seen.append(self.read(simulation) * self.unit)
+            there.append(float(each.state.q[:2] @ self._loop.along))
         lasted = np.diff([each.time for each in walk.begins])[:, None]
-        grown = np.diff(seen, axis=0)
-        return np.asarray(np.all(np.abs(grown - lasted) <= INSTANTS * lasted, axis=0), float)
+        went, grown = np.diff(there)[:, None], np.diff(seen, axis=0)
+        instants = np.all(np.abs(grown - lasted) <= INSTANTS * lasted, axis=0)
+        # No place goes farther than the robot, and what does not grow need not be asked about.
+        far = np.abs(went)
+        growing = (np.abs(grown) > GROWING * far) & (np.abs(grown) <= (1.0 + INSTANTS) * far)
+        places = np.where(np.all(growing, axis=0), np.mean(grown / went, axis=0), 0.0)
+        moved = np.where(instants, 0.0, np.sign(places))  # at least those that are as far
+        if places.any() and self._loop.can_be_moved:
+            elsewhere = self._loop.fresh(FARTHER)
+            self._loop.advanced(elsewhere, walk.begins[0].time, "a walk that begins elsewhere")
+            moved = (self.read(elsewhere) * self.unit - seen[0]) / FARTHER
+        places[np.abs(moved - places) > INSTANTS * np.abs(moved)] = 0.0
+        return np.asarray(instants & (places == 0.0), float), places
 
     def _that_matter(self) -> list[str]:
         """Those whose disturbance one call of the controller does not undo without a trace."""

@@ -29,7 +29,7 @@ WEIGHTS = {
     "swing": 1.0,
     "pitch": 0.15,
     "angle": 0.05,
-    "posture": 4.5e-4,
+    "posture": 2.5e-4,
     "torque": 1e-7,
 }
 """How much the tasks count, of every robot."""

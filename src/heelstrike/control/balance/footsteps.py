@@ -144,7 +144,10 @@ def consider(
         plan.cost = cost
         plan.foothold = foothold
         plan.remaining = remaining
-        plan.pressure = shift
+        # What is off is gone a little before the foot lands: later, nothing could mend the rest.
+        before = max(remaining - 2.0 * planning.soon, planning.soon)
+        hurried = shift * (1.0 - 1.0 / slow) / (1.0 - exp(-reference.rate * before))
+        plan.pressure = min(max(hurried, planning.heel - own), planning.toe - own)
 
 
 @kernel

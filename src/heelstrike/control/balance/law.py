@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan, cos, exp, inf, sin, sqrt
+from math import atan, atan2, cos, exp, inf, sin, sqrt
 
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.balance.constrained import constrain, point_task
@@ -191,7 +191,7 @@ def stay(t: float, parameters: Parameters, memory: Memory) -> None:
 
 
 @kernel
-def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> None:
+def decide(t: float, landed: bool, tilt: float, parameters: Parameters, memory: Memory) -> None:
     """Plan the landing, move the reference's clock on, and see how alarming all this is."""
     reference, plan = parameters.reference, memory.plan
     elapsed = max(t - memory.time, 0.0)
@@ -212,6 +212,8 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
     if landed and parameters.adapts == 1:
         # A foot that is late has found the ground lower than it should be.
         alarm = min(2.0 * memory.late / parameters.search - 0.2, 1.0)
+        # One that does not lie as the ground is believed to lies on ground that is not known.
+        alarm = max(alarm, min(abs(tilt + atan(memory.slope)) / BUMP - 1.0, 1.0))
         amiss = sqrt(plan.cost)
         if plan.remaining < COMMITTED * reference.duration:
             # A foot that is as good as down cannot be placed anew: the next one will be off by
@@ -225,25 +227,30 @@ def decide(t: float, landed: bool, parameters: Parameters, memory: Memory) -> No
 @kernel
 def press_where_it_touches(
     contacts: Contacts, robot: ControlledRobot, parameters: Parameters, tilt: float, memory: Memory
-) -> None:
+) -> float:
     """Want the centre of pressure near what touches of a foot that does not lie flat.
 
     A foot on its heel alone is turned down gently by a pressure a little before the heel; torques
-    that are right for a sole that lies flat would throw it about.
+    that are right for a sole that lies flat would throw it about. Returned is how far what the
+    foot stands on is inclined: as its sole, or as the ground under the only end that touches.
     """
     planning, plan = parameters.planning, memory.plan
-    least, most = inf, -inf
+    least, most, under = inf, -inf, tilt
     for i in range(robot.nc):
         if robot.contact_foot[i] == memory.stance and contacts.gap[i] < parameters.flat:
             x = contacts.position[i, 0] - memory.sole[0]
             z = contacts.position[i, 1] - memory.sole[1]
             along = x * cos(tilt) - z * sin(tilt)
             least, most = min(least, along), max(most, along)
-    if most != least or memory.stands == 1:
-        return
+            under = atan2(contacts.normal[i, 0], contacts.normal[i, 1])
+    if most != least:
+        return tilt
+    if memory.stands == 1:
+        return under
     span = TURNING * (planning.toe - planning.heel)
     plan.pressure = min(max(plan.pressure, most - span), least + span)
     plan.pressure = min(max(plan.pressure, planning.heel), planning.toe)
+    return under
 
 
 @kernel
@@ -392,7 +399,7 @@ def want_posture(
     """Add what settles what the other tasks leave open: the gait's joints, bent knees, effort."""
     reference, weights = parameters.reference, parameters.weights
     program, on, phase, rate = memory.program, memory.on, memory.phase, memory.rate
-    weight = weights.posture * (1.0 - 0.98 * memory.alarm)
+    weight = weights.posture * (1.0 - 0.92 * memory.alarm)
     for i in range(robot.nu):
         table = reference.joints[memory.stance, :, i]
         wanted = curvature_at(table, phase) * rate * rate
@@ -461,14 +468,15 @@ def keep_balance(
     if comes_down and landed:
         learn_slope(parameters, memory)
     stand_or_walk(t, parameters, memory)
+    stance = memory.stance
+    link = robot.foot_link[stance]
+    tilt = state.kinematics.angle[link] - parameters.legs.angle[stance]
     if memory.stands == 1:
         stay(t, parameters, memory)
     else:
-        decide(t, landed, parameters, memory)
-    stance, on, program = memory.stance, memory.on, memory.program
-    link = robot.foot_link[stance]
-    tilt = state.kinematics.angle[link] - parameters.legs.angle[stance]
-    press_where_it_touches(contacts, robot, parameters, tilt, memory)
+        decide(t, landed, tilt, parameters, memory)
+    on, program = memory.on, memory.program
+    under = press_where_it_touches(contacts, robot, parameters, tilt, memory)
     constrain(robot, state, link, memory.sole, on)
     clear(program)
     weights = parameters.weights
@@ -481,7 +489,7 @@ def keep_balance(
     else:
         want_foothold(state, robot, parameters, damping, memory)
     want_posture(state, robot, parameters, damping, memory)
-    add_contact(parameters, tilt, on, program)
+    add_contact(parameters, tilt, under, on, program)
     add_motors(robot, state, on, program)
     keep_knees_bent(state, parameters, memory)
     solve_torques(robot, state, memory, torque)

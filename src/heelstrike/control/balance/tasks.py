@@ -61,14 +61,21 @@ def add_wrench_row(
 
 
 @kernel
-def add_contact(parameters: Parameters, tilt: float, on: Constrained, program: Program) -> None:
-    """Add what the ground can do: push, within the cone, and from within the sole."""
+def add_contact(
+    parameters: Parameters, tilt: float, under: float, on: Constrained, program: Program
+) -> None:
+    """Add what the ground can do: push, within the cone, and from within the sole.
+
+    The ground under the foot is inclined by `under`, the sole by `tilt`: on its toe a foot may be
+    turned farther than any cone is wide.
+    """
     planning, friction = parameters.planning, parameters.friction
-    nx, nz = sin(tilt), cos(tilt)  # along the sole goes (nz, −nx)
+    nx, nz = sin(under), cos(under)  # along the ground goes (nz, −nx)
     pushes = add_wrench_row(on, nx, nz, 0.0, FORCE_LEVEL, program)
     program.bound[pushes] += parameters.least_force
     add_wrench_row(on, friction * nx + nz, friction * nz - nx, 0.0, CONE_LEVEL, program)
     add_wrench_row(on, friction * nx - nz, friction * nz + nx, 0.0, CONE_LEVEL, program)
+    nx, nz = sin(tilt), cos(tilt)
     add_wrench_row(on, -planning.heel * nx, -planning.heel * nz, -1.0, PRESSURE_LEVEL, program)
     add_wrench_row(on, planning.toe * nx, planning.toe * nz, 1.0, PRESSURE_LEVEL, program)
 

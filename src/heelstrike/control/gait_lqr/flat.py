@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.linalg import expm
+from scipy.linalg import block_diag, expm
 from scipy.signal import cont2discrete
 
 from heelstrike import dynamics
@@ -160,19 +160,28 @@ class FlatOrbit:
         each = [self.stance.acceleration(q, v, one) - still for one in np.eye(nu)]
         return np.array(each).T
 
-    def regulator(self, cost: Floats, effort: Floats) -> Floats:
-        """Gains (FINE, nu, 2 nu) in the middles of even intervals, of the least cost for ever."""
-        width = self.gait.step_duration / FINE
-        moves = [cont2discrete((A, B, A, 0.0 * B), width)[:2] for A, B in self.between()]
+    def regulator(self, cost: Floats, effort: Floats, count: int | None = None) -> Floats:
+        """Gains (intervals, nu, 2 nu) of the least cost for ever.
+
+        Those of torques that follow at once, in the middles of `FINE` even intervals; or, of
+        `count` intervals over each of which torques are held, at their beginnings.
+        """
+        number, nx = FINE if count is None else count, len(cost)
+        both, width = block_diag(cost, effort), self.gait.step_duration / number
+        moves = [
+            (*_held(A, B, width), width * both) if count is None else _sampled(A, B, both, width)
+            for A, B in self.between(number)
+        ]
         value, before = np.zeros_like(cost), np.inf
-        gains = np.zeros((FINE, len(effort), len(cost)))
+        gains = np.zeros((number, len(effort), nx))
         for _ in range(PERIODS):
             value = self.jump.T @ value @ self.jump
-            for k in range(FINE - 1, -1, -1):
-                A, B = moves[k]
-                gains[k] = np.linalg.solve(width * effort + B.T @ value @ B, B.T @ value @ A)
-                left = A - B @ gains[k]
-                value = width * (cost + gains[k].T @ effort @ gains[k]) + left.T @ value @ left
+            for k in range(number - 1, -1, -1):
+                A, B, price = moves[k]
+                answered = B.T @ value @ A + price[nx:, :nx]
+                gains[k] = np.linalg.solve(price[nx:, nx:] + B.T @ value @ B, answered)
+                left, chosen = A - B @ gains[k], np.vstack([np.eye(nx), -gains[k]])
+                value = chosen.T @ price @ chosen + left.T @ value @ left
             size = np.abs(value).max()
             if not np.isfinite(size):
                 break
@@ -181,17 +190,24 @@ class FlatOrbit:
             before = size
         raise ControllerError("no regulator makes this walk repeat: its motors do not reach enough")
 
-    def over_a_step(self, gains: Floats) -> Floats:
-        """What a step makes of errors under gains (FINE, nu, 2 nu), to before its impact."""
-        width = self.gait.step_duration / FINE
+    def over_a_step(self, gains: Floats, *, held: bool = False) -> Floats:
+        """What a step makes of errors under gains (intervals, nu, 2 nu), to before its impact.
+
+        The torques follow at once, or are held over each interval.
+        """
+        width = self.gait.step_duration / len(gains)
         moved = np.eye(len(self.jump))
-        for (A, B), gain in zip(self.between(), gains, strict=True):
-            moved = expm(width * (A - B @ gain)) @ moved
+        for (A, B), gain in zip(self.between(len(gains)), gains, strict=True):
+            if held:
+                grown, pushed = _held(A, B, width)
+                moved = (grown - pushed @ gain) @ moved
+            else:
+                moved = expm(width * (A - B @ gain)) @ moved
         return moved
 
-    def between(self) -> list[tuple[Floats, Floats]]:
-        """A and B in the middles of FINE intervals."""
-        middles = (np.arange(FINE) + 0.5) * self.gait.step_duration / FINE
+    def between(self, count: int) -> list[tuple[Floats, Floats]]:
+        """A and B in the middles of even intervals."""
+        middles = (np.arange(count) + 0.5) * self.gait.step_duration / count
         A, B = (
             CubicSpline(self.time, np.array(each))(middles)
             for each in zip(*self.linear, strict=True)
@@ -265,6 +281,24 @@ class FlatOrbit:
         q, v, _ = self.joints(self.gait.step_duration)
         begin = np.concatenate(self.joints(0.0)[:2])
         return float(np.abs(self.stance.after(np.concatenate([q, v])) - begin).max())
+
+
+def _held(A: Floats, B: Floats, width: float) -> tuple[Floats, Floats]:
+    """What an interval makes of errors, and of torques that are held over it."""
+    return cont2discrete((A, B, A, 0.0 * B), width)[:2]
+
+
+def _sampled(A: Floats, B: Floats, price: Floats, width: float) -> tuple[Floats, Floats, Floats]:
+    """The same, and what errors at its beginning and torques cost until its end.
+
+    All three are blocks of one exponential (C. F. Van Loan 1978, *Computing integrals involving the
+    matrix exponential*, IEEE Transactions on Automatic Control 23(3)).
+    """
+    (nx, nu), size = B.shape, len(price)
+    still = np.vstack([np.hstack([A, B]), np.zeros((nu, size))])
+    found = expm(width * np.block([[-still.T, price], [np.zeros((size, size)), still]]))
+    grown = found[size:, size:]
+    return grown[:nx, :nx], grown[:nx, nx:], grown.T @ found[:size, size:]
 
 
 def _slope(function: Callable[[Floats], Floats], x: Floats) -> Floats:

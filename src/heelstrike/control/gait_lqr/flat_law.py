@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from heelstrike.compiler.bundle import array, number
 from heelstrike.compiler.compilation import kernel
-from heelstrike.control.arguments import check_gait, weights_of
+from heelstrike.control.arguments import check_gait, positive, weights_of
 from heelstrike.control.computed_torque import (
     Stance,
     StepTiming,
@@ -24,6 +24,7 @@ from heelstrike.control.gait_lqr.flat import FINE, KEPT, FlatOrbit
 from heelstrike.control.gait_lqr.transverse import multipliers_of
 from heelstrike.errors import ControllerError
 from heelstrike.gait.gait import Footing, Gait
+from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.loops import refuse_loops
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
@@ -33,6 +34,9 @@ from heelstrike.sim.controller.robot import ControlledRobot, ControlState
 
 REPEATS = 1e-6
 """Impacts may lead this far from the beginning of the gait (rad, rad/s)."""
+
+FEWEST = 20
+"""Calls a step with which the regulator is still one of the step."""
 
 
 class Parameters(StepTiming):
@@ -89,21 +93,11 @@ class Memory(Stance):
 @kernel
 def find_errors(state: ControlState, parameters: Parameters, memory: Memory, phase: float) -> None:
     """Write what joints lack of the gait at a time in the step, and their velocities."""
-    late = phase > parameters.latest
-    s = min(phase, parameters.latest)
-    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
-    piece = 0
-    while piece < coefficients.shape[1] - 1 and s >= breakpoints[piece + 1]:
-        piece += 1
-    s -= breakpoints[piece]
-    count = coefficients.shape[3]
+    piece, inside, moves = place_in_step(phase, parameters.latest, parameters.breakpoints)
+    terms = parameters.coefficients[memory.stance, piece]
+    count = terms.shape[1]
     for i in range(count):
-        position, velocity = 0.0, 0.0
-        for k in range(coefficients.shape[2] - 1, -1, -1):
-            velocity = velocity * s + position
-            position = position * s + coefficients[memory.stance, piece, k, i]
-        if late:
-            velocity = 0.0
+        position, velocity, _ = motion_in_piece(terms, i, inside, moves)
         memory.error[i] = position - state.joint_position[i]
         memory.error[count + i] = velocity - state.joint_velocity[i]
 
@@ -159,6 +153,9 @@ class FlatGaitLQR(Law):
         What errors of the joints and their velocities cost (1/rad², s²/rad²).
     torque_weight : float or (nu,) array
         What torques cost besides those of the gait, 1/(N m)².
+    period : float or None
+        Seconds between two calls, for which the regulator is found: torques are held meanwhile.
+        None for a law that acts continuously, or every millisecond.
 
     Attributes
     ----------
@@ -171,13 +168,13 @@ class FlatGaitLQR(Law):
     Raises
     ------
     ControllerError
-        If the robot cannot be controlled this way, the gait or a weight does not fit it, or the
-        motors cannot stabilise it.
+        If the robot cannot be controlled this way, the gait, a weight or the period does not fit
+        it, or the motors cannot stabilise it.
 
     Notes
     -----
-    The gains are those of torques that follow at once. With the usual weights errors of a light
-    foot die within a millisecond: where the law is called less often, weights have to be less.
+    Without a period the gains are those of torques that follow at once. With the usual weights
+    errors of a light foot die within a millisecond: a law that is called less often has to know.
 
     Examples
     --------
@@ -197,6 +194,7 @@ class FlatGaitLQR(Law):
         position_weight: ArrayLike = 1e5,
         velocity_weight: ArrayLike = 1e3,
         torque_weight: ArrayLike = 1.0,
+        period: float | None = None,
     ) -> None:
         check_gait(robot, gait)
         refuse_loops(robot, "a regulator about a gait", ControllerError)
@@ -211,11 +209,14 @@ class FlatGaitLQR(Law):
                 f"the impact of robot {robot.name!r} at the end of this gait misses its beginning "
                 f"by {orbit.misses:.2g} rad or rad/s; design one with optimize_gait"
             )
+        duration = gait.step_duration
+        count = None if period is None else _calls(period, duration)
         cost = np.diag(np.concatenate([by_position, by_velocity]))
-        gains = _table(orbit.regulator(cost, np.diag(effort)))
+        found = orbit.regulator(cost, np.diag(effort), count)
         # What the table makes of the gains is what is predicted.
-        places = (np.arange(FINE) + 0.5) / FINE
-        step = orbit.over_a_step(_at(gains, places))
+        places = (np.arange(len(found)) + (0.5 if count is None else 0.0)) / len(found)
+        gains = _table(found, places)
+        step = orbit.over_a_step(_at(gains, places), held=count is not None)
         self.multipliers: NDArray[np.complex128] = multipliers_of(orbit.jump @ step)
         self.either = tuple(float(abs(multipliers_of(each @ step)[0])) for each in orbit.jumps)
         if not np.all(np.abs(self.multipliers) < 1.0):
@@ -223,10 +224,11 @@ class FlatGaitLQR(Law):
         mirror = robot.mirror
         assert mirror is not None  # see pitch_of
         driven = mirror.among(robot.model.actuator_joint)
-        duration = gait.step_duration
         sides = [gait.pieces, gait.mirrored_pieces()]
         if gait.stance_foot:
             sides.reverse()
+        # Torques that are held until the next call are those of half way there.
+        times = np.linspace(0.0, duration, KEPT + 1) + 0.5 * (period or 0.0)
         parameters = Parameters(
             first=gait.stance_foot,
             actuator=driven.joint,
@@ -237,11 +239,11 @@ class FlatGaitLQR(Law):
             earliest=0.5 * duration,
             latest=1.1 * duration,
             landing=0.02 * duration,
-            torque=orbit.torques(np.linspace(0.0, duration, KEPT + 1)),
+            torque=orbit.torques(times),
             gains=gains,
         )
         begin = {"stance": gait.stance_foot, "landed": 1}
-        super().__init__(flat_gait_lqr, parameters, memory=begin, robot=robot)
+        super().__init__(flat_gait_lqr, parameters, memory=begin, robot=robot, period=period)
         self.gait = gait
 
 
@@ -255,12 +257,23 @@ def _check(robot: Robot, gait: Gait) -> None:
         )
 
 
-def _table(gains: Floats) -> Floats:
-    """Gains at even places of the step, of those in the middles of finer intervals."""
-    middles = (np.arange(len(gains)) + 0.5) / len(gains)
+def _calls(period: float, duration: float) -> int:
+    """How often a law is called in a step, as far as it makes a difference."""
+    positive("period", period)
+    calls = round(duration / period)
+    if calls < FEWEST:
+        raise ControllerError(
+            f"a period of {period:g} s is too long for steps of {duration:g} s: the law must be "
+            f"called {FEWEST} times a step at the least"
+        )
+    return min(calls, FINE)
+
+
+def _table(gains: Floats, known: Floats) -> Floats:
+    """Gains at even places of the step, of those that are known at other places."""
     places = np.linspace(0.0, 1.0, KEPT + 1)
     flat = gains.reshape(len(gains), -1)
-    found = np.array([np.interp(places, middles, each) for each in flat.T]).T
+    found = np.array([np.interp(places, known, each) for each in flat.T]).T
     return found.reshape(KEPT + 1, *gains.shape[1:])
 
 

@@ -35,6 +35,7 @@ from heelstrike.control.regulation.numbers import (
 from heelstrike.dynamics.kernels import point_bias_acceleration
 from heelstrike.dynamics.places import point_columns
 from heelstrike.dynamics.spatial import spatial
+from heelstrike.gait.polynomials import motion_in_piece, place_in_step
 from heelstrike.robot.model import Floats
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.controller.law import controller
@@ -73,22 +74,13 @@ def exchange_at_touchdown(
 @kernel
 def look_up(parameters: Parameters, foot: int, clock: float, choice: Choice) -> None:
     """Find the gait and its derivatives by the clock; beyond its end it is still."""
-    late = clock > parameters.latest
-    inside = min(clock, parameters.latest)
-    breakpoints, coefficients = parameters.breakpoints, parameters.coefficients
-    piece = 0
-    while piece < coefficients.shape[1] - 1 and inside >= breakpoints[piece + 1]:
-        piece += 1
-    inside -= breakpoints[piece]
-    for i in range(coefficients.shape[3]):
-        position, slope, curvature = 0.0, 0.0, 0.0
-        for k in range(coefficients.shape[2] - 1, -1, -1):
-            curvature = curvature * inside + 2.0 * slope
-            slope = slope * inside + position
-            position = position * inside + coefficients[foot, piece, k, i]
+    piece, inside, moves = place_in_step(clock, parameters.latest, parameters.breakpoints)
+    terms = parameters.coefficients[foot, piece]
+    for i in range(terms.shape[1]):
+        position, slope, curvature = motion_in_piece(terms, i, inside, moves)
         choice.position[i] = position
-        choice.slope[i] = 0.0 if late else slope
-        choice.curvature[i] = 0.0 if late else curvature
+        choice.slope[i] = slope
+        choice.curvature[i] = curvature
 
 
 @kernel

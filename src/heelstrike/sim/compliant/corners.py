@@ -276,7 +276,7 @@ def tell_resultants(model: Model, corners: Corners, impulse: Floats, place: Floa
     """Write the impulses of both faces in the frames of the sample, and where they act.
 
     Where the resultant's line of action leaves the disc; that of forces that nearly cancel may miss
-    it.
+    it. No force acts where the frame has its contact point.
     """
     for point in range(corners.sides - model.nc):
         if corners.joins[point] == 0:
@@ -284,8 +284,11 @@ def tell_resultants(model: Model, corners: Corners, impulse: Floats, place: Floa
         x, z = corners.force[point, 0], corners.force[point, 1]
         impulse[point, 0], impulse[point, 1] = into_frame(corners.frame[point], (x, z))
         size = math.sqrt(x * x + z * z)
+        radius = model.contact_radius[point]
+        for i in range(2):
+            place[point, i] = corners.center[point, i] - radius * corners.frame[point, i]
         if size > 0.0:
-            radius, lever = model.contact_radius[point], corners.moment[point] / size
+            lever = corners.moment[point] / size
             depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
             place[point, 0] = corners.center[point, 0] + (lever * z - depth * x) / size
             place[point, 1] = corners.center[point, 1] + (-lever * x - depth * z) / size

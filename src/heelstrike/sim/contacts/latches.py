@@ -91,6 +91,24 @@ def hold(count: int, stop: Integers, held: Integers, assembly: Assembly) -> int:
     return missing
 
 
+def latches_of(robot: Robot, latched: Iterable[str | int]) -> list[int]:
+    """Return which joints are named, all of which have a latch.
+
+    Raises
+    ------
+    SimulationError
+        If a joint has none.
+    """
+    chosen = [robot.joint_index(joint) for joint in several("latched", latched)]
+    for joint in chosen:
+        if joint not in robot.model.latch_joint:
+            raise SimulationError(
+                f"joint {robot.joint_names[joint]!r} of robot {robot.name!r} has no latch; "
+                f"{', '.join(robot.latch_names) or 'no joint'} has"
+            )
+    return chosen
+
+
 def latches_at(
     robot: Robot, state: State, ground: Ground, latched: Iterable[str | int] | None
 ) -> tuple[bool, ...]:
@@ -122,14 +140,9 @@ def latches_at(
         stands = (np.abs(at.gap) <= AT_THE_END) & (np.abs(at.velocity[:, 0]) <= AT_THE_END)
         standing = model.contact_link[stands]
         return tuple((rests & ~np.isin(model.latch_release, standing)).tolist())
-    chosen = [robot.joint_index(joint) for joint in several("latched", latched)]
+    chosen = latches_of(robot, latched)
     for joint in chosen:
         of_joint = model.latch_joint == joint
-        if not np.any(of_joint):
-            raise SimulationError(
-                f"joint {robot.joint_names[joint]!r} of robot {robot.name!r} has no latch; "
-                f"{', '.join(robot.latch_names) or 'no joint'} has"
-            )
         if not np.any(of_joint & there):
             raise SimulationError(
                 f"the latch of joint {robot.joint_names[joint]!r} holds it at "

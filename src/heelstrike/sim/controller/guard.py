@@ -114,6 +114,7 @@ def intact_between(block: Integers, between: Integers) -> bool:
     """Whether the guard words next to the arrays within a block are what they were."""
     changed = 0
     for i in range(between.shape[0]):
-        for k in range(NEAR):
-            changed |= block[between[i] + k] ^ GUARD
+        first = between[i]
+        for k in range(NEAR):  # a constant number of words at once, where no index is negative
+            changed |= word_at(block, first + k) ^ GUARD
     return changed == 0

@@ -6,12 +6,13 @@ does not ask for modes. At its end, contacts that touch must not approach, other
 
     w = G λ + b,   b = J v + h (J a_f + J̇ v),   b_n more by e J_n v,  or by gap / h where it is open
 
-with a_f the acceleration that the known forces lead to. It is kept as short as suffices: each
-further one without progress is longer. The impulses act at its beginning, as those of an impact;
-then the robot moves on freely to its end, where a smooth phase begins again. Impulses that make
-energy are refused, with restitution first and then without. Bridges of a half and of a quarter of
-the length tell how far a bridge may be wrong: its order is one. The ends compared are those on
-their constraints, from which the motion goes on.
+with a_f the acceleration that the known forces lead to. The rows turn on the way, by more than J̇ v
+tells: what velocities at the end differ by from w is added to b, and the problem solved again. What
+is pressed then is put on the ground by as little as the masses allow. A bridge is kept as short as
+suffices: each further one without progress is longer. The impulses act at its beginning, as those
+of an impact; then the robot moves on freely to its end, where a smooth phase begins again. Impulses
+that make energy are refused, with restitution first and then without. Bridges of a half and of a
+quarter of the length tell how far a bridge may be wrong: its order is one.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops
+from heelstrike.sim.contacts.loops import append_loops, free_loops, rows_of
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
-from heelstrike.sim.event_driven.corners import is_cornered, is_struck, joined
-from heelstrike.sim.event_driven.dynamics import evaluate, project
-from heelstrike.sim.event_driven.faces import locate, stand_on_face
+from heelstrike.sim.event_driven.corners import is_struck, log_impulse
+from heelstrike.sim.event_driven.dynamics import evaluate, observe_faces, solve_constraints
+from heelstrike.sim.event_driven.faces import has_corners, locate, stand_on_face
 from heelstrike.sim.event_driven.gaps import (
     free_gap_acceleration,
     gap_now,
@@ -45,7 +46,6 @@ from heelstrike.sim.event_driven.gaps import (
     gap_velocity,
 )
 from heelstrike.sim.event_driven.impact import IMPACT, NOTICEABLE, heading
-from heelstrike.sim.event_driven.modes import form_groups
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.rows import write_row
 from heelstrike.sim.frame import Scene
@@ -64,6 +64,8 @@ PROGRESS = 1e-3
 # Gap (m) up to which a contact touches; speed (m/s, rad/s) at which another might within a bridge.
 TOUCHING = 1e-9
 CLOSING_SPEED = 20.0
+# Approach (m/s, rad/s) at the end of a bridge that is no more than the turning of the rows leaves.
+SETTLED = 1e-6
 # Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
 SLOW = 1e-3
 # What a bridge of order one is wrong by grows with the square of its length: its halves together
@@ -187,6 +189,128 @@ def made_energy(count: int, assembly: Assembly, phase: Phase) -> bool:
 
 
 @kernel
+def lend_faces(count: int, assembly: Assembly, phase: Phase) -> None:
+    """Keep the second faces of candidates, which open ones would look for anew wherever they are.
+
+    Those that are lent so are marked in ``phase.hit``.
+    """
+    for contact in range(phase.first_second, phase.watched):
+        phase.hit[contact] = 0
+    for place in range(count):
+        contact = assembly.candidate[place]
+        if contact >= phase.first_second and phase.closed[contact] == 0:
+            phase.hit[contact], phase.closed[contact] = 1, 1
+
+
+@kernel
+def return_faces(phase: Phase) -> None:
+    """Take back what :func:`lend_faces` did."""
+    for contact in range(phase.first_second, phase.watched):
+        if phase.hit[contact] == 1:
+            phase.hit[contact], phase.closed[contact] = 0, 0
+
+
+@kernel
+def keeps_face(contact: int, model: Model, ground: GroundModel, phase: Phase) -> bool:
+    """Whether a candidate is a contact that will be on the same face at the end of a bridge."""
+    if phase.first_dry <= contact < phase.first_second:
+        return False
+    return contact >= model.nc or phase.face[contact] != NO_FACE or not has_corners(ground)
+
+
+@kernel
+def reach_end(
+    total: int, length: float, free_end: Floats, scene: Scene, memory: Memory, phase: Phase
+) -> None:
+    """Write where the impulses lead to ``phase.end``, from velocities without them."""
+    model, begin, end = scene.model, phase.begin, phase.end
+    for i in range(model.nv):
+        end[model.nq + i] = free_end[model.nq + i]
+    if total > 0:
+        add_impulse(model, memory.assembly, total, memory.equations, end[model.nq :])
+    for i in range(model.nv):
+        end[i] = begin[i] + length * end[model.nq + i]
+
+
+@kernel
+def put_on_ground(count: int, scene: Scene, memory: Memory, phase: Phase) -> None:
+    """Put what the bridge presses to the ground there at its end."""
+    model, assembly, end = scene.model, memory.assembly, phase.end
+    impulse, velocity, kept = (
+        assembly.answer.impulse,
+        assembly.answer.velocity,
+        phase.saddle.impulse,
+    )
+    for row in range(2 * count):
+        kept[row] = impulse[row]
+    for _ in range(2):
+        observe_faces(model, scene.ground, end, phase, memory)
+        size = 0
+        for place in range(count):
+            contact = assembly.candidate[place]
+            leaves = velocity[2 * place] - phase.lean[place] > TOUCHING
+            if (
+                kept[2 * place] > 0.0
+                and not leaves
+                and keeps_face(contact, model, scene.ground, phase)
+            ):
+                phase.row[size] = 2 * place
+                size += 1
+        for i in range(size):
+            contact = assembly.candidate[phase.row[i] // 2]
+            phase.system[i, size] = -gap_now(contact, memory.contacts, phase, end)
+        observe_faces(model, scene.ground, phase.begin, phase, memory)
+        solve_constraints(size, 0.0, assembly.problem.delassus, phase)
+        for row in range(2 * count):
+            impulse[row] = 0.0
+        for i in range(size):
+            impulse[phase.row[i]] = phase.unknown[i]
+        add_impulse(model, assembly, count, memory.equations, end[: model.nq])
+    for row in range(2 * count):
+        impulse[row] = kept[row]
+
+
+@kernel
+def turn_rows(count: int, scene: Scene, memory: Memory, phase: Phase) -> None:
+    """Let the free terms be those with which velocities at the end are what the problem says."""
+    model, assembly = scene.model, memory.assembly
+    free, velocity = assembly.problem.free, assembly.answer.velocity
+    observe_faces(model, scene.ground, phase.end, phase, memory)
+    for place in range(count):
+        contact = assembly.candidate[place]
+        if not keeps_face(contact, model, scene.ground, phase):
+            continue
+        normal, tangent = gap_velocity(
+            contact, model, memory.contacts, memory.equations.tree, phase, phase.end
+        )
+        free[2 * place] += normal - (velocity[2 * place] - phase.lean[place])
+        if not model.nc <= contact < phase.first_dry:
+            free[2 * place + 1] += tangent - velocity[2 * place + 1]
+    observe_faces(model, scene.ground, phase.begin, phase, memory)
+
+
+@kernel
+def solve_bridge(
+    count: int, total: int, length: float, free_end: Floats, scene: Scene, memory: Memory,
+    phase: Phase,
+) -> bool:  # fmt: skip
+    """Find the impulses of the candidates, and where they lead; return success."""
+    assembly, guess, friction = memory.assembly, memory.reaction.mode, memory.surface.friction
+    for attempt in range(2):
+        status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
+        note_residual(assembly.answer.residual, memory.tally)
+        if status != SOLVED or made_energy(total, assembly, phase):
+            return False
+        reach_end(total, length, free_end, scene, memory, phase)
+        if rows_of(memory.loops) > 0:  # they turn, too, and are closed when the next phase begins
+            return True
+        put_on_ground(count, scene, memory, phase)
+        if attempt == 0:
+            turn_rows(count, scene, memory, phase)
+    return True
+
+
+@kernel
 def find_impulses(
     scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase
 ) -> bool:
@@ -204,7 +328,6 @@ def find_impulses(
     free_acceleration(model, begin, memory.torque, phase, memory.pushes, equations)
     for i in range(model.nv):
         trial[model.nq + i] = begin[model.nq + i] + length * equations.rate[i]
-        end[model.nq + i] = trial[model.nq + i]
     find_faces(model, scene.ground, memory, phase)
     for contact in range(phase.watched):
         memory.reaction.mode[contact] = OPEN
@@ -215,16 +338,14 @@ def find_impulses(
     free_loops(total, memory.loops, trial[model.nq :], 0.5 * length, assembly)
     for place in range(count, total):
         phase.lean[place] = 0.0
+    reach_end(0, length, trial, scene, memory, phase)
     if total > 0:
         assemble_delassus(model, total, equations, assembly)
-        guess, friction = memory.reaction.mode, memory.surface.friction
-        status = solve_candidates(count, memory.loops, False, friction, guess, phase, assembly)
-        note_residual(answer.residual, memory.tally)
-        if status != SOLVED:
+        lend_faces(count, assembly, phase)
+        solved = solve_bridge(count, total, length, trial, scene, memory, phase)
+        return_faces(phase)
+        if not solved:
             return False
-        if made_energy(total, assembly, phase):
-            return False
-        add_impulse(model, assembly, total, equations, end[model.nq :])
     collect_impulses(count, assembly, memory.reaction, phase)
     for place in range(count):
         contact = assembly.candidate[place]
@@ -233,7 +354,6 @@ def find_impulses(
             answer.impulse[2 * place + 1] = 0.0
     finite = True
     for i in range(model.nv):
-        end[i] = begin[i] + length * end[model.nq + i]
         finite = finite and np.isfinite(end[i])
         trial[i] = begin[i]
         trial[model.nq + i] = begin[model.nq + i]
@@ -247,6 +367,66 @@ def copy_state(source: Floats, state: Floats) -> None:
     """Copy a state (q, v)."""
     for i in range(source.shape[0]):
         state[i] = source[i]
+
+
+@kernel
+def end_of_parts(
+    scene: Scene, parts: int, length: float, bouncing: bool, control: Control, memory: Memory,
+    phase: Phase, end: Floats,
+) -> None:  # fmt: skip
+    """Write where so many bridges end that take some time together; where they begin without."""
+    here = phase.slopes[HERE]
+    copy_state(phase.begin, here)
+    found = True
+    for _ in range(parts):
+        found = found and find_impulses(scene, length / parts, bouncing, control, memory, phase)
+        copy_state(phase.end, phase.begin)
+    copy_state(phase.begin if found else here, end)
+    copy_state(here, phase.begin)
+
+
+@kernel
+def find_bridge(
+    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
+) -> tuple[bool, float]:
+    """Find a bridge of some length; return success, and how far its end may be wrong."""
+    halved, quartered = phase.slopes[HALVED], phase.slopes[QUARTERED]
+    for attempt in range(2):
+        bouncing = attempt == 0
+        end_of_parts(scene, 2, length, bouncing, control, memory, phase, halved)
+        end_of_parts(scene, 4, length, bouncing, control, memory, phase, quartered)
+        if find_impulses(scene, length, bouncing, control, memory, phase):
+            wrong = 0.0
+            for i in range(halved.shape[0]):
+                first = FROM_HALVES * (phase.end[i] - halved[i])
+                second = FROM_QUARTERS * (halved[i] - quartered[i])
+                wrong = max(wrong, abs(first) + abs(first - second))
+            return True, wrong
+    return False, 0.0
+
+
+@kernel
+def report_impulses(
+    model: Model, wrong: float, contacts: Contacts, phase: Phase, reported: Reported, record: Record
+) -> None:
+    """Append the bridge to the events, and the impulses of the contacts."""
+    log_event(phase.time, BRIDGE, 0, phase.length, wrong, record)
+    for contact in range(phase.first_dry):
+        normal = phase.impulse[contact, 0]
+        struck = is_struck(contact, phase) if contact < model.nc else normal > 0.0
+        if not struck:
+            continue
+        if contact >= model.nc:
+            joint = phase.stop_joint[contact - model.nc]
+            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
+            reported.closed[contact] = 1
+            continue
+        kind = IMPACT
+        if reported.closed[contact] == 0:
+            kind = TOUCHDOWN
+            reported.closed[contact] = 1
+            reported.slipping[contact] = 0
+        log_impulse(kind, contact, contacts, phase, record)
 
 
 @kernel
@@ -271,117 +451,12 @@ def adopt_end(model: Model, ground: GroundModel, memory: Memory, phase: Phase) -
                 phase.slide[contact] = heading(phase.begin[model.nq + joint])
             continue
         touches = gap_now(contact, contacts, phase, phase.begin) <= TOUCHING
-        phase.closed[contact] = 1 if touches and mode[contact] != OPEN else 0
+        normal, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
+        # What has come down by the end of the bridge meets the ground there.
+        holds = mode[contact] != OPEN and normal >= -SETTLED
+        phase.closed[contact] = 1 if touches and holds else 0
         if phase.closed[contact] == 1 and mode[contact] != STICK:
-            _, tangent = gap_velocity(contact, model, contacts, tree, phase, phase.begin)
             phase.slide[contact] = heading(tangent)
-
-
-@kernel
-def keep_modes(phase: Phase) -> None:
-    """Remember what is closed, and on which faces, where marks of impacts have no use now."""
-    for contact in range(phase.watched):
-        phase.hit[contact] = phase.closed[contact]
-        phase.plastic[contact] = phase.face[contact]
-
-
-@kernel
-def restore_modes(phase: Phase) -> None:
-    """Go back to what :func:`keep_modes` remembered."""
-    for contact in range(phase.watched):
-        phase.closed[contact] = phase.hit[contact]
-        phase.face[contact] = phase.plastic[contact]
-        phase.hit[contact] = 0
-        phase.plastic[contact] = 0
-
-
-@kernel
-def end_of_parts(
-    scene: Scene, parts: int, length: float, bouncing: bool, control: Control, memory: Memory,
-    phase: Phase, end: Floats,
-) -> None:  # fmt: skip
-    """Write where so many bridges end that take some time together; where they begin without."""
-    here = phase.slopes[HERE]
-    copy_state(phase.begin, here)
-    copy_state(phase.begin, end)
-    found = True
-    for _ in range(parts):
-        found = found and find_impulses(scene, length / parts, bouncing, control, memory, phase)
-        copy_state(phase.end, phase.begin)
-    if found:
-        keep_modes(phase)
-        adopt_end(scene.model, scene.ground, memory, phase)
-        put_end_in_place(scene, memory, phase, end)
-        restore_modes(phase)
-    copy_state(here, phase.begin)
-
-
-@kernel
-def put_end_in_place(scene: Scene, memory: Memory, phase: Phase, end: Floats) -> None:
-    """Write the state behind a bridge, whose modes have been adopted, put on its constraints."""
-    model, tree = scene.model, memory.equations.tree
-    copy_state(phase.begin, end)
-    form_groups(model, tree, memory.contacts, memory.surface.friction, phase)
-    project(model, scene.ground, memory, phase, end)
-    for contact in range(phase.watched):
-        phase.carrier[contact] = 0
-        phase.holder[contact] = 0
-        phase.stuck[contact] = 0
-
-
-@kernel
-def find_bridge(
-    scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
-) -> bool:
-    """Find a bridge of some length, and where its halves and quarters end; return success."""
-    halved, quartered = phase.slopes[HALVED], phase.slopes[QUARTERED]
-    for attempt in range(2):
-        bouncing = attempt == 0
-        end_of_parts(scene, 2, length, bouncing, control, memory, phase, halved)
-        end_of_parts(scene, 4, length, bouncing, control, memory, phase, quartered)
-        if find_impulses(scene, length, bouncing, control, memory, phase):
-            return True
-    return False
-
-
-@kernel
-def estimate_error(scene: Scene, memory: Memory, phase: Phase) -> float:
-    """How far the end of a bridge may be wrong, once it has been adopted."""
-    end, halved, quartered = phase.slopes[HERE], phase.slopes[HALVED], phase.slopes[QUARTERED]
-    put_end_in_place(scene, memory, phase, end)
-    wrong = 0.0
-    for i in range(end.shape[0]):
-        first = FROM_HALVES * (end[i] - halved[i])
-        second = FROM_QUARTERS * (halved[i] - quartered[i])
-        wrong = max(wrong, abs(first) + abs(first - second))
-    return wrong
-
-
-@kernel
-def report_impulses(
-    model: Model, contacts: Contacts, phase: Phase, reported: Reported, record: Record
-) -> None:
-    """Append the bridge to the events, its error left open, and the impulses of the contacts."""
-    log_event(phase.time, BRIDGE, 0, phase.length, 0.0, record)
-    for contact in range(phase.first_dry):
-        normal, tangent = phase.impulse[contact, 0], phase.impulse[contact, 1]
-        struck = normal > 0.0
-        if contact < model.nc and is_cornered(contact, phase):
-            struck = is_struck(contact, phase)
-            normal, tangent = joined(contact, phase.impulse, contacts, phase)
-        if not struck:
-            continue
-        if contact >= model.nc:
-            joint = phase.stop_joint[contact - model.nc]
-            log_event(phase.time, JOINT_STOP, joint, normal, 0.0, record)
-            reported.closed[contact] = 1
-            continue
-        kind = IMPACT
-        if reported.closed[contact] == 0:
-            kind = TOUCHDOWN
-            reported.closed[contact] = 1
-            reported.slipping[contact] = 0
-        log_event(phase.time, kind, contact, normal, tangent, record)
 
 
 @kernel
@@ -399,22 +474,22 @@ def cross(
         phase.series = phase.time
         phase.bridges = 0
     found = False
+    wrong = 0.0
     while not found and phase.bridges < MOST_BRIDGES:
         wish = SHORTEST_BRIDGE * LONGER**phase.bridges
         phase.length = min(wish, stop - phase.time)
-        found = find_bridge(scene, phase.length, control, memory, phase)
+        found, wrong = find_bridge(scene, phase.length, control, memory, phase)
         if phase.length == wish or not found:
             phase.bridges += 1
     if not found:
         return False
-    bridge = record.events
-    report_impulses(model, memory.contacts, phase, memory.reported, record)
+    report_impulses(model, wrong, memory.contacts, phase, memory.reported, record)
     for contact in range(phase.watched):
         if not phase.first_dry <= contact < phase.first_second:
             phase.closed[contact] = 0
         phase.carrier[contact] = 0
         phase.holder[contact] = 0
-    # The faces stay: the impulses just reported are in the frame that this row has.
+    leave_faces(model, phase)
     for i in range(model.nv):
         phase.begin[model.nq + i] = phase.trial[model.nq + i]
     row = record.rows
@@ -426,6 +501,5 @@ def cross(
     for i in range(phase.begin.shape[0]):
         phase.begin[i] = phase.end[i]
     adopt_end(model, scene.ground, memory, phase)
-    record.event_impulse[bridge, 1] = estimate_error(scene, memory, phase)
     phase.bridging = 0
     return True

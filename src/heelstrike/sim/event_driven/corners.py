@@ -2,7 +2,8 @@
 
 A record, an event and a controller know one force a contact point, in the frame of one normal. In a
 corner that is the resultant of both faces, in the frame of the first; where a point meets a second
-face, it is the frame of that one: that is the face that hits it.
+face, it is the frame of that one: that is the face that hits it. Events have the frame of the first
+row of their instant.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from heelstrike.dynamics.frames import into_frame, out_of_frame
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.controller.interface import Contacts
+from heelstrike.sim.event_driven.location import shortest_step
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.memory import Memory
 from heelstrike.sim.record.record import Record
+from heelstrike.sim.record.recording import log_event
 
 
 @kernel
@@ -45,6 +48,36 @@ def impulse_of(point: int, contacts: Contacts, phase: Phase) -> tuple[float, flo
     if is_cornered(point, phase):
         return joined(point, phase.impulse, contacts, phase)
     return phase.impulse[point, 0], phase.impulse[point, 1]
+
+
+@kernel
+def first_row(time: float, record: Record) -> int:
+    """First of the rows of this instant, or the next to be written if it has none as yet."""
+    row = record.rows
+    while row > 0 and abs(record.time[row - 1] - time) <= 0.5 * shortest_step(time):
+        row -= 1
+    return row
+
+
+@kernel
+def log_impulse(kind: int, point: int, contacts: Contacts, phase: Phase, record: Record) -> None:
+    """Append the impulse on a point in this instant to the events.
+
+    It is told in the frame of the first row of the instant: several impacts, jams and a bridge may
+    follow each other there, and turn the point from face to face.
+    """
+    frame = contacts.normal[point]
+    normal, tangent = phase.impulse[point, 0], phase.impulse[point, 1]
+    if is_cornered(point, phase):
+        normal, tangent = joined(point, phase.impulse, contacts, phase)
+        if phase.meets[point] == 1:
+            frame = phase.seconds.normal[point]
+    row = first_row(phase.time, record)
+    if row < record.rows:
+        told = record.contact_normal[row, point]
+        if told[0] != frame[0] or told[1] != frame[1]:
+            normal, tangent = into_frame(told, out_of_frame(frame, (normal, tangent)))
+    log_event(phase.time, kind, point, normal, tangent, record)
 
 
 @kernel
@@ -89,17 +122,18 @@ def record_corner(
     place, moment = record.contact_point[row, point], radius * (force[1] + other[1])
     size = math.sqrt(x * x + z * z)
     normal = seconds.normal[point] if meets else own
-    if meets:
+    if size > 0.0:
+        lever = moment / size
+        depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
+        place[0] += radius * own[0] + (lever * z - depth * x) / size
+        place[1] += radius * own[1] + (-lever * x - depth * z) / size
+    elif meets:
         place[0], place[1] = seconds.position[point, 0], seconds.position[point, 1]
+    if meets:
         record.gap[row, point] = seconds.gap[point]
         for i in range(2):
             record.contact_normal[row, point, i] = normal[i]
         _, record.slip_velocity[row, point] = contact_velocity(
             model, memory.equations.tree, seconds, point
         )
-    elif size > 0.0:
-        lever = moment / size
-        depth = math.sqrt(max(radius * radius - lever * lever, 0.0))
-        place[0] += radius * normal[0] + (lever * z - depth * x) / size
-        place[1] += radius * normal[1] + (-lever * x - depth * z) / size
     force[0], force[1] = into_frame(normal, (x, z))

@@ -178,10 +178,11 @@ def watch_geometry(
 ) -> None:  # fmt: skip
     """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
-    That of a point that is let pass below the ground is its depth.
+    That of a point that is let pass below the ground is its depth. On ground with corners the
+    second rate of an open point bounds how fast it moves.
     """
-    value, rate = phase.value, phase.rate
-    if has_corners(ground):
+    value, rate, corners = phase.value, phase.rate, has_corners(ground)
+    if corners:
         watch_corners(model, ground, contacts, phase, value)
         if phase.watched > phase.first_second:
             watch_second_faces(model, tree, phase)
@@ -205,6 +206,8 @@ def watch_geometry(
             side = 1.0 - 2.0 * phase.passing[contact]
             value[2 * contact] = side * contacts.gap[contact]
             rate[2 * contact] = side * normal
+            if corners:
+                rate[2 * contact + 1] = abs(normal) + abs(tangent)
         elif phase.slide[contact] != 0 and phase.group[contact] == contact:
             value[2 * contact + 1] = phase.slide[contact] * tangent
 

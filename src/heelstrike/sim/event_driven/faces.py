@@ -16,6 +16,7 @@ import numpy as np
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.dynamics.kernels import point_position
+from heelstrike.dynamics.places import place_of, velocity_at
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Model
 from heelstrike.sim.contacts.faces import (
@@ -39,6 +40,8 @@ from heelstrike.sim.memory import Reaction, Surface
 ONE_NORMAL = 1e-12
 # Faces whose gaps differ by less (m) are equally near.
 ONE_GAP = 1e-9
+# How far ahead (s) it is looked for how fast a corner comes near.
+SOON = 1e-6
 
 
 @kernel
@@ -213,13 +216,44 @@ def watch_corners(
     first = 2 * phase.watched
     for contact in range(model.nc):
         value[first + contact] = 1.0
-        face, radius = phase.face[contact], model.contact_radius[contact]
-        if face != NO_FACE:
+        if phase.face[contact] != NO_FACE:
             x, z = center_of(model, contacts, contact)
-            left, _ = following_face(ground, face, x, z, radius)
-            if phase.watched > phase.first_second:
-                left = min(left, *way_out(ground, contact, x, z, radius, phase))
+            left = way_left(ground, contact, x, z, model.contact_radius[contact], phase)
             value[first + contact] = min(left, 1.0)
+
+
+@kernel
+def way_left(
+    ground: GroundModel, point: int, x: float, z: float, radius: float, phase: Phase
+) -> float:
+    """How far a disc on a face is from the end of it, or what there is to meet or leave besides."""
+    left, _ = following_face(ground, phase.face[point], x, z, radius)
+    if phase.watched > phase.first_second:
+        left = min(left, *way_out(ground, point, x, z, radius, phase))
+    return float(left)
+
+
+@kernel
+def rate_corners(
+    model: Model, ground: GroundModel, tree: Workspace, contacts: Contacts, phase: Phase
+) -> None:
+    """Rates of the event functions of corners that have fired.
+
+    They are linear in the place of a disc, or nearly so: a short way ahead tells.
+    """
+    center = phase.scratch[0]
+    for contact in range(model.nc):
+        corner = 2 * phase.watched + contact
+        if phase.fired[corner] == 0 or phase.face[contact] == NO_FACE:
+            continue
+        x, z = center_of(model, contacts, contact)
+        center[0], center[1] = x, z
+        link, radius = model.contact_link[contact], model.contact_radius[contact]
+        along_x, along_z = velocity_at(tree.velocity, link, place_of(tree, center))
+        later = way_left(
+            ground, contact, x + SOON * along_x, z + SOON * along_z, radius, phase
+        )  # fmt: skip
+        phase.rate[corner] = (later - way_left(ground, contact, x, z, radius, phase)) / SOON
 
 
 @kernel

@@ -18,7 +18,7 @@ from heelstrike.sim.contacts.geometry import (
 from heelstrike.sim.contacts.loops import append_loops, find_loops, free_loops, note_loops, rows_of
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration
-from heelstrike.sim.event_driven.corners import impulse_of, is_cornered, is_struck, joined
+from heelstrike.sim.event_driven.corners import is_struck, log_impulse
 from heelstrike.sim.event_driven.dynamics import gather_closed
 from heelstrike.sim.event_driven.faces import locate
 from heelstrike.sim.event_driven.gaps import free_gap_acceleration, gap_rows, gap_velocity
@@ -244,8 +244,7 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
             phase.last_impact[contact] = time
     made_at = report_impacts(model, time, contacts, phase, reported, record)
     if made > NOTICEABLE:
-        normal, tangent = impulse_of(made_at, contacts, phase)
-        log_event(time, ENERGY_GAIN, made_at, normal, tangent, record)
+        log_impulse(ENERGY_GAIN, made_at, contacts, phase, record)
     return True
 
 
@@ -257,15 +256,11 @@ def report_impacts(
     impulse = phase.impulse
     largest = 0
     for contact in range(phase.first_dry):
-        normal, tangent = impulse[contact, 0], impulse[contact, 1]
-        struck = normal > 0.0
-        if contact < model.nc and is_cornered(contact, phase):
-            struck = is_struck(contact, phase)
-            normal, tangent = joined(contact, impulse, contacts, phase)
-        if contact < model.nc and impulse[contact, 0] > impulse[largest, 0]:
+        normal = impulse[contact, 0]
+        struck = is_struck(contact, phase) if contact < model.nc else normal != 0.0
+        if contact < model.nc and normal > impulse[largest, 0]:
             largest = contact
-        pulls = contact >= model.nc and normal < 0.0  # as a latch may
-        if not (struck or pulls):
+        if not struck:  # a stop may pull, as a latch does
             continue
         landed = reported.closed[contact] == 0
         reported.closed[contact] = 1
@@ -275,5 +270,5 @@ def report_impacts(
             continue
         if landed:
             reported.slipping[contact] = 0
-        log_event(time, TOUCHDOWN if landed else IMPACT, contact, normal, tangent, record)
+        log_impulse(TOUCHDOWN if landed else IMPACT, contact, contacts, phase, record)
     return largest

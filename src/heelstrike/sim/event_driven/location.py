@@ -11,8 +11,9 @@ import math
 
 import numpy as np
 
-from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats
+from heelstrike.sim.contacts.faces import nearest_face
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
@@ -30,7 +31,7 @@ from heelstrike.sim.event_driven.dynamics import (
     look,
     project,
 )
-from heelstrike.sim.event_driven.faces import has_corners
+from heelstrike.sim.event_driven.faces import has_corners, rate_corners
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.frame import Scene
 from heelstrike.sim.memory import Memory
@@ -62,6 +63,11 @@ ATTEMPTS = 3
 EARLIER = 0.25
 SOONEST = 1e-8
 LOW, SOON = 1e-5, 1e-6
+# How many faces and corners a point may pass between two samples; part of the way to the first
+# sample after which it is told over which it is; a radius with which corners are faces, too.
+MOST_FACES = 6
+AT_ONCE = 1e-3
+A_DISC = 1.0
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
 
@@ -217,6 +223,28 @@ def may_dip(function: int, span: float, phase: Phase) -> bool:
     return bool(2.0 * (before + rate * where) <= min(before, value))
 
 
+@dissolved_kernel
+def may_cross(function: int, span: float, phase: Phase) -> bool:
+    """Whether a function that is positive at two samples may pass zero between them.
+
+    A gap has to fall by all that it is at the lower of its ends. A cubic falls by less than a sixth
+    of what its rates at both ends would make of it in the whole time between them: one that has
+    more left than all of that is not asked where it is lowest.
+    """
+    before, value = phase.before[function], phase.sample[function]
+    if not (before > 0.0 and value > 0.0):
+        return True
+    contact = function // 2
+    if contact >= phase.watched:
+        return False
+    rate, later_rate = phase.before_rate[function], phase.sample_rate[function]
+    if function % 2 == 1:
+        return bool(phase.slide[contact] != 0 and rate < 0.0 and later_rate > 0.0)
+    if phase.closed[contact] == 1:
+        return False
+    return not min(before, value) > span * (max(-rate, 0.0) + max(later_rate, 0.0))
+
+
 @kernel
 def lowest_place(before: float, rate: float, value: float, later_rate: float) -> float:
     """Fraction of an interval at which the cubic through values and rates is lowest, if below zero.
@@ -267,7 +295,7 @@ def crossing(
     if is_gap and rate >= 0.0 and later_rate >= 0.0 and before <= least:
         # It rises: it is no nearer than before, but for the error of the dense output.
         least = phase.absolute + phase.relative
-    if is_gap and value >= -least:
+    if is_gap and not dips and value >= -least:
         # It may have been lower in between, and be on its way up at both ends.
         span = (high - low) * length
         dip = lowest_place(before, span * rate, value, span * later_rate)
@@ -286,6 +314,89 @@ def crossing(
             return begin
     bracket = begin, before, end, value
     return find_root(scene, function, 0.0, bracket, length, control, memory, phase)
+
+
+@kernel
+def may_turn(function: int, span: float, radius: Floats, phase: Phase) -> bool:
+    """Whether a point might have been in the ground beside a corner, between two samples of it.
+
+    No gap changes faster than the point moves. Of a disc, whose centre is off the ground, no gap
+    has a kink below which it could dip.
+    """
+    contact = function // 2
+    if function % 2 == 1 or contact >= radius.shape[0] or phase.closed[contact] == 1:
+        return False
+    speed = phase.before_rate[function + 1] + phase.sample_rate[function + 1]
+    way = phase.before[function] + phase.sample[function]
+    return bool(radius[contact] == 0.0 and way <= span * speed)
+
+
+@kernel
+def face_within(
+    scene: Scene, part: float, length: float, contact: int, control: Control, memory: Memory,
+    phase: Phase,
+) -> int:  # fmt: skip
+    """Face, or corner, of the ground that an open point is nearest to at a fraction of the step."""
+    evaluate_within(scene, part, length, False, control, memory, phase)
+    x, z = memory.contacts.position[contact, 0], memory.contacts.position[contact, 1]
+    return int(nearest_face(scene.ground, x, z, A_DISC))
+
+
+@kernel
+def next_kink(
+    scene: Scene, contact: int, low: float, high: float, length: float, control: Control,
+    memory: Memory, phase: Phase,
+) -> tuple[float, float]:  # fmt: skip
+    """Fractions of the step between which another face is the nearest, or twice the last of it."""
+    face = face_within(scene, low, length, contact, control, memory, phase)
+    if face_within(scene, high, length, contact, control, memory, phase) == face:
+        return high, high
+    while high - low > EVENT_TIME / length:
+        part = low + 0.5 * (high - low)
+        if face_within(scene, part, length, contact, control, memory, phase) == face:
+            low = part
+        else:
+            high = part
+    return low, high
+
+
+@kernel
+def crossing_by_faces(
+    scene: Scene, function: int, low: float, high: float, length: float, control: Control,
+    memory: Memory, phase: Phase,
+) -> float:  # fmt: skip
+    """Fraction of the step at which an open point reaches ground whose nearest face changes.
+
+    Its gap has kinks there, and is smooth in between. That of a point in the ground can be deepest
+    at one. Where it begins on the ground, as on a corner, a moment later tells over which face.
+    """
+    before, before_rate = phase.before[function], phase.before_rate[function]
+    value, rate = phase.sample[function], phase.sample_rate[function]
+    root, begin = NO_EVENT, low
+    for _ in range(MOST_FACES):
+        if begin == 0.0 and before <= TOGETHER:
+            end = beyond = AT_ONCE * high
+        else:
+            end, beyond = next_kink(
+                scene, function // 2, begin, high, length, control, memory, phase
+            )  # fmt: skip
+        if end == high:
+            break
+        evaluate_within(scene, end, length, False, control, memory, phase)
+        phase.sample[function] = phase.value[function]
+        phase.sample_rate[function] = phase.rate[function]
+        root = crossing(scene, function, begin, end, length, control, memory, phase)
+        if root != NO_EVENT:
+            break
+        evaluate_within(scene, beyond, length, False, control, memory, phase)
+        phase.before[function] = phase.value[function]
+        phase.before_rate[function] = phase.rate[function]
+        begin = beyond
+    phase.sample[function], phase.sample_rate[function] = value, rate
+    if root == NO_EVENT:
+        root = crossing(scene, function, begin, high, length, control, memory, phase)
+    phase.before[function], phase.before_rate[function] = before, before_rate
+    return root
 
 
 @kernel
@@ -323,8 +434,8 @@ def first_event(
     ``phase.before_rate`` must hold the event functions at the start of the step.
     """
     sample, sample_rate = phase.sample, phase.sample_rate
-    functions = 2 * phase.watched
-    if has_corners(scene.ground):
+    functions, corners = 2 * phase.watched, has_corners(scene.ground)
+    if corners:
         functions += scene.model.nc
     together = min(EVENT_TIME / length, 0.5)  # there are steps shorter than that near poles
     low = 0.0
@@ -338,8 +449,12 @@ def first_event(
         first = NO_EVENT
         for i in range(functions):
             phase.fired[i] = 0
-            root = crossing(scene, i, low, high, length, control, memory, phase)
-            if root == NO_EVENT and k == 1 and just_left(i, phase):
+            span, root = (high - low) * length, NO_EVENT
+            if corners and may_turn(i, span, scene.model.contact_radius, phase):
+                root = crossing_by_faces(scene, i, low, high, length, control, memory, phase)
+            elif may_cross(i, span, phase):
+                root = crossing(scene, i, low, high, length, control, memory, phase)
+            if k == 1 and root == NO_EVENT and just_left(i, phase):
                 root = early_crossing(scene, i, high, length, control, memory, phase)
             if root < first - together:
                 for j in range(i):
@@ -401,6 +516,8 @@ def end_at_event(
         if not settle(scene, memory, phase):
             return length, True, False
         look(scene.model, scene.ground, phase.end, memory, phase)
+        if has_corners(scene.ground):
+            rate_corners(scene.model, scene.ground, memory.equations.tree, memory.contacts, phase)
         value, rate = phase.value, phase.rate
         change = 0.0
         for i in range(phase.fired.shape[0]):

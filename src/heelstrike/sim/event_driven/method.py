@@ -34,7 +34,12 @@ from heelstrike.sim.contacts.loops import close_loops, rows_of, steady_loops
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.bridge import TOUCHING, cross
-from heelstrike.sim.event_driven.corners import impulse_of, is_struck, show_forces
+from heelstrike.sim.event_driven.corners import (
+    impulse_of,
+    is_struck,
+    log_impulse,
+    show_forces,
+)
 from heelstrike.sim.event_driven.dynamics import evaluate, is_in_place, project
 from heelstrike.sim.event_driven.faces import (
     choose_faces,
@@ -324,8 +329,7 @@ def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Recor
             joint = phase.stop_joint[contact - model.nc]
             log_event(phase.time, JOINT_STOP, joint, phase.impulse[contact, 0], 0.0, record)
         elif contact < model.nc and is_struck(contact, phase):
-            normal, tangent = impulse_of(contact, memory.contacts, phase)
-            log_event(phase.time, PAINLEVE, contact, normal, tangent, record)
+            log_impulse(PAINLEVE, contact, memory.contacts, phase, record)
     if not solved:
         for i in range(begin.shape[0]):
             begin[i] = before[i]

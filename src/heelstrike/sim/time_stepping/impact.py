@@ -69,7 +69,8 @@ class Impact(Bundle):
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
     relaxed, wedged : int
-        Whether what is in the ground is left there in this step; the last step where it was.
+        Whether this step is asked for less than to come out of the ground and to bounce; the last
+        step that was.
     arriving : (nv,) float
         Where there is an impact, the velocity that positions move with.
     member : (capacity,) int
@@ -138,17 +139,28 @@ def call(place: int, impact: Impact) -> None:
 
 
 @kernel
-def relax(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
-    """Leave the candidates where they are that are beyond stops or in the ground; return if any is.
+def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool:
+    """Ask a step without an answer for less: no way out, no bounce; return if it asked for any.
 
-    Not if one is deeper than rounding and turning explain.
+    Without these the velocity that the step would have without contact is all that is in the way,
+    and there is an answer. What is beyond stops or in the ground is left there, where the gap is
+    bounded and none is deeper than rounding and turning explain. In a wedge that goes on all of it
+    is explained: the step before has let nothing sink but by turning.
     """
-    deepest = 0.0
+    deepest, bounces = 0.0, False
+    surface, corner = memory.surface, impact.corner
     for place in range(count):
         candidate = memory.assembly.candidate[place]
-        if candidate < 2 * (model.nc + model.nv):
-            deepest = min(deepest, gap_of(model, memory, impact.corner, candidate))
-    leaves = impact.relaxed == 0 and -WEDGED_BY <= deepest < 0.0
+        second = candidate - model.nc - 2 * model.nv
+        if second < model.nc:
+            deepest = min(deepest, gap_of(model, memory, corner, candidate))
+        if candidate < model.nc:
+            bounces = bounces or surface.restitution[candidate] > 0.0
+        elif 0 <= second < model.nc:
+            bounces = bounces or corner.restitution[second] > 0.0
+    leaves = impact.relaxed == 0 and bounces
+    if bounds_gaps and impact.relaxed == 0 and deepest < 0.0:
+        leaves = impact.wedged == memory.tally.steps - 1 or deepest >= -WEDGED_BY
     if leaves:
         impact.relaxed = 1
     return leaves
@@ -254,10 +266,11 @@ def pose_impact(
         if candidate < 2 * (model.nc + model.nv):
             gap = gap_of(model, memory, impact.corner, candidate)
             normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
-        if candidate < model.nc:
+        bounces = impact.relaxed == 0
+        if bounces and candidate < model.nc:
             before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
             normal += memory.surface.restitution[candidate] * before
-        elif model.nc + 2 * model.nv <= candidate < 2 * (model.nc + model.nv):
+        elif bounces and model.nc + 2 * model.nv <= candidate < 2 * (model.nc + model.nv):
             contact, corner = candidate - model.nc - 2 * model.nv, impact.corner
             before, _ = contact_velocity(model, memory.equations.tree, corner.contacts, contact)
             normal += corner.restitution[contact] * before

@@ -386,7 +386,8 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
             before, _ = contact_velocity(model, tree, contacts, contact)
             if gap + 0.5 * step * before > work.activation:
                 continue
-            normal += memory.surface.restitution[contact] * before
+            if work.impact.relaxed == 0:
+                normal += memory.surface.restitution[contact] * before
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = velocity[contact, 1]
         problem.set[count] = CONE
@@ -482,7 +483,8 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
             before = row_product(assembly.jacobian, 2 * count, memory.v)
             if gap + 0.5 * step * before > work.activation:
                 continue
-            normal += corner.restitution[contact] * before
+            if work.impact.relaxed == 0:
+                normal += corner.restitution[contact] * before
         elif gap > work.activation:
             continue
         problem.free[2 * count] = normal
@@ -783,7 +785,7 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
     a candidate, is called and the step solved again. So it is where nothing pushes all candidates
-    out of where they are already; they are left there, then.
+    out of where they are already, or lets them bounce; they are left there, then.
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
     again = True
@@ -808,19 +810,19 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         first_loop = 2 * (model.nc + model.nv) + memory.dry_joint.shape[0]
         count = append_loops(first_loop, count, memory.loops, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
-        if impact.relaxed == 1:
+        if impact.relaxed == 1 and is_linearised(work.scheme):
             close_gaps(model, work.step, count, impact, memory)
         if count > 0:
             solved = solve_candidates(model, near, joints, count, work, memory)
         v = impact.arriving if impact.happens == 1 else memory.next_v
-        if not is_linearised(work.scheme):
-            again = False
-        elif solved:
+        if not solved:
+            again = relax(model, is_linearised(work.scheme), count, memory, impact)
+        elif is_linearised(work.scheme):
             again = may_go_through(model, work, near, count, v, memory) and call_missed(
                 model, work.step, v, memory, impact
             )
         else:
-            again = relax(model, count, memory, impact)
+            again = False
     if impact.calls > 0:
         dismiss(impact)
     if work.scheme == IMPACT_RESOLVED:

@@ -1,0 +1,1 @@
+"""Closed loops, coupled joints, latches and brakes: scenes that have them, and their laws."""
