@@ -396,12 +396,13 @@ def find_bridge(
         end_of_parts(scene, 2, length, bouncing, control, memory, phase, halved)
         end_of_parts(scene, 4, length, bouncing, control, memory, phase, quartered)
         if find_impulses(scene, length, bouncing, control, memory, phase):
-            wrong = 0.0
+            wrong, doubt = 0.0, 0.0
             for i in range(halved.shape[0]):
                 first = FROM_HALVES * (phase.end[i] - halved[i])
                 second = FROM_QUARTERS * (halved[i] - quartered[i])
-                wrong = max(wrong, abs(first) + abs(first - second))
-            return True, wrong
+                wrong = max(wrong, abs(first))
+                doubt = max(doubt, abs(first - second))
+            return True, wrong + doubt
     return False, 0.0
 
 
