@@ -98,7 +98,8 @@ class _Steps:
             if controller is not None and self.scheme is Scheme.LINEARLY_IMPLICIT:
                 stiffness[model.actuator_joint] += controller.parameters.kp
                 damping[model.actuator_joint] += controller.parameters.kd
-            matrix = matrix + np.diag(ahead * damping + ahead**2 * stiffness)
+            rows.ties.added = ahead * damping + ahead**2 * stiffness
+            matrix = matrix + np.diag(rows.ties.added)
             known = known - ahead * stiffness * self.before
         self.metric = Metric(matrix)
         self.matrix = matrix
@@ -118,7 +119,9 @@ class _Steps:
         """Steps whose positions move with another velocity than the one behind them."""
         if self.scheme is Scheme.IMPACT_RESOLVED:
             self.split = np.any(self.missed(self.after) > MOTION, axis=1)
-            self.moved = np.where(self.split[:, None], rows.ties.straight(self.h), self.after)
+            self.moved = self.after.copy()
+            split = np.flatnonzero(self.split)
+            self.moved[split] = rows.ties.straight(self.h, split)
         self.wedged = self.wedges()
         """Whether a wedge is going on, in which steps may leave in the ground what is there."""
         self.asked_for = np.zeros(len(self.time))

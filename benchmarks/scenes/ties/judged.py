@@ -34,8 +34,8 @@ LAW = 1e-6
 """Torque of a brake that slips, relative to its limit."""
 MOVING = 1e-3
 """Speed (rad/s, m/s) from which a brake slips; smoothed friction creeps below it."""
-ATTEMPTS = 12
-"""Newton steps that put positions back on the ties."""
+ATTEMPTS, CLOSED = 8, 1e-13
+"""Newton steps that put positions back on the ties, and how far (m, rad) these are from it then."""
 AT_THE_END = 1e-3
 """Distance (rad, m) from its end up to which a latch may hold."""
 
@@ -59,11 +59,14 @@ class JudgedTies:
         Coordinates that a brake which does not slip holds.
     latched : (T, n) bool
         Coordinates that are where a latch may hold them.
+    added : (n,) float
+        What a scheme of time stepping adds to the diagonal of the mass matrix.
     """
 
     def __init__(self, run: Any, poses: Any, metric: Metric) -> None:
         model, q = run.robot.model, run.position
         self.run, self.metric, self.tree = run, metric, poses.tree
+        self.added = np.zeros(q.shape[1])
         self.tied = Tied(model, poses, q, run.velocity)
         loops = run.loop_force.reshape(len(q), 2 * len(model.loop_link))
         self.along = np.concatenate((loops, run.coupling_force), axis=1)
@@ -122,31 +125,47 @@ class JudgedTies:
         out: Array = 0.5 * (time[changes] + time[changes + 1])
         return out
 
-    def put_back(self, q: Array) -> Array:
-        """Positions (T - 1, n) at the ends of steps, put back on what ties them.
+    def put_back(self, q: Array, steps: Array | None = None) -> Array:
+        """Positions (S, n) at the ends of some steps, or all, put back on what ties them.
 
         The way is the shortest by the masses; joints that a brake holds stay where they are.
         """
-        for _ in range(ATTEMPTS if self.along.shape[1] or self.held.any() else 0):
-            poses = Poses(self.tree, q)
-            tied = Tied(self.run.robot.model, poses, q)
-            away = np.concatenate((tied.displacement, q - self.run.position[:-1]), axis=1)
-            rows = self._with_brakes(tied.jacobian)
-            q = q - torn(rows, Metric(poses.mass_matrix()), 0.0 * q, -away)
+        steps = np.arange(len(self.held) - 1) if steps is None else steps
+        if not (self.along.shape[1] or self.held.any()):
+            return q
+        q, left = q.copy(), np.arange(len(q))
+        for _ in range(ATTEMPTS):
+            poses = Poses(self.tree, q[left])
+            tied = Tied(self.run.robot.model, poses, q[left])
+            at = steps[left]
+            stayed = q[left] - self.run.position[at]
+            away = np.concatenate((tied.displacement, np.where(self.held[at], stayed, 0.0)), axis=1)
+            rows = self._with_brakes(tied.jacobian, at)
+            metric = Metric(poses.mass_matrix() + np.diag(self.added))
+            q[left] -= torn(rows, metric, 0.0 * stayed, -away)
+            left = left[np.abs(away).max(axis=1) > CLOSED]
+            if len(left) == 0:
+                break
         return q
 
-    def straight(self, step: float) -> Array:
-        """Velocities (T - 1, n) with which positions moved before they were put back on the ties.
+    def straight(self, step: float, steps: Array) -> Array:
+        """Velocities (S, n) with which positions moved in some steps before they were put back.
 
         They keep to the chord, ``J u + h/2 J̇ v = 0``, and lead to where the positions are.
         """
         q = self.run.position
-        u = np.diff(q, axis=0) / step
-        rows, before = self._with_brakes(self.tied.jacobian[:-1]), Metric(self.metric.matrix[:-1])
-        along = np.concatenate((self.chord(step), 0.0 * u), axis=1)
-        for _ in range(ATTEMPTS if self.along.shape[1] else 0):
-            u = u + (q[1:] - self.put_back(q[:-1] + step * u)) / step
+        u: Array = (q[steps + 1] - q[steps]) / step
+        if not self.along.shape[1] or len(steps) == 0:
+            return u
+        rows = self._with_brakes(self.tied.jacobian[steps], steps)
+        before = Metric(self.metric.matrix[steps] + np.diag(self.added))
+        along = np.concatenate((self.chord(step)[steps], 0.0 * u), axis=1)
+        for _ in range(ATTEMPTS):
             u = u - torn(rows, before, u, along)
+            missed = q[steps + 1] - self.put_back(q[steps] + step * u, steps)
+            if np.abs(missed).max() < CLOSED:
+                break
+            u = u + missed / step
         return u
 
     def chord(self, step: float) -> Array:
@@ -159,9 +178,9 @@ class JudgedTies:
         out: Array = np.where(taken.any(axis=1)[:, None], 0.0, -0.5 * step * self.tied.bias[:-1])
         return out
 
-    def _with_brakes(self, jacobian: Array) -> Array:
-        """Rows (T - 1, rows + n, n) of ties and held joints; those of other joints are zero."""
-        single = self.held[:-1, :, None] * np.eye(self.held.shape[1])
+    def _with_brakes(self, jacobian: Array, steps: Array) -> Array:
+        """Rows (S, rows + n, n) of ties and held joints; those of other joints are zero."""
+        single = self.held[steps][:, :, None] * np.eye(self.held.shape[1])
         return np.concatenate((jacobian, single), axis=1)
 
     def judge(

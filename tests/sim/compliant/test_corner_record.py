@@ -22,9 +22,9 @@ def test_no_force_in_a_corner_is_where_the_point_is() -> None:
     impulse, place = np.full((2, 2), np.nan), np.full((2, 2), 9.0)
     uncompiled(tell_resultants)(robot.model, corners, impulse, place)
     np.testing.assert_array_equal(impulse[0], 0.0)
-    np.testing.assert_allclose(place[0], [0.73, 0.16], rtol=1e-15)
+    np.testing.assert_allclose(place[0], [0.73, 0.16], rtol=1e-12)
     # A force through the centre acts where it leaves the disc.
     corners.force[0] = 0.0, 2.0
     uncompiled(tell_resultants)(robot.model, corners, impulse, place)
-    np.testing.assert_allclose(place[0], [0.7, 0.15], rtol=1e-15)
-    np.testing.assert_allclose(impulse[0], [1.6, -1.2], rtol=1e-15)
+    np.testing.assert_allclose(place[0], [0.7, 0.15], rtol=1e-12)
+    np.testing.assert_allclose(impulse[0], [1.6, 1.2], rtol=1e-12)

@@ -37,6 +37,9 @@ SMOOTH, ROUGH = 1e-5, 0.05
 REBOUND = 0.3
 """Touchdowns that follow a step sooner than this part of the longest are of the same step."""
 
+SAME = 1e-9
+"""Times (s) that differ by less are one."""
+
 FEW_ROWS = 10**9
 
 
@@ -141,8 +144,13 @@ class ClosedLoop:
         return direction
 
     def advanced(self, simulation: Simulation, until: float, doing: str) -> None:
-        """Simulate until a time, or say why that did not go."""
-        simulation.advance(until)
+        """Simulate until a time, or say why that did not go.
+
+        What is meant to be a sample is one to the last digit: a little later, the controller would
+        have been asked.
+        """
+        sample = self.sampled(until)
+        simulation.advance(sample if abs(sample - until) <= SAME else until)
         if simulation.status not in CAN_GO_ON:
             raise LimitCycleError(f"{doing}: {simulation.message}")
         if simulation.status is not CAN_GO_ON[0]:
