@@ -361,6 +361,11 @@ def test_a_walk_that_does_not_keep_step_with_its_samples() -> None:
             listens(), ground=hs.Ground(friction=3.0, slope=-slope), control_period=0.1,
             afresh=False,
         )  # fmt: skip
+    with pytest.raises(hs.LimitCycleError, match=r"between two steps of the method, every 0.001 s"):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=inertia, gravity=gravity), wheel_state(slope, speed),
+            ground=hs.Ground(friction=3.0, slope=-slope), method=hs.TimeStepping(), afresh=False,
+        )  # fmt: skip
 
 
 def test_arguments_of_controllers_that_begin_afresh() -> None:
