@@ -9,6 +9,8 @@ from synthetic_runs import box, pendulum
 
 import heelstrike as hs
 from heelstrike.analysis import energy_balance
+from heelstrike.robot import RobotBuilder
+from heelstrike.sim import EventKind
 
 G = 9.81
 
@@ -127,6 +129,29 @@ def test_joint_stop_between_rows(side: float) -> None:
     assert balance.kinetic[after] == pytest.approx(0.0, abs=1e-4)
     assert balance.stops[after] == pytest.approx(-3.0 * np.deg2rad(120.0), rel=1e-5)
     np.testing.assert_allclose(balance.residual, 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["brake", "dry friction"])
+def test_a_joint_that_comes_to_rest_between_rows(kind: str) -> None:
+    """Friction of 2000 N m stops 0.5 kg m² at 2 rad/s in 0.5 ms, and takes ½ I ω², all of it.
+
+    The torque is gone in the row in which the joint rests; the one before it is half a period away.
+    """
+    build = RobotBuilder("wheel")
+    dry = 2000.0 if kind == "dry friction" else 0.0
+    build.hinge("turn", None, mass=1.0, inertia=0.5, center_of_mass=(0.0, 0.0), dry_friction=dry)
+    build.brake("turn", limit=2000.0)
+    simulation = hs.Simulation(
+        build.build(), state=hs.State([0.0], [2.0]), method=hs.EventDriven(), stop_when_fallen=False
+    )
+    simulation.braked = ["turn"] if kind == "brake" else []
+    simulation.advance(0.01)
+    run = simulation.record
+    assert [event.kind for event in run.events][-1] is EventKind.JOINT_STICK
+    balance = energy_balance(run)
+    taken = balance.brakes if kind == "brake" else balance.dry_friction
+    assert taken[-1] == pytest.approx(-0.5 * 0.5 * 2.0**2, rel=1e-9)
+    np.testing.assert_allclose(balance.residual, 0.0, atol=1e-9)
 
 
 def test_walk() -> None:

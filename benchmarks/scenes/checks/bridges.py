@@ -8,6 +8,7 @@ says which; a second bridge from the same moment is half as long.
 
 A moment counts if the exact motion has no impact within the bridge. That an impact acts at its
 beginning, and not where it belongs, is what a bridge is for: such are told apart (`with_impact`).
+A scene without a moment that counts neither passes nor fails (`counts` is false).
 """
 
 from __future__ import annotations
@@ -113,8 +114,9 @@ def bridges_of_scene(check: str, seed: int, *, twins: bool = True) -> Words:
     return result | {
         "status": run.status.value,
         "message": run.message,
-        "passes": not causes,
-        "cause": ", ".join(causes),
+        "counts": bool(plain),
+        "passes": bool(plain) and not causes,
+        "cause": ", ".join(causes) if plain else "no bridge",
         "size": max((one["error"] for one in plain), default=0.0),
         "bridges": found,
         "seconds": time.process_time() - began,

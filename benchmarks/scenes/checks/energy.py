@@ -150,7 +150,9 @@ def balance(work: Work) -> Balance:
             elif k not in rows.bridges and made > GAIN * _size_squared(work, a, b):
                 unsaid = max(unsaid, made)
     before, times, lefts, doubts, what = zip(*found, strict=True) if found else ((),) * 5
-    in_play = max(float(kinetic.max()), float(np.ptp(potential)), 1e-9)
+    # Of a robot that stands still nothing is in play but what so many sums are rounded by.
+    rounding = len(energy) * float(np.finfo(float).eps * np.abs(energy).max()) / EXPLAINED
+    in_play = max(float(kinetic.max()), float(np.ptp(potential)), rounding, 1e-9)
     return Balance(
         np.array(before, dtype=int), np.array(times), np.array(lefts), np.array(doubts), what,
         in_play, gained, unsaid, len(work.gains), len(rows.jams), out, jam_made,

@@ -14,11 +14,18 @@ Result = dict[str, Any]
 
 
 def summary(check: str, results: Sequence[Result]) -> str:
-    """Counts, the worst, and the seeds of what does not pass by its cause."""
+    """Counts, the worst, and the seeds of what does not pass by its cause.
+
+    Scenes in which there was nothing to check (`counts` is false) are told, and not counted.
+    """
+    idle = [one["seed"] for one in results if not one.get("counts", True)]
+    results = [one for one in results if one.get("counts", True)]
     if not results:
-        return f"{check}: no scenes"
+        return f"{check}: no scenes" + (" with anything to check" if idle else "")
     passed = [one for one in results if one.get("passes")]
     lines = [f"{check}: {len(passed)} of {len(results)} scenes pass"]
+    if idle:
+        lines.append(f"nothing to check in {len(idle)}, not counted: {seed_words(idle)}")
     sized = [one for one in results if "size" in one]
     if sized:
         worst = max(sized, key=lambda one: one["size"])

@@ -41,7 +41,8 @@ class Work:
         kick = generalised(rows.rows.acting[row : row + 1], p[None])[0] + joint.get(k, np.zeros(n))
         if rows.first[k] != rows.last[k]:
             before, after = rows.rows.v[row], rows.rows.v[rows.last[k]]
-            kick = kick + rows.couple(row, rows.rows.matrix[row] @ (after - before) - kick, p)
+            left = rows.rows.matrix[row] @ (after - before) - kick
+            kick = kick + rows.rows.ties.explained(row, left, rows.couples(k, p))
         result: Array = kick
         return result
 

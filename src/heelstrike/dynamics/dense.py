@@ -6,6 +6,8 @@ A tableau, or dictionary, writes its basic variables in terms of the others: row
 
 from __future__ import annotations
 
+import math
+
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Integers
 
@@ -21,6 +23,9 @@ SINGULAR = 2e-15
 
 CONSISTENT = 1e-12
 """Equations that are left with less than this, relative to the largest, are met."""
+
+SWEEPS, ROUNDING = 100, 1e-14
+"""How often forces are raised to zero at most, and part of the largest that is none."""
 
 NO_PIVOT = 1e-11
 """Pivots of any matrix below this, relative to its largest entry, count as zero."""
@@ -175,7 +180,8 @@ def shorten(
     lean : (size - first,) float
     column : (size,) int
     system : (size, size + 1) float
-        What elimination left. Out: the free directions in the rows from `rank` on.
+        What elimination left. Out: the free directions in the rows from `rank` on, orthogonal to
+        each other and of length one, or zero if no unknown that counts has a part in them.
     unknown : (size,) float
         A solution. Out: the shortest.
     """
@@ -191,22 +197,76 @@ def shorten(
         for i in range(size):
             direction[i] *= unit[i]
         for earlier in range(rank, free):
-            _remove(first, size, lean, system[earlier], direction)
-        _remove(first, size, lean, direction, unknown)
+            remove(system[earlier], first, size, lean, direction)
+        length = math.sqrt(product(direction, direction, first, size, lean))
+        for i in range(size):
+            direction[i] = direction[i] / length if length > 0.0 else 0.0
+        remove(direction, first, size, lean, unknown)
 
 
 @kernel
-def _remove(first: int, size: int, lean: Floats, direction: Floats, vector: Floats) -> None:
-    """Make a vector orthogonal to a direction, as :func:`shorten` reckons lengths."""
-    along = 0.0
-    length = 0.0
+def product(one: Floats, other: Floats, first: int, size: int, lean: Floats) -> float:
+    """Product of two vectors, as :func:`shorten` reckons lengths."""
+    total = 0.0
     for i in range(first, size):
-        weighted = (1.0 + lean[i - first] * lean[i - first]) * direction[i]
-        along += weighted * vector[i]
-        length += weighted * direction[i]
-    if length > 0.0:
-        for i in range(size):
-            vector[i] -= along / length * direction[i]
+        total += (1.0 + lean[i - first] * lean[i - first]) * one[i] * other[i]
+    return total
+
+
+@kernel
+def remove(direction: Floats, first: int, size: int, lean: Floats, vector: Floats) -> None:
+    """Make a vector orthogonal to a direction of length one, as :func:`shorten` reckons them."""
+    along = product(direction, vector, first, size, lean)
+    for i in range(size):
+        vector[i] -= along * direction[i]
+
+
+@kernel
+def raise_to_zero(
+    first: int, size: int, rank: int, presses: Integers, system: Floats, unknown: Floats
+) -> None:
+    """Move what :func:`shorten` chose as little as lets nothing pull that can only press.
+
+    Hildreth's method: in turn, each such force is raised to zero along the free directions, or let
+    back as far as it has been raised. If no solution has them all, some are left below zero.
+
+    Parameters
+    ----------
+    first, size, rank : int
+        As there.
+    presses : (size - first,) int
+        Whether each unknown from `first` on must not be negative.
+    system : (size, size + 1) float
+        The free directions, in the rows from `rank` on. Its last column is used up.
+    unknown : (size,) float
+        The solution.
+    """
+    largest = 0.0
+    for i in range(first, size):
+        system[i, size] = 0.0
+        largest = max(largest, abs(unknown[i]))
+    for _ in range(SWEEPS):
+        moved = 0.0
+        for i in range(first, size):
+            square = 0.0
+            for free in range(rank, size):
+                square += system[free, i] * system[free, i]
+            if presses[i - first] == 0 or square < NO_PIVOT:
+                continue
+            raised = max(-unknown[i] / square, -system[i, size])
+            if raised == 0.0:
+                continue
+            system[i, size] += raised
+            for free in range(rank, size):
+                along = raised * system[free, i]
+                for j in range(size):
+                    unknown[j] += along * system[free, j]
+            moved = max(moved, abs(raised) * square)
+        if moved <= ROUNDING * largest:
+            break
+    for i in range(first, size):
+        if presses[i - first] == 1 and 0.0 > unknown[i] > -100.0 * ROUNDING * largest:
+            unknown[i] = 0.0
 
 
 @dissolved_kernel

@@ -132,3 +132,14 @@ def test_a_check_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFi
     check("bridges", range(1, 3), out, 1)
     (first, *_) = capsys.readouterr().out.splitlines()
     assert first == "bridges: 1 of 2 scenes pass"
+
+
+def test_scenes_without_a_bridge_are_told_and_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bridges, "bridge_at", lambda *_: None)
+    result = bridges.bridges_of_scene("bridges", SEED)
+    assert not result["passes"]
+    good = result | {"seed": 11, "passes": True, "counts": True}
+    words = summary("bridges", [result, good])
+    assert words.startswith("bridges: 1 of 1 scenes pass")
+    assert "nothing to check in 1, not counted: 10" in words
+    assert summary("bridges", [result]) == "bridges: no scenes with anything to check"

@@ -10,9 +10,11 @@ import pytest
 import walking
 from scenes.event_judge import judge_events
 from scenes.methods import Setting
+from scenes.record import Rows
 from scenes.scene import random_scene
 
 import heelstrike as hs
+from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.sim import Event, EventKind, RunStatus, Simulation
 from heelstrike.sim.event_driven.bridge import MOST_BRIDGES
 
@@ -77,6 +79,21 @@ def test_how_wrong_a_bridge_may_be(begin: float) -> None:
     assert errors[1] <= 0.3 * errors[2]
 
 
+def test_what_a_bridge_in_free_fall_is_wrong_by() -> None:
+    """It falls with the velocity of its end, too far by ½ g h², and says exactly that."""
+    simulation = Simulation(
+        mechanisms.rimless_wheel(), state=hs.State([0.0, 3.0, 0.0], [0.0, 0.0, 0.0]),
+        method=hs.EventDriven(), stop_when_fallen=False,
+    )  # fmt: skip
+    simulation.advance(0.01)
+    length, phase = 1e-6 * 4.0**4, simulation._work
+    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    simulation.advance(0.0105)
+    (bridge,) = bridges(simulation.record)
+    assert bridge.impulse[0] == pytest.approx(length)
+    assert bridge.impulse[1] == pytest.approx(0.5 * 9.81 * length**2, rel=1e-6)
+
+
 def test_a_bridge_obeys_the_laws_and_is_kept_in_files(tmp_path: Path) -> None:
     run, _ = bridged(0.35, 2)
     assert len(bridges(run)) == 1
@@ -85,6 +102,54 @@ def test_a_bridge_obeys_the_laws_and_is_kept_in_files(tmp_path: Path) -> None:
     assert not [one for one in found.objections if "bridge" in one.law or "impact" in one.law]
     run.save(tmp_path / "run.nc")
     assert hs.load_run(tmp_path / "run.nc").events == run.events
+
+
+def test_who_carries_a_robot_that_slides_on_stiff_legs_does_not_flicker() -> None:
+    """Straight legs that coincide, at their stops, on two heels: one row too many.
+
+    Which heel carries how much turns the free ankle, by friction; the shortest forces that only
+    press decide it, not the rounding that elimination pivots on. The record shows these forces:
+    they explain how fast the ankle turns, to the second order of the time between rows.
+    """
+    robot, ground = hs.load_robot("walker2d"), hs.Ground(friction=0.5)
+    q = np.array([0.0, 0.0, 4.1, 0.0, 0.0, robot.model.upper[5], 0.0, 0.0, -0.7])
+    v = np.array([1.95, 0.0, -4.09, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    at = contact_kinematics(robot, q, v, ground)
+    q[1] -= at.gap.min()
+    v[1] -= at.velocity[np.argmin(at.gap), 0]
+    run = hs.simulate(
+        robot, state=hs.State(q, v), duration=0.01, method=hs.EventDriven(), ground=ground,
+        stop_when_fallen=False,
+    )  # fmt: skip
+    assert {event.kind for event in run.events} == {EventKind.SLIP}
+    assert run.contact_force[5, 0, 0] > 50.0
+    assert run.contact_force[5, 2, 0] > 50.0
+    rows = Rows(run, instants=True)
+    said = rows.metric.accelerated(rows.smooth + rows.contact_force())[5]
+    turned = (run.velocity[6] - run.velocity[4]) / (run.time[6] - run.time[4])
+    np.testing.assert_allclose(said, turned, rtol=1e-3, atol=1e-2)
+
+
+def test_points_on_two_steps_of_a_stair_are_no_group() -> None:
+    """A link that leans on the risers of two steps sticks there (a thousand bridges long, once)."""
+    run = Setting.of(random_scene(4018)).run("event_driven")
+    assert run.status is RunStatus.COMPLETED
+    assert not bridges(run)
+
+
+def test_a_jam_that_steps_get_no_nearer_to_ends_in_a_jump() -> None:
+    """Forces grow to a pole; the velocity jumps there, without a bridge that takes its place."""
+    run = Setting.of(random_scene(11334)).run("event_driven")
+    assert any(e.kind is EventKind.PAINLEVE and e.impulse[0] > 0.0 for e in run.events)
+    assert not bridges(run)
+
+
+def test_a_bridge_in_a_corner_has_the_frame_of_its_row() -> None:
+    """A disc between two faces: what is said of two bridges explains how velocities jump."""
+    setting = Setting.of(random_scene(11021))
+    run = setting.run("event_driven")
+    assert bridges(run)
+    assert "balance of an impact" not in judge_events(run).broken()
 
 
 def test_a_robot_that_no_bridge_helps_is_given_up_in_words() -> None:

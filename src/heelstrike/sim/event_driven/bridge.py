@@ -11,8 +11,8 @@ tells: what velocities at the end differ by from w is added to b, and the proble
 is pressed then is put on the ground by as little as the masses allow. A bridge is kept as short as
 suffices: each further one without progress is longer. The impulses act at its beginning, as those
 of an impact; then the robot moves on freely to its end, where a smooth phase begins again. Impulses
-that make energy are refused, with restitution first and then without. Two bridges of half the
-length tell how far a bridge may be wrong: its order is one.
+that make energy are refused, with restitution first and then without. Bridges of a half and of a
+quarter of the length tell how far a bridge may be wrong: its order is one.
 """
 
 from __future__ import annotations
@@ -68,12 +68,13 @@ CLOSING_SPEED = 20.0
 SETTLED = 1e-6
 # Approach (m/s) below which a bridge knows no restitution: bounces so small are what piled up.
 SLOW = 1e-3
-# The two halves of a bridge of order one are half as wrong as the whole, so that it is twice as
-# wrong as they are apart; and what puts its end on the ground afterwards, which they do not know
-# of, moves it up to as far again in most cases.
-SAFETY = 4.0
+# What a bridge of order one is wrong by grows with the square of its length: its halves together
+# are half as wrong as the whole, its quarters a quarter. So it is this many times as wrong as the
+# whole is apart from the halves, and as these are from the quarters; what these two estimates
+# differ by is how far the first may be wrong itself.
+FROM_HALVES, FROM_QUARTERS = 2.0, 4.0
 # Slopes of the step to come, where states can be kept until then.
-HERE, HALVED = 2, 3
+HERE, HALVED, QUARTERED = 2, 3, 4
 
 
 @kernel
@@ -369,20 +370,19 @@ def copy_state(source: Floats, state: Floats) -> None:
 
 
 @kernel
-def halves_end(
-    scene: Scene, length: float, bouncing: bool, control: Control, memory: Memory, phase: Phase,
-    end: Floats,
-) -> bool:  # fmt: skip
-    """Write where two bridges of half the length end; return whether there are such."""
+def end_of_parts(
+    scene: Scene, parts: int, length: float, bouncing: bool, control: Control, memory: Memory,
+    phase: Phase, end: Floats,
+) -> None:  # fmt: skip
+    """Write where so many bridges end that take some time together; where they begin without."""
     here = phase.slopes[HERE]
     copy_state(phase.begin, here)
     found = True
-    for _ in range(2):
-        found = found and find_impulses(scene, 0.5 * length, bouncing, control, memory, phase)
+    for _ in range(parts):
+        found = found and find_impulses(scene, length / parts, bouncing, control, memory, phase)
         copy_state(phase.end, phase.begin)
-    copy_state(phase.begin, end)
+    copy_state(phase.begin if found else here, end)
     copy_state(here, phase.begin)
-    return found
 
 
 @kernel
@@ -390,16 +390,19 @@ def find_bridge(
     scene: Scene, length: float, control: Control, memory: Memory, phase: Phase
 ) -> tuple[bool, float]:
     """Find a bridge of some length; return success, and how far its end may be wrong."""
-    other = phase.slopes[HALVED]
+    halved, quartered = phase.slopes[HALVED], phase.slopes[QUARTERED]
     for attempt in range(2):
         bouncing = attempt == 0
-        sure = halves_end(scene, length, bouncing, control, memory, phase, other)
+        end_of_parts(scene, 2, length, bouncing, control, memory, phase, halved)
+        end_of_parts(scene, 4, length, bouncing, control, memory, phase, quartered)
         if find_impulses(scene, length, bouncing, control, memory, phase):
-            wrong = 0.0
-            for i in range(other.shape[0]):
-                apart = phase.end[i] - (other[i] if sure else phase.begin[i])
-                wrong = max(wrong, SAFETY * abs(apart))
-            return True, wrong
+            wrong, doubt = 0.0, 0.0
+            for i in range(halved.shape[0]):
+                first = FROM_HALVES * (phase.end[i] - halved[i])
+                second = FROM_QUARTERS * (halved[i] - quartered[i])
+                wrong = max(wrong, abs(first))
+                doubt = max(doubt, abs(first - second))
+            return True, wrong + doubt
     return False, 0.0
 
 

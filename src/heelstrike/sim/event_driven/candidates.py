@@ -128,3 +128,13 @@ def share_redundant(
             phase.value[2 * contact] = 1.0
         if phase.holder[contact] == 1 and phase.value[2 * contact + 1] < 0.0:
             phase.value[2 * contact + 1] = 1.0
+
+
+@kernel
+def slides(count: int, friction: Floats, phase: Phase, assembly: Assembly) -> bool:
+    """Whether any of the candidates slides with friction."""
+    for place in range(count):
+        contact = assembly.candidate[place]
+        if phase.slide[contact] != 0 and friction[contact] > 0.0:
+            return True
+    return False

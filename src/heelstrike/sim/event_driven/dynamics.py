@@ -11,7 +11,7 @@ import math
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.dense import shorten, solve_to_rank
+from heelstrike.dynamics.dense import raise_to_zero, shorten, solve_to_rank
 from heelstrike.dynamics.kernels import forward_kinematics, link_velocities
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.robot.model import Floats, Integers, Model
@@ -267,6 +267,22 @@ def gather_closed(
 
 
 @kernel
+def list_pressing(size: int, count: int, memory: Memory, phase: Phase) -> None:
+    """Write to ``phase.column`` which unknown forces can press only.
+
+    These are the normal forces but for those of latches that hold.
+    """
+    for k in range(size):
+        place = phase.row[k] // 2
+        phase.column[k] = 1 if phase.row[k] % 2 == 0 and place < count else 0
+        if phase.column[k] == 1:
+            contact = memory.assembly.candidate[place]
+            for latch in range(memory.loops.held.shape[0]):
+                if memory.loops.held[latch] == 1 and phase.latch_stop[latch] == contact:
+                    phase.column[k] = 0
+
+
+@kernel
 def hold_by_saddle_point(
     size: int, count: int, model: Model, state: Floats, memory: Memory, phase: Phase
 ) -> None:
@@ -290,6 +306,8 @@ def hold_by_saddle_point(
             nv, nv + size, rank, saddle.scale, phase.lean, saddle.order, saddle.system,
             saddle.unknown,
         )  # fmt: skip
+        list_pressing(size, count, memory, phase)
+        raise_to_zero(nv, nv + size, rank, phase.column, saddle.system, saddle.unknown)
     saddle.needed = 1
     for i in range(nv):
         rate[i] = saddle.unknown[i]
@@ -343,6 +361,8 @@ def hold_closed(
     phase.deficient = 1 if rank < size else 0
     if phase.deficient == 1:
         shorten(0, size, rank, phase.scale, phase.lean, phase.column, phase.system, phase.unknown)
+        list_pressing(size, count, memory, phase)
+        raise_to_zero(0, size, rank, phase.column, phase.system, phase.unknown)
     for i in range(size):
         impulse[phase.row[i]] += phase.unknown[i]
         if phase.lean[i] != 0.0:

@@ -9,6 +9,7 @@ from heelstrike.sim.contacts.dry_friction import dry_force
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.contacts.loops import note_loops, rows_of
 from heelstrike.sim.controller.control import Control
+from heelstrike.sim.event_driven.candidates import slides
 from heelstrike.sim.event_driven.corners import record_corner
 from heelstrike.sim.event_driven.dormand_prince import SLOPES, interpolate
 from heelstrike.sim.event_driven.dynamics import (
@@ -22,7 +23,7 @@ from heelstrike.sim.event_driven.location import TOGETHER, shortest_step
 from heelstrike.sim.event_driven.phase import Phase
 from heelstrike.sim.event_driven.saddle_point import solve_accelerations
 from heelstrike.sim.frame import Scene
-from heelstrike.sim.memory import Memory
+from heelstrike.sim.memory import Assembly, Memory
 from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_residual, note_row
 
@@ -66,6 +67,24 @@ def put_right(scene: Scene, state: Floats, memory: Memory, phase: Phase) -> bool
 
 
 @kernel
+def show_who_carries(count: int, friction: Floats, phase: Phase, assembly: Assembly) -> None:
+    """Let the answer be the forces that the motion follows, where others would lead to another.
+
+    That is where equations leave open who carries what and something slides: friction hangs on it.
+    """
+    if not slides(count, friction, phase, assembly):
+        return
+    for place in range(count):
+        contact = assembly.candidate[place]
+        if phase.value[2 * contact] < 0.0 or phase.value[2 * contact + 1] < 0.0:
+            return
+    for place in range(count):
+        contact = assembly.candidate[place]
+        for k in range(2):
+            assembly.answer.impulse[2 * place + k] = phase.force[contact, k]
+
+
+@kernel
 def write_row(
     scene: Scene, time: float, state: Floats, lawful: bool, control: Control, memory: Memory,
     phase: Phase, record: Record,
@@ -98,6 +117,8 @@ def write_right(
     elif count + loops > 0:
         solve_accelerations(count, model, trial, memory, phase)
         note_residual(residual, memory.tally)
+        if loops == 0 and phase.deficient == 1:
+            show_who_carries(count, memory.surface.friction, phase, assembly)
         note_loops(model, count + loops, impulse, memory.loops)
     row, friction_torque = record.rows, record.friction_torque[record.rows]
     note_row(time, memory, record)
