@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import signal
 import stat
 import subprocess
 import sys
@@ -133,9 +134,14 @@ def test_a_script_waits_until_it_is_interrupted(monkeypatch: pytest.MonkeyPatch)
 def test_an_interrupt_closes_it_and_is_not_lost() -> None:
     pytest.importorskip("websockets")
     viewer = hs.watch(walking.walk(steps=1), browser=False, block=False)
-    timer = threading.Timer(0.3, interrupt_main)
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        viewer.wait()
-    timer.join()
+    # A suite in the background of a script inherits interrupts that are ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        timer = threading.Timer(0.3, interrupt_main)
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            viewer.wait()
+        timer.join()
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert viewer.closed
