@@ -56,6 +56,7 @@ from heelstrike.sim.event_driven.location import (
     GAP_NOISE,
     TOGETHER,
     integrate,
+    longest_turn,
     shortest_step,
 )
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
@@ -872,6 +873,8 @@ def move(
             clock.time = stop
             end_bounces(model, phase, record)
             return DONE
+        turn = longest_turn(model, memory.equations.tree.motion, phase.begin)
+        phase.next_length = min(phase.next_length, turn)
         wish = phase.longest if phase.bridging == 1 else min(phase.next_length, phase.longest)
         if clock.forked == 0 and stop == clock.until and phase.time + 1.0001 * wish >= stop:
             clock.forked = 1
