@@ -111,9 +111,7 @@ def test_linkages_are_judged_by_what_their_loops_do(method: Any, judge: Any) -> 
 def test_a_latch_explains_no_force_of_a_stop_that_is_not_touched() -> None:
     """Not even next to the end at which it would hold; what it does hold there is left in peace."""
     build = hs.RobotBuilder("gate")
-    build.hinge(
-        "hinge", None, mass=1.0, inertia=0.02, center_of_mass=(0, -0.5), limits=(-1.0, 0.3)
-    )
+    build.hinge("hinge", None, mass=1.0, inertia=0.02, center_of_mass=(0, -0.5), limits=(-1.0, 0.3))
     build.latch("hinge", "upper")
     robot = build.build()
     run = hs.simulate(
