@@ -78,7 +78,7 @@ class Rows:
             self.acting = self.along(self.poses.jacobian(model.contact_link, acts))
         self.matrix = self.poses.mass_matrix()
         self.metric = Metric(self.matrix)
-        self.ties = JudgedTies(run, self.poses, self.metric)
+        self.ties = JudgedTies(run, self.poses, self.metric, instants=instants)
         self.speed = rates(self.jacobian, self.v)
         self.smooth = -self.poses.bias_force(self.v)
         self.smooth -= model.damping * self.v + model.stiffness * (self.q - model.rest)

@@ -36,8 +36,9 @@ MOVING = 1e-3
 """Speed (rad/s, m/s) from which a brake slips; smoothed friction creeps below it."""
 ATTEMPTS, CLOSED = 8, 1e-13
 """Newton steps that put positions back on the ties, and how far (m, rad) these are from it then."""
-AT_THE_END = 1e-3
-"""Distance (rad, m) from its end up to which a latch may hold."""
+AT_THE_END, IN_STEPS = 1e-6, 1e-3
+"""Distance (rad, m) from its end up to which a latch may hold: at an instant, and in a record whose
+rows tell what is done until the next, or whose stops give way."""
 
 
 class JudgedTies:
@@ -63,7 +64,7 @@ class JudgedTies:
         What a scheme of time stepping adds to the diagonal of the mass matrix.
     """
 
-    def __init__(self, run: Any, poses: Any, metric: Metric) -> None:
+    def __init__(self, run: Any, poses: Any, metric: Metric, *, instants: bool) -> None:
         model, q = run.robot.model, run.position
         self.run, self.metric, self.tree = run, metric, poses.tree
         self.added = np.zeros(q.shape[1])
@@ -79,7 +80,8 @@ class JudgedTies:
                 self.held[:, joint] = run.brake_torque[:, brake] != 0.0
         for joint, side in zip(model.latch_joint, model.latch_side, strict=True):
             end = model.upper[joint] if side > 0 else model.lower[joint]
-            self.latched[:, joint] |= np.abs(q[:, joint] - end) <= AT_THE_END
+            near = AT_THE_END if instants else IN_STEPS
+            self.latched[:, joint] |= np.abs(q[:, joint] - end) <= near
         self.any = bool(self.along.shape[1] or len(model.brake_joint) or len(model.latch_joint))
 
     def force(self, jacobian: Array | None = None) -> Array:

@@ -106,3 +106,22 @@ def test_linkages_are_judged_by_what_their_loops_do(method: Any, judge: Any) -> 
     strength = 40.0 if isinstance(method, hs.Compliant) else 1.01
     assert "balance" in found(loop_force=strength * run.loop_force).broken()
     assert "balance" in found(brake_torque=10.0 * strength * run.brake_torque).broken()
+
+
+def test_a_latch_explains_no_force_of_a_stop_that_is_not_touched() -> None:
+    """Not even next to the end at which it would hold; what it does hold there is left in peace."""
+    build = hs.RobotBuilder("gate")
+    build.hinge("hinge", None, mass=1.0, inertia=0.02, center_of_mass=(0, -0.5), limits=(-1.0, 0.3))
+    build.latch("hinge", "upper")
+    robot = build.build()
+    run = hs.simulate(
+        robot, state=robot.state({"hinge": 0.2999}, {"hinge": 1.0}), duration=0.01,
+        method=hs.EventDriven(), stop_when_fallen=False,
+    )  # fmt: skip
+    assert np.all(run.stop_torque[-3:] > 0.0)  # it would fall back, but for the latch
+    assert not judge_events(run).objections
+    for torque in (-1.0, 1.0):
+        pushed = run.stop_torque.copy()
+        pushed[0] = torque
+        broken = judge_events(dataclasses.replace(run, stop_torque=pushed)).broken()
+        assert any("stop: force without touch" in law for law in broken)

@@ -182,3 +182,25 @@ def test_bridges_and_impacts_of_one_instant_balance(seed: int, duration: float) 
     run = setting.run("event_driven", duration=duration)
     assert run.status is RunStatus.COMPLETED
     assert not setting.judge("event_driven", run).objections
+
+
+def test_what_slides_under_a_torque_that_switches_does_not_jam_forever() -> None:
+    """Steps as short as before a pole of the forces, and nothing that a jump could end."""
+    build = hs.RobotBuilder("slider")
+    cart = build.slide(
+        "z", build.slide("x", None, direction=(1, 0), mass=0.0), direction=(0, 1), mass=2.0
+    )
+    build.contact(cart, (0.0, 0.0))
+    build.hinge("arm", cart, at=(0.0, 0.1), mass=0.5, inertia=0.01, torque=1e3)
+
+    @hs.controller
+    def switch(t, state, contacts, robot, torque):  # type: ignore[no-untyped-def]
+        torque[0] = -800.0 * np.tanh(1e12 * state.v[2])
+
+    run = hs.simulate(
+        build.build(), switch(), state=hs.State([0.0, 0.0, 0.3], [3.0, 0.0, 1e-9]), duration=2e-8,
+        method=hs.EventDriven(), ground=hs.Ground(friction=0.3), stop_when_fallen=False,
+    )  # fmt: skip
+    assert run.completed
+    assert len(bridges(run)) == 1
+    assert sum(event.kind is EventKind.PAINLEVE for event in run.events) < 20

@@ -134,3 +134,54 @@ def test_a_step_ends_at_a_row_inside_it_only() -> None:
     assert is_inside(0.3004, 0.3, 1e-3)
     assert not is_inside(0.1 * 3, 0.3, 1e-3)
     assert not is_inside(0.3 + 0.9995e-3, 0.3, 1e-3)
+
+
+def thrown(radius: float, speed: float, profile: list[list[float]]) -> hs.Run:
+    builder = hs.RobotBuilder("puck")
+    disc = builder.floating_base("puck", mass=1.0, inertia=0.01)
+    builder.contact(disc, (0.0, 0.0), radius=radius)
+    return hs.simulate(
+        builder.build(), state=hs.State([0.0, 0.06, 0.0], [speed, 0.3, 0.0]), duration=0.035,
+        method=hs.EventDriven(), ground=hs.Ground(profile=profile), stop_when_fallen=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("radius", "speed"), [(0.001, 20.0), (0.01, 10.0), (0.05, 20.0)])
+def test_a_disc_does_not_go_through_a_thin_wall_between_two_samples(
+    radius: float, speed: float
+) -> None:
+    """It is on both sides of a wall of 5 mm at its foot, and nowhere near it at any sample."""
+    wall = [[-5.0, 0.0], [0.3, 0.0], [0.3025, 0.1], [0.305, 0.0], [5.0, 0.0]]
+    run = thrown(radius, speed, wall)
+    assert run.certificates.penetration <= 1e-10
+    height = 0.06 + 0.3 * run.events[0].time - 0.5 * GRAVITY * run.events[0].time ** 2
+    slant = np.hypot(1.0, 0.0025 / 0.1)  # of the wall's face, off which the centre is a radius
+    reached = 0.3 + 0.0025 / 0.1 * height - radius * slant
+    assert speed * run.events[0].time == pytest.approx(reached, abs=1e-9)
+
+
+def test_a_point_that_passes_many_faces_between_two_samples_is_stopped_by_the_last() -> None:
+    """Over the teeth of a comb, 2 mm each, to one that is longer: 41 faces in a sample's time."""
+    teeth = [[0.1 + 0.004 * i, 0.0 if i % 2 == 0 else 0.055] for i in range(101)]
+    teeth[41][1] = 0.1
+    run = thrown(0.0, 20.0, [[-5.0, 0.0], *teeth, [5.0, 0.0]])
+    assert run.certificates.penetration <= 1e-10
+    assert 20.0 * run.events[0].time == pytest.approx(0.2625, abs=5e-4)
+
+
+def test_the_tip_of_what_spins_fast_is_not_in_the_ground_between_two_samples() -> None:
+    """A rod of 0.4 m in free fall, 70 turns a second: its smooth motion would allow any step."""
+    builder = hs.RobotBuilder("rod")
+    rod = builder.floating_base("rod", mass=1.0, inertia=0.01)
+    for end in (-0.2, 0.2):
+        builder.contact(rod, (end, 0.0))
+    run = hs.simulate(
+        builder.build(), state=hs.State([0.0, 0.64, 1.2], [0.0, 0.0, 450.0]), duration=0.32,
+        method=hs.EventDriven(), stop_when_fallen=False,
+    )  # fmt: skip
+    low = lambda t: 0.64 - 0.5 * GRAVITY * t**2 - 0.2 * abs(np.sin(1.2 + 450.0 * t))  # noqa: E731
+    times = np.linspace(0.0, 0.32, 320001)
+    inside = int(np.argmax(low(times) < 0.0))
+    assert run.events[0].time == pytest.approx(
+        brentq(low, times[inside - 1], times[inside], xtol=1e-15), abs=1e-9
+    )

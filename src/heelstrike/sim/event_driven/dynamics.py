@@ -179,7 +179,7 @@ def watch_geometry(
     """Event functions that need no forces: gaps of open points, speeds of what slides, corners.
 
     That of a point that is let pass below the ground is its depth. On ground with corners the
-    second rate of an open point bounds how fast it moves.
+    second rate of an open point bounds how fast it moves, or the centre of its disc.
     """
     value, rate, corners = phase.value, phase.rate, has_corners(ground)
     if corners:
@@ -207,7 +207,9 @@ def watch_geometry(
             value[2 * contact] = side * contacts.gap[contact]
             rate[2 * contact] = side * normal
             if corners:
-                rate[2 * contact + 1] = abs(normal) + abs(tangent)
+                spin = tree.velocity[model.contact_link[contact], 0]
+                rolls = abs(model.contact_radius[contact] * spin)
+                rate[2 * contact + 1] = abs(normal) + abs(tangent) + rolls
         elif phase.slide[contact] != 0 and phase.group[contact] == contact:
             value[2 * contact + 1] = phase.slide[contact] * tangent
 

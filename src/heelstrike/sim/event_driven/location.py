@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.robot.model import Floats
-from heelstrike.sim.contacts.faces import nearest_face
+from heelstrike.robot.model import Floats, Model
+from heelstrike.sim.contacts.faces import center_of, nearest_face
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.event_driven.dormand_prince import (
     NODES,
@@ -65,11 +65,14 @@ SOONEST = 1e-8
 LOW, SOON = 1e-5, 1e-6
 # How many faces and corners a point may pass between two samples; part of the way to the first
 # sample after which it is told over which it is; a radius with which corners are faces, too.
-MOST_FACES = 6
+MOST_FACES = 64
 AT_ONCE = 1e-3
 A_DISC = 1.0
 # How much a step is shortened whose end does not fit its constraints.
 SHORTENED = 0.25
+# Angle (rad) by which links may turn in a step. What turns freely makes no error however long the
+# step is, and its points would be in the ground and out of it between two samples.
+TURN = 4.0
 
 # Shortest step as a multiple of the rounding of time.
 SHORTEST_STEP = 8.0
@@ -317,18 +320,17 @@ def crossing(
 
 
 @kernel
-def may_turn(function: int, span: float, radius: Floats, phase: Phase) -> bool:
-    """Whether a point might have been in the ground beside a corner, between two samples of it.
+def may_turn(function: int, span: float, points: int, phase: Phase) -> bool:
+    """Whether a point might have been in the ground between two samples, over another face.
 
-    No gap changes faster than the point moves. Of a disc, whose centre is off the ground, no gap
-    has a kink below which it could dip.
+    No gap changes faster than the point moves, or the centre of a disc.
     """
     contact = function // 2
-    if function % 2 == 1 or contact >= radius.shape[0] or phase.closed[contact] == 1:
+    if function % 2 == 1 or contact >= points or phase.closed[contact] == 1:
         return False
     speed = phase.before_rate[function + 1] + phase.sample_rate[function + 1]
     way = phase.before[function] + phase.sample[function]
-    return bool(radius[contact] == 0.0 and way <= span * speed)
+    return bool(way <= span * speed)
 
 
 @kernel
@@ -338,7 +340,7 @@ def face_within(
 ) -> int:  # fmt: skip
     """Face, or corner, of the ground that an open point is nearest to at a fraction of the step."""
     evaluate_within(scene, part, length, False, control, memory, phase)
-    x, z = memory.contacts.position[contact, 0], memory.contacts.position[contact, 1]
+    x, z = center_of(scene.model, memory.contacts, contact)
     return int(nearest_face(scene.ground, x, z, A_DISC))
 
 
@@ -368,7 +370,8 @@ def crossing_by_faces(
     """Fraction of the step at which an open point reaches ground whose nearest face changes.
 
     Its gap has kinks there, and is smooth in between. That of a point in the ground can be deepest
-    at one. Where it begins on the ground, as on a corner, a moment later tells over which face.
+    at one, as in a thin wall that it would go through. Where it begins on the ground, as on a
+    corner, a moment later tells over which face.
     """
     before, before_rate = phase.before[function], phase.before_rate[function]
     value, rate = phase.sample[function], phase.sample_rate[function]
@@ -450,7 +453,7 @@ def first_event(
         for i in range(functions):
             phase.fired[i] = 0
             span, root = (high - low) * length, NO_EVENT
-            if corners and may_turn(i, span, scene.model.contact_radius, phase):
+            if corners and may_turn(i, span, scene.model.nc, phase):
                 root = crossing_by_faces(scene, i, low, high, length, control, memory, phase)
             elif may_cross(i, span, phase):
                 root = crossing(scene, i, low, high, length, control, memory, phase)
@@ -549,6 +552,15 @@ def look_back(scene: Scene, control: Control, memory: Memory, phase: Phase) -> N
     """Evaluate the beginning of the step again."""
     evaluate(scene, phase.time, phase.begin, control, memory, phase, phase.slopes[0])
     copy_events(phase.value, phase.rate, phase.before, phase.before_rate)
+
+
+@kernel
+def longest_turn(model: Model, motion: Floats, state: Floats) -> float:
+    """Length (s) of a step in which no link turns by more than is looked at."""
+    speed = 0.0
+    for i in range(model.nv):
+        speed += abs(motion[i, 0] * state[model.nq + i])
+    return TURN / speed if speed > 0.0 else np.inf
 
 
 @kernel

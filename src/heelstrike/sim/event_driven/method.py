@@ -56,6 +56,7 @@ from heelstrike.sim.event_driven.location import (
     GAP_NOISE,
     TOGETHER,
     integrate,
+    longest_turn,
     shortest_step,
 )
 from heelstrike.sim.event_driven.modes import adopt_modes, form_groups, report_modes
@@ -849,13 +850,15 @@ def move_over(
 def jam(model: Model, phase: Phase) -> bool:
     """Leave it to a jump of the velocity to end forces that grow without bound before a pole.
 
-    Only a sliding point has such; returns whether there is one.
+    Only a sliding point has such; returns whether there is one. Where steps are as short for
+    another reason, as under a torque that switches, no jump ends it however often it is tried.
     """
     for contact in range(model.nc):
         if phase.slide[contact] != 0:
             phase.jammed = 1
             phase.undecided = 1
-    return phase.jammed == 1
+    phase.burst += 1
+    return phase.jammed == 1 and phase.burst <= INSISTENT
 
 
 @kernel
@@ -872,6 +875,8 @@ def move(
             clock.time = stop
             end_bounces(model, phase, record)
             return DONE
+        turn = longest_turn(model, memory.equations.tree.motion, phase.begin)
+        phase.next_length = min(phase.next_length, turn)
         wish = phase.longest if phase.bridging == 1 else min(phase.next_length, phase.longest)
         if clock.forked == 0 and stop == clock.until and phase.time + 1.0001 * wish >= stop:
             clock.forked = 1
@@ -879,8 +884,7 @@ def move(
         if phase.bridging == 1:
             return move_over(scene, stop, control, memory, phase, record, clock)
         if not integrate(scene, stop, control, memory, phase):
-            phase.burst += 1
-            if not jam(model, phase) or phase.burst > INSISTENT:
+            if not jam(model, phase):
                 phase.bridging = 1
             phase.next_length = 1e-6
             return DONE
