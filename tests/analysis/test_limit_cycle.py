@@ -361,12 +361,26 @@ def test_a_walk_that_does_not_keep_step_with_its_samples() -> None:
             listens(), ground=hs.Ground(friction=3.0, slope=-slope), control_period=0.1,
             afresh=False,
         )  # fmt: skip
+    with pytest.raises(hs.LimitCycleError, match=r"between two steps of the method, every 0.001 s"):
+        hs.find_limit_cycle(
+            mechanisms.rimless_wheel(inertia=inertia, gravity=gravity), wheel_state(slope, speed),
+            ground=hs.Ground(friction=3.0, slope=-slope), method=hs.TimeStepping(), afresh=False,
+        )  # fmt: skip
 
 
 def test_arguments_of_controllers_that_begin_afresh() -> None:
     robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
-    with pytest.raises(hs.SimulationError, match="landing is of controllers that begin afresh"):
-        hs.find_limit_cycle(robot, state, landing=[0], afresh=False)
+    for points in ([0], np.array([0, 1])):
+        with pytest.raises(hs.SimulationError, match="landing is of controllers that begin afresh"):
+            hs.find_limit_cycle(robot, state, landing=points, afresh=False)  # type: ignore[arg-type]
     kept = hs.Simulation(robot, state=state).snapshot()
     with pytest.raises(hs.SimulationError, match="afresh=False it goes on from a Snapshot"):
         hs.find_limit_cycle(robot, kept)
+
+
+@pytest.mark.parametrize("afresh", [True, False])
+def test_how_long_and_how_closely_it_searches(afresh: bool) -> None:
+    robot, state = mechanisms.compass_gait(), compass_state(-0.2, 0.34, 1.05, 0.35)
+    for wrong in ({"max_iterations": -1}, {"tolerance": 0.0}, {"tolerance": float("nan")}):
+        with pytest.raises(hs.SimulationError, match="max_iterations must not be negative and the"):
+            hs.find_limit_cycle(robot, state, afresh=afresh, **wrong)  # type: ignore[arg-type]

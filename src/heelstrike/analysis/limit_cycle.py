@@ -189,12 +189,20 @@ def find_limit_cycle(
     Where the order of contacts is different for different disturbances - a flat foot comes down
     heel first or toe first - the map has a kink: multipliers are then those of a mean of its sides.
     """
+    if max_iterations < 0 or not tolerance > 0.0:
+        raise SimulationError(
+            "max_iterations must not be negative and the tolerance positive; got "
+            f"{max_iterations!r}, {tolerance!r}"
+        )
     ground = Ground() if ground is None else ground
     method = EventDriven(rtol=1e-12, atol=1e-13) if method is None else method
     if not afresh:
-        given = {"memory": memory, "relabelled": relabelled, "landing": landing}
-        for name, value in (given | {"symmetry": symmetry}).items():
-            if value:
+        given = {
+            "memory": len(memory) > 0, "relabelled": relabelled is not None,
+            "landing": landing is not None, "symmetry": symmetry is not None,
+        }  # fmt: skip
+        for name, told in given.items():
+            if told:
                 raise SimulationError(
                     f"{name} is of controllers that begin afresh at every touchdown; without "
                     "afresh all memory is carried and no leg relabelled"

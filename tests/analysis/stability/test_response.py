@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 import heelstrike as hs
-from heelstrike.analysis.stability.loop import steps_of
+from heelstrike.analysis.stability.loop import ClosedLoop, steps_of
 from heelstrike.analysis.stability.response import step_duration
+from heelstrike.dynamics import contact_positions
 from heelstrike.experiments.passive import METHOD, passive_walk
 from heelstrike.sim.closed_sets import EventKind
 
@@ -139,6 +140,12 @@ def test_what_there_is_to_doubt() -> None:
     assert twice.error < 1e-5
 
 
+@pytest.mark.parametrize(("name", "returns"), [("shove", 2), ("push", 0)])
+def test_what_it_tells_nothing_of(name: str, returns: int) -> None:
+    with pytest.raises(hs.SimulationError, match=r"after push.*; got"):
+        measured().after(name, returns)
+
+
 def test_multipliers_are_those_of_the_walk() -> None:
     _, cycle = compass()
     values = np.sort_complex(np.linalg.eigvals(measured().A))
@@ -191,3 +198,22 @@ def test_a_step_is_from_foot_to_foot() -> None:
     run.events = events[3:5]
     with pytest.raises(hs.LimitCycleError, match="two steps"):
         step_duration(run)
+
+
+def test_a_foot_that_rocks_as_a_walk_is_taken_up_takes_no_step() -> None:
+    """In the middle of a step one foot stands: that it touches again is no touchdown of a step."""
+    robot = hs.load_robot("bravo7")
+    state = robot.reference_state()
+    loop = ClosedLoop(robot, None, state, method=None, ground=None, control_period=None)
+    assert loop._stands(state) is None  # both do
+    for lifted, foot in enumerate(robot.feet):
+        q = state.q.copy()
+        q[foot.link - 2] += 0.3  # its hip: it is lifted by a centimetre
+        assert contact_positions(robot, q)[list(foot.contacts), 1].min() > 0.01
+        assert loop._stands(hs.State(q, state.v)) == 1 - lifted
+    kind = EventKind.TOUCHDOWN
+    down = [(0.25, robot.feet[1]), (0.35, robot.feet[0]), (1.05, robot.feet[1])]
+    events: Any = [
+        SimpleNamespace(time=time, contact=foot.contacts[0], kind=kind) for time, foot in down
+    ]
+    assert steps_of(robot, events, 0.0, 1) == [(0.35, 0), (1.05, 1)]

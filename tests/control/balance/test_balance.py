@@ -173,7 +173,7 @@ def test_it_stands_still() -> None:
     assert contact_positions(robot, simulation.state.q)[:, 1] == pytest.approx(0.0, abs=1e-4)
 
 
-@pytest.mark.parametrize(("impulse", "steps"), [(15.0, False), (-15.0, False), (60.0, True)])
+@pytest.mark.parametrize(("impulse", "steps"), [(15.0, False), (-16.0, False), (60.0, True)])
 def test_pushed_as_it_stands_it_stands_again(impulse: float, steps: bool) -> None:
     """Without a step as long as the sole is long enough for the capture point."""
     robot = walking.bravo7()
@@ -276,6 +276,27 @@ def test_a_foot_on_its_heel_has_the_cone_of_the_ground_under_it() -> None:
     ahead, upwards, _ = on.wrench @ program.x + on.load
     assert upwards > 0.5 * simulation.parameters.weight
     assert 0.0 < ahead < 0.6 * upwards
+
+
+@pytest.mark.parametrize("height", [-0.5e-3, -1.5e-3])
+def test_a_wall_beside_a_toe_is_no_ground_under_it(height: float) -> None:
+    """Just beyond an edge the nearest ground is the riser: its cone would bear no weight."""
+    robot, begin = walking.bravo7(), walking.gait().initial_state
+    foot = robot.feet[walking.gait().stance_foot]
+    q = begin.q.copy()
+    q[foot.link] += robot.model.axis[foot.link, 0] * 0.3  # on its toe
+    heel, toe = sorted(contact_positions(robot, q)[list(foot.contacts)], key=lambda end: end[0])
+    assert toe[1] < heel[1] - 0.02
+    q[1] += height - toe[1]
+    edge = toe[0] - 0.5e-3
+    ground = hs.Ground(profile=[[-9.0, 0.0], [edge, 0.0], [edge, -0.06], [9.0, -0.06]])
+    state = hs.State(q, np.zeros(robot.nv))
+    simulation = hs.Simulation(robot, law(), state=state, ground=ground)
+    simulation.advance(0.001)
+    program, on = simulation.memory.program, simulation.memory.on
+    ahead, upwards, _ = on.wrench @ program.x + on.load
+    assert upwards > 0.0
+    assert abs(ahead) < upwards
 
 
 def test_it_logs_what_it_plans() -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import is_wheel
 from heelstrike.contact.ground import Ground
+from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -39,6 +40,9 @@ REBOUND = 0.3
 
 SAME = 1e-9
 """Times (s) that differ by less are one."""
+
+STANDS = 1e-4
+"""A foot that is lifted by less than this (m) stands."""
 
 FEW_ROWS = 10**9
 
@@ -186,15 +190,21 @@ class ClosedLoop:
         """What comes down as one: the points of a foot, or every spoke by itself."""
         return foot_of(self.robot, contact)
 
+    def _stands(self, state: State) -> int | None:
+        """Tell which foot stands, if it is one."""
+        gap = contact_kinematics(self.robot, state.q, state.v, self.ground).gap
+        feet = {self.foot(int(i)) for i in np.flatnonzero(gap <= STANDS)}
+        return feet.pop() if len(feet) == 1 else None
+
     def _landings(self, wanted: int, longest: float) -> list[tuple[float, int]]:
         """When which foot first touched the ground, of the first so many steps."""
         simulation = self.fresh()
-        begin = simulation.time
+        begin, stands = simulation.time, self._stands(simulation.state)
         while True:
-            before = len(steps_of(self.robot, whole(simulation.record).events, begin))
+            before = len(steps_of(self.robot, whole(simulation.record).events, begin, stands))
             doing = f"the undisturbed walk ends after {before} steps, {wanted} are needed"
             self.advanced(simulation, simulation.time + longest, doing)
-            steps = steps_of(self.robot, whole(simulation.record).events, begin)
+            steps = steps_of(self.robot, whole(simulation.record).events, begin, stands)
             if len(steps) >= wanted:
                 return steps
             if len(steps) == before:
@@ -204,11 +214,14 @@ class ClosedLoop:
                 )
 
 
-def steps_of(robot: Robot, events: Sequence[Event], begin: float) -> list[tuple[float, int]]:
+def steps_of(
+    robot: Robot, events: Sequence[Event], begin: float, stands: int | None = None
+) -> list[tuple[float, int]]:
     """When which foot touched the ground first, however often it bounced or rocked then.
 
     A foot may rock long after it has come down, and the other at the impact of this one: a step is
-    one by another foot, some time later.
+    one by another foot, some time later. At the beginning it is another than the one that stands
+    then, if that is known.
     """
     landings = [
         (event.time, foot_of(robot, event.contact))
@@ -220,8 +233,8 @@ def steps_of(robot: Robot, events: Sequence[Event], begin: float) -> list[tuple[
     alone = len({foot_of(robot, contact) for contact in range(robot.nc)}) == 1
     steps: list[tuple[float, int]] = []
     for time, foot in landings:
-        last, stands = steps[-1] if steps else (begin, None)
-        if time - last > apart and (alone or foot != stands):
+        last, standing = steps[-1] if steps else (begin, stands)
+        if time - last > apart and (alone or foot != standing):
             steps.append((time, foot))
     return steps
 

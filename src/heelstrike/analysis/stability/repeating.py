@@ -203,8 +203,9 @@ def _why_not(
     )
     ahead = abs(_ahead(section, walk))
     if loop.grid > 0.0 and ahead > BETWEEN * loop.grid:
+        of = "steps of the method" if loop.controller is None else "calls of its controller"
         return (
-            f"{told}, as it comes back {ahead:.3g} s between two calls of its controller, every "
+            f"{told}, as it comes back {ahead:.3g} s between two {of}, every "
             f"{loop.grid:.3g} s: it does not keep step with them. hs.floquet_multipliers tells how "
             "errors of such walks die"
         )

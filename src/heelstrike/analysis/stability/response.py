@@ -188,7 +188,17 @@ class DisturbanceResponse:
         -------
         (returns, l) float
             Changes of the indicators.
+
+        Raises
+        ------
+        SimulationError
+            If there is no such disturbance, or no return.
         """
+        if name not in self.disturbances or returns < 1:
+            raise SimulationError(
+                f"of at least one return after {' or '.join(self.disturbances)}; got {name!r}, "
+                f"{returns!r}"
+            )
         place = self.disturbances.index(name)
         seen, error = [self.D[:, place]], self.B[:, place]
         for _ in range(returns - 1):

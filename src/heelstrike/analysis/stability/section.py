@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.poincare_map import RANK_TOLERANCE, derivative
-from heelstrike.analysis.stability.loop import ClosedLoop, Walk
+from heelstrike.analysis.stability.loop import STANDS, ClosedLoop, Walk
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.dynamics import loop_displacement, loop_jacobian
@@ -24,9 +24,6 @@ Floats = NDArray[np.float64]
 
 TOUCHING, AT_REST = 1e-6, 1e-6
 """Gap (m) and speed (m/s) of a contact point that stands."""
-
-STANDS = 1e-4
-"""A foot that is lifted by less than this (m) stands."""
 
 TURNED = 10.0
 """m/s²: over a fixed step a standing point's Jacobian turns, and by so much of it its speed with

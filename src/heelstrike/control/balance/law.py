@@ -232,7 +232,8 @@ def press_where_it_touches(
 
     A foot on its heel alone is turned down gently by a pressure a little before the heel; torques
     that are right for a sole that lies flat would throw it about. Returned is how far what the
-    foot stands on is inclined: as its sole, or as the ground under the only end that touches.
+    foot stands on is inclined: as its sole, or as the ground under the only end that touches, if
+    that can be stood upon.
     """
     planning, plan = parameters.planning, memory.plan
     least, most, under = inf, -inf, tilt
@@ -242,7 +243,8 @@ def press_where_it_touches(
             z = contacts.position[i, 1] - memory.sole[1]
             along = x * cos(tilt) - z * sin(tilt)
             least, most = min(least, along), max(most, along)
-            under = atan2(contacts.normal[i, 0], contacts.normal[i, 1])
+            if contacts.normal[i, 1] > STEEP:  # else a wall beside it is nearest
+                under = atan2(contacts.normal[i, 0], contacts.normal[i, 1])
     if most != least:
         return tilt
     if memory.stands == 1:
