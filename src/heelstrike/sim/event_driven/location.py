@@ -320,17 +320,18 @@ def crossing(
 
 
 @kernel
-def may_turn(function: int, span: float, points: int, phase: Phase) -> bool:
+def may_turn(function: int, span: float, radius: Floats, phase: Phase) -> bool:
     """Whether a point might have been in the ground between two samples, over another face.
 
-    No gap changes faster than the point moves, or the centre of a disc.
+    No gap changes faster than the point moves, or the centre of a disc; and a disc goes through
+    nothing while it moves by less than a quarter of its radius.
     """
     contact = function // 2
-    if function % 2 == 1 or contact >= points or phase.closed[contact] == 1:
+    if function % 2 == 1 or contact >= radius.shape[0] or phase.closed[contact] == 1:
         return False
     speed = phase.before_rate[function + 1] + phase.sample_rate[function + 1]
     way = phase.before[function] + phase.sample[function]
-    return bool(way <= span * speed)
+    return bool(way <= span * speed and span * speed > 0.5 * radius[contact])
 
 
 @kernel
@@ -453,7 +454,7 @@ def first_event(
         for i in range(functions):
             phase.fired[i] = 0
             span, root = (high - low) * length, NO_EVENT
-            if corners and may_turn(i, span, scene.model.nc, phase):
+            if corners and may_turn(i, span, scene.model.contact_radius, phase):
                 root = crossing_by_faces(scene, i, low, high, length, control, memory, phase)
             elif may_cross(i, span, phase):
                 root = crossing(scene, i, low, high, length, control, memory, phase)
