@@ -31,14 +31,9 @@ def test_a_fall_has_no_objections(run: hs.Run) -> None:
 
 
 def test_a_run_cut_short_does_not_arrive(run: hs.Run) -> None:
-    short = {
-        name: getattr(run, name)[:-5]
-        for name in ("time", "position", "velocity", "torque", "gap", "contact_force")
-    }
-    short |= {
-        name: getattr(run, name)[:-5]
-        for name in ("contact_point", "contact_normal", "stop_torque", "friction_torque")
-    }
+    rows = """time position velocity torque gap contact_force contact_point contact_normal stop_torque
+    friction_torque brake_torque loop_force coupling_force"""
+    short = {name: getattr(run, name)[:-5] for name in rows.split()}
     assert "does not arrive" in broken(run, **short)
 
 
