@@ -189,6 +189,12 @@ class CompliantWorkspace(Bundle):
         Seconds between two samples; tolerated errors of a step, relative and absolute.
     proposed : float
         Length of the next step as far as accuracy allows (s).
+    patience : int
+        Tries of the steps of a sample after which torques of a law that switches are held.
+    held_since, held_for, held_wrong : float
+        When that began within the sample (s), for how long in all (s), and the most that the
+        torques' next jump would have changed an acceleration by, times how long they were held
+        (m/s, rad/s).
     row : int
         Row of the record for this sample, -1 for none.
     """
@@ -233,6 +239,10 @@ class CompliantWorkspace(Bundle):
     rtol: float = number(float)
     atol: float = number(float)
     proposed: float = cell(float)
+    patience: int = cell(int)
+    held_since: float = cell(float)
+    held_for: float = cell(float)
+    held_wrong: float = cell(float)
     row: int = cell(int)
 
 
@@ -506,7 +516,7 @@ def tangent_gains(friction: FrictionForces, contact: int, g: float) -> tuple[flo
 
 @kernel
 def factorize_step(
-    model: Model, control: Control, g: float, command: Floats, work: CompliantWorkspace
+    model: Model, control: Control, g: float, held: bool, command: Floats, work: CompliantWorkspace
 ) -> None:
     """Factorise the linear system of all stages of a step of length g / γ."""
     nv = model.parent.shape[0]
@@ -517,7 +527,7 @@ def factorize_step(
             by_q[i, j] = 0.0
         system[i, i] += g * (model.damping[i] - (base.stop.by_speed[i] + base.dry_by_speed[i]))
         by_q[i, i] = base.stop.by_gap[i] - model.stiffness[i]
-    if control.continuous == 1:
+    if control.continuous == 1 and not held:
         for i in range(model.actuator_joint.shape[0]):
             joint = model.actuator_joint[i]
             for j in range(nv):
@@ -660,16 +670,22 @@ def attempt_step(
     ground: GroundModel,
     time: float,
     h: float,
+    held: bool,
     memory: Memory,
     work: CompliantWorkspace,
 ) -> float:
-    """Go from the start of the step, at `time`, to its end; return the error over the tolerance."""
+    """Go from the start of the step, at `time`, to its end; return the error over the tolerance.
+
+    A controller that acts continuously is asked within it, unless its torques are `held`.
+    """
     rtol, atol, now, base = work.rtol, work.atol, work.now, work.base
     how = DECIDED if h <= DECISIVE else TRIED
+    if held:
+        how = HELD
     nv = model.parent.shape[0]
     nc = work.corners.sides
     g = GAMMA * h
-    factorize_step(model, control, g, memory.command, work)
+    factorize_step(model, control, g, held, memory.command, work)
     for stage in range(STAGES):
         if stage > 0:
             for i in range(nv):
