@@ -885,7 +885,8 @@ def decide(
     if work.impact.relaxed == 1:
         note_wedge(model, clock.time, memory, work.impact, record)
     first = record.events
-    note_events(model, clock.time, work.step, memory, record)
+    end = clock.start + (clock.index + 1) * work.step
+    note_events(model, clock.time, end, work.step, memory, record)
     react(model, first, memory.q, record, memory.loops)
     share_friction(
         model, memory.breakaway, memory.reaction.friction_torque, memory.loops.brake_force
