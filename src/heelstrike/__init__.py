@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
+    from heelstrike.errors import SimulationWarning as SimulationWarning
     from heelstrike.errors import ViewError as ViewError
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
@@ -184,6 +185,7 @@ _HOME = {
     "Sensed": "heelstrike.control",
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
+    "SimulationWarning": "heelstrike.errors",
     "Snapshot": "heelstrike.sim",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",

@@ -333,6 +333,15 @@ class Run:
         return self.status is RunStatus.COMPLETED
 
     @property
+    def doubt(self) -> str:
+        """Why the run may mean little though it was completed; empty if nothing is known."""
+        if not len(self.time):
+            return ""
+        begun = max(0.0, -float(self.gap[0].min(initial=0.0)))
+        sunk = self.certificates.penetration - begun
+        return "; ".join(self.method.doubts(self.robot, self.position[0], sunk))
+
+    @property
     def final_state(self) -> State:
         """State of the last row."""
         return State(self.position[-1], self.velocity[-1])

@@ -14,6 +14,7 @@ from scenes.record import Rows
 from scenes.scene import random_scene
 
 import heelstrike as hs
+from heelstrike import dynamics
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.sim import Event, EventKind, RunStatus, Simulation
 from heelstrike.sim.event_driven.bridge import MOST_BRIDGES
@@ -92,6 +93,24 @@ def test_what_a_bridge_in_free_fall_is_wrong_by() -> None:
     (bridge,) = bridges(simulation.record)
     assert bridge.impulse[0] == pytest.approx(length)
     assert bridge.impulse[1] == pytest.approx(0.5 * 9.81 * length**2, rel=1e-6)
+
+
+def test_loops_hold_at_the_end_of_a_bridge() -> None:
+    """Their rows turn on the way: velocities behind it would tear at them by ½ h J̇ v."""
+    robot = mechanisms.four_bar()
+    simulation = Simulation(
+        robot, state=robot.closed(hs.State([0.5, 0.0, 0.0], [4.0, 0.0, 0.0]), keep=["crank"]),
+        method=hs.EventDriven(), stop_when_fallen=False,
+    )  # fmt: skip
+    simulation.advance(0.01)
+    phase, length = simulation._work, 1e-6 * 4.0**4
+    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    simulation.advance(0.01 + length)
+    run = simulation.record
+    assert len(bridges(run)) == 1
+    q, v = run.position[-1], run.velocity[-1]
+    assert np.abs(dynamics.loop_displacement(robot, q)).max() <= 1e-11
+    assert np.abs(dynamics.loop_jacobian(robot, q) @ v).max() <= 1e-6
 
 
 def test_a_bridge_obeys_the_laws_and_is_kept_in_files(tmp_path: Path) -> None:

@@ -64,6 +64,9 @@ from heelstrike.sim.push import add_pushes
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
 # They only steer the linear systems: their error costs steps, not accuracy.
 PERTURBATION = 1e-6
+# A torque that changes so much (of itself, and N m) is asked for again nearer by: as far away as
+# this part of the perturbation it is a jump if it changes by more than half of that, and no gain.
+STEEP, NEARER = 1e-2, 0.1
 
 # Steps for which the gains of a controller are taken to last, as long as none fails.
 GAINS_LAST = 20
@@ -289,6 +292,15 @@ def try_command(
 
 
 @kernel
+def is_steep(gains: Floats, j: int, torque: Floats) -> bool:
+    """Whether a torque changes so much with coordinate j that it may have jumped."""
+    for i in range(torque.shape[0]):
+        if PERTURBATION * abs(gains[i, j]) > STEEP * (1.0 + abs(torque[i])):
+            return True
+    return False
+
+
+@kernel
 def find_gains(
     controller: Any, control: Control, time: float, model: Model, memory: Memory,
     work: CompliantWorkspace,
@@ -296,7 +308,8 @@ def find_gains(
     """Derivatives of the controller's torques at the start of the step, by differences.
 
     The smaller of the differences to either side: where the torque jumps, as when a controller
-    changes its mind, the other would be the jump over the perturbation.
+    changes its mind, the other would be the jump over the perturbation. Where it jumps to both
+    sides, as ``sign`` at zero, it has no gain.
     """
     for j in range(model.parent.shape[0]):
         memory.q[j] = work.base_q[j]
@@ -320,6 +333,15 @@ def find_gains(
                     slope = (torque[i] - memory.torque[i]) / change
                     if side == 0 or abs(slope) < abs(gains[i, j]):
                         gains[i, j] = slope
+            if is_steep(gains, j, memory.torque):
+                varied[j] = kept + NEARER * PERTURBATION
+                forward_kinematics(model, memory.q, memory.equations.tree)
+                link_velocities(model, memory.v, memory.equations.tree)
+                command, torque = work.trial_command, work.trial_torque
+                try_command(controller, control, time, model, memory, command, torque)
+                for i in range(gains.shape[0]):
+                    if abs(torque[i] - memory.torque[i]) > 0.5 * PERTURBATION * abs(gains[i, j]):
+                        gains[i, j] = 0.0
             varied[j] = kept
     work.age = 0
 

@@ -8,11 +8,12 @@ does not ask for modes. At its end, contacts that touch must not approach, other
 
 with a_f the acceleration that the known forces lead to. The rows turn on the way, by more than J̇ v
 tells: what velocities at the end differ by from w is added to b, and the problem solved again. What
-is pressed then is put on the ground, and loops are closed, by as little as the masses allow. A bridge is kept as short as
-suffices: each further one without progress is longer. The impulses act at its beginning, as those
-of an impact; then the robot moves on freely to its end, where a smooth phase begins again. Impulses
-that make energy are refused, with restitution first and then without. Bridges of a half and of a
-quarter of the length tell how far a bridge may be wrong: its order is one.
+is pressed then is put on the ground, and loops are closed, by as little as the masses allow. A
+bridge is kept as short as suffices: each further one without progress is longer. The impulses act
+at its beginning, as those of an impact; then the robot moves on freely to its end, where a smooth
+phase begins again. Impulses that make energy are refused, with restitution first and then without.
+Bridges of a half and of a quarter of the length tell how far a bridge may be wrong: its order is
+one.
 """
 
 from __future__ import annotations

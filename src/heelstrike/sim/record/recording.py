@@ -80,8 +80,9 @@ def note_events(
 
     It ends at `end`, which is the `time` of the next step to the last bit: what a step ends with
     comes before what the next begins with. An impulse closes a contact by the end of the step; a
-    gap opens it at the start of a step. Points that already stand on the ground when the run begins do not touch down, and joints that
-    rest at a stop do not reach it. Joints with dry friction come to rest, or begin to move.
+    gap opens it at the start of a step. Points that already stand on the ground when the run begins
+    do not touch down, and joints that rest at a stop do not reach it. Joints with dry friction come
+    to rest, or begin to move.
     """
     first = record.events
     for contact in range(model.contact_link.shape[0]):

@@ -40,9 +40,10 @@ from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import SimulationError
+from heelstrike.errors import SimulationError, SimulationWarning
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import note_brakes, share_friction, take_hold
@@ -82,6 +83,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
+from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
@@ -113,6 +115,8 @@ CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
 # The same for joint stops (rad/s or m/s).
 CLOSING_RATE = 20.0
+# Contact points deeper in the ground (m) than this, and than the run began, put it in doubt.
+SUNK = 1e-2
 
 
 class Stepping(Bundle):
@@ -236,6 +240,22 @@ class TimeStepping(Method):
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
                 f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
             )
+        stiff = self._too_stiff(setting.robot, setting.state.q)
+        if stiff:
+            warn(stiff, SimulationWarning)
+
+    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:
+        """Say what is too stiff or too light, and how deep a step ended in the ground."""
+        deep = (
+            f"a step ended with a contact point {sunk:.2g} m in the ground: it turned too far in a "
+            f"step of {self.step:g} s, which has to be shorter"
+        )
+        found = (self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "")
+        return [doubt for doubt in found if doubt]
+
+    def _too_stiff(self, robot: Robot, q: Floats) -> str:
+        implicit = self.scheme in (Scheme.MOREAU_JEAN, Scheme.LINEARLY_IMPLICIT)
+        return "" if implicit else too_stiff(robot, q, self.step)
 
 
 @dissolved_kernel
