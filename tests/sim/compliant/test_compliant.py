@@ -218,8 +218,9 @@ def switched_arm(step: float) -> hs.Run:
 def test_a_law_that_switches_to_and_fro_is_crossed_and_the_run_says_so() -> None:
     """Where v = −4 q attracts from both sides q decays as exp(−4 t), whatever the masses.
 
-    They begin on it, where the law asks for nothing. Torques are held for a hundredth of a sample, and everything is wrong by that in the first
-    order. Followed, each millisecond took a million steps.
+    They begin on it, where the law asks for nothing. Torques are held for a hundredth of a sample,
+    and everything is wrong by that in the first order. Followed, each millisecond took a million
+    steps.
     """
     errors = []
     for step in (2e-3, 1e-3):
@@ -234,7 +235,6 @@ def test_a_law_that_switches_to_and_fro_is_crossed_and_the_run_says_so() -> None
         assert 0.0 < np.abs(off).max() <= wrong <= 100.0 * step
         exact = np.exp(-4.0 * run.time)[:, None] * run.position[0]
         errors.append(np.abs(run.position - exact).max())
-    print(errors, told[-3:])
     assert errors[1] <= 0.6 * errors[0] <= 0.6e-2, errors
 
 
