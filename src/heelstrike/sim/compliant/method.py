@@ -80,9 +80,10 @@ BRIDGE = int(EventKind.BRIDGE)
 # Shortest step in s. It is taken whatever its error: only a torque that jumps asks for less, and a
 # jump of 1000 rad/s² over so short a time is 1e-7 rad/s.
 SHORTEST = 1e-10
-# Under a controller that changes its mind to and fro such steps would not end. After so many tries
-# within a sample, and from then on so many, its torques are held for this part of a sample.
-PATIENCE, IMPATIENCE = 400, 40
+# Under a controller that changes its mind to and fro such steps would not end (a sample with hard
+# impacts takes some hundreds). After so many tries within a sample its torques are held for this
+# part of it; in the next one after so many, and after twice as many in each that held none.
+PATIENCE, IMPATIENCE = 5000, 40
 HELD_PART = 0.01
 SAFETY = 0.9
 SHRINK = 0.2
@@ -306,7 +307,8 @@ def sample(
         tries += 1
         shortest = taken <= SHORTEST
         if not (error <= 1.0 or (shortest and error < np.inf)):
-            if tries > work.patience and not held and taken <= HELD_PART * span:
+            brief = not held and taken <= HELD_PART * span
+            if brief and control.continuous == 1 and tries > work.patience:
                 held_from = elapsed
                 held_until = min(elapsed + HELD_PART * span, span)
                 h = held_until - elapsed
@@ -357,7 +359,7 @@ def sample(
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
     work.proposed = min(h, span)
-    work.patience = IMPATIENCE if work.held_for > 0.0 else PATIENCE
+    work.patience = IMPATIENCE if work.held_for > 0.0 else min(2 * work.patience, PATIENCE)
     finish_sample(model, memory, work)
     return DONE
 
