@@ -281,7 +281,22 @@ class UnknownMethod:
     impulses_in_events: bool = False
 
     def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
-        """Nothing is known of it."""
+        """Say nothing: nothing is known of it.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        q : (nq,) float
+            A pose that it goes through.
+        sunk : float
+            How much deeper (m) in the ground it was than at the beginning.
+
+        Returns
+        -------
+        list of str
+            None.
+        """
         return []
 
 
