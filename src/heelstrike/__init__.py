@@ -96,7 +96,6 @@ if TYPE_CHECKING:
     from heelstrike.errors import RobotError as RobotError
     from heelstrike.errors import RunFileError as RunFileError
     from heelstrike.errors import SimulationError as SimulationError
-    from heelstrike.errors import SimulationWarning as SimulationWarning
     from heelstrike.errors import ViewError as ViewError
     from heelstrike.errors import WriteError as WriteError
     from heelstrike.experiments.comparison import compare as compare
@@ -125,6 +124,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import RunStatus as RunStatus
     from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import Simulation as Simulation
+    from heelstrike.sim import SimulationWarning as SimulationWarning
     from heelstrike.sim import Snapshot as Snapshot
     from heelstrike.sim import TimeStepping as TimeStepping
     from heelstrike.sim import load_run as load_run
@@ -185,7 +185,7 @@ _HOME = {
     "Sensed": "heelstrike.control",
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
-    "SimulationWarning": "heelstrike.errors",
+    "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",

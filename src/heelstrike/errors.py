@@ -1,4 +1,4 @@
-"""Errors and warnings a user can meet, each worded for a person: what, where, and what to do."""
+"""Errors a user can meet, each worded for a person: what was wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -29,10 +29,6 @@ class ContactProblemError(HeelstrikeError, ValueError):
 
 class SimulationError(HeelstrikeError, ValueError):
     """The arguments of a simulation are not usable (before anything is simulated)."""
-
-
-class SimulationWarning(UserWarning):
-    """A simulation begins, but what comes out of it may mean little."""
 
 
 class LimitCycleError(HeelstrikeError, RuntimeError):

@@ -23,6 +23,10 @@ from heelstrike.robot.robot import Robot
 EASIEST = 3e7
 
 
+class SimulationWarning(UserWarning):
+    """A simulation begins, but what comes out of it may mean little."""
+
+
 def stiffest(robot: Robot, q: Floats, step: float) -> tuple[float, str]:
     """Return how stiff the springs and dampers are for a step, and the joint that swings most.
 

@@ -40,7 +40,7 @@ from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
-from heelstrike.errors import SimulationError, SimulationWarning
+from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.warning import warn
@@ -83,7 +83,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
-from heelstrike.sim.time_stepping.doubts import too_light, too_stiff
+from heelstrike.sim.time_stepping.doubts import SimulationWarning, too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
