@@ -31,6 +31,7 @@ from heelstrike.robot.files.urdf import (
     missing_moments,
     translate_dialects,
     urdf_text,
+    weigh_no_shapes,
 )
 from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.robot import LockedJoint
@@ -251,6 +252,8 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False
+    if urdf:
+        weigh_no_shapes(spec)
     if urdf or file.massless:
         let_massless_links_pass(spec)
         let_thin_meshes_pass(spec)
