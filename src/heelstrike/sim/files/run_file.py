@@ -25,19 +25,23 @@ from heelstrike.sim.files.robot_dataset import robot_to_dataset
 from heelstrike.sim.files.seal import seal, seal_holds
 from heelstrike.sim.files.settings import unreadable
 from heelstrike.sim.files.stored_run import stored_run
+from heelstrike.sim.files.table import to_csv
 from heelstrike.sim.run import Run
 from heelstrike.whole_file import write_whole
 
+NETCDF, TABLE = ".nc", ".csv"
+"""Endings of the names of files that runs are written to."""
+
 
 def save(run: Run, path: str | os.PathLike[str]) -> Path:
-    """Write a run as NetCDF. The file appears whole or not at all.
+    """Write a run as NetCDF, or as a table of text. The file appears whole or not at all.
 
     Parameters
     ----------
     run : Run
         The run.
     path : str or path
-        File to write, by custom ``.nc``; an existing one is replaced.
+        File to write, ``.nc`` or ``.csv``; an existing one is replaced.
 
     Returns
     -------
@@ -47,10 +51,13 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     RunFileError
-        If the folder does not exist, cannot be written to or is full, or the method is one that
-        could not be read again. The run is as it was, and so is an older file.
+        If the name ends otherwise, the folder does not exist, cannot be written to or is full, or
+        the method is one that could not be read again. The run is as it was, and so is an older
+        file.
     """
     kept = "the run is still in memory, to be saved elsewhere"
+    if check_run_file(path) == TABLE:
+        return _written(path, to_csv(run), kept)
     if reason := unreadable(run.method):
         raise RunFileError(
             f"cannot write {path}: a run by {type(run.method).__name__} could not be read again: "
@@ -67,8 +74,31 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
         raise RunFileError(
             f"cannot write {path}: {type(error).__name__}: {error}; {kept}"
         ) from error
+    return _written(path, image.getbuffer(), kept)
+
+
+def check_run_file(path: str | os.PathLike[str]) -> str:
+    """Return the ending of the name of a file for a run; refuse it if nothing is written so.
+
+    Raises
+    ------
+    RunFileError
+        With the endings there are.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise RunFileError(f"a run is written to a file, as 'walk.nc'; this is {path!r}")
+    ending = Path(path).suffix.lower()
+    if ending not in (NETCDF, TABLE) and not Path(path).is_dir():
+        raise RunFileError(
+            f"cannot write {path}: the name of a run ends in {NETCDF} (NetCDF, which load_run reads) "
+            f"or {TABLE} (a table of text, for other programs)"
+        )
+    return ending
+
+
+def _written(path: str | os.PathLike[str], content: str | memoryview, kept: str) -> Path:
     try:
-        return write_whole(path, image.getbuffer())
+        return write_whole(path, content)
     except WriteError as error:
         raise RunFileError(f"{error}; {kept}") from error
 
@@ -135,6 +165,10 @@ def load_run(
             raise RunFileError(f"there is no file {source}")
         if not source.is_file():
             raise RunFileError(f"{source}: not a run of heelstrike: it is not a regular file")
+        if source.suffix.lower() == TABLE:
+            raise RunFileError(
+                f"{source} is a table, which does not hold robot and ground; load the {NETCDF} file"
+            )
         sealed = seal_holds(source)
     except RunFileError:
         raise
