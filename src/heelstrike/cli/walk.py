@@ -34,6 +34,7 @@ from heelstrike.cli.terminal import (
     wrote,
 )
 from heelstrike.cli.values import ground_called, pushes_called
+from heelstrike.errors import HeelstrikeError
 
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle
@@ -206,7 +207,9 @@ def _save(results: Results, run: Run, gait: Gait | None, animation: Animation) -
             wrote(*results.written)
     for each in saved:
         if each.error is not None:
-            complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
+            ours = isinstance(each.error, HeelstrikeError)
+            reason = str(each.error) if ours else f"{type(each.error).__name__}: {each.error}"
+            complain(f"{each.path} could not be made: {reason}")
     return saved
 
 
