@@ -102,7 +102,7 @@ def test_a_misspelt_name_suggests_the_nearest(wrong: str, right: str) -> None:
 
 
 def test_a_name_like_no_other_suggests_nothing() -> None:
-    with pytest.raises(AttributeError, match="has no attribute 'xyzzy'$"):
+    with pytest.raises(AttributeError, match=r"has no attribute 'xyzzy'$"):
         heelstrike.xyzzy  # noqa: B018
     assert not hasattr(heelstrike, "_timestepping")
 

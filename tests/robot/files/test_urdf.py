@@ -220,7 +220,7 @@ def test_a_file_that_asks_for_the_mass_of_shapes_gets_it() -> None:
 def test_a_leg_that_has_lost_its_mass_is_refused() -> None:
     with (
         pytest.warns(RobotWarning, match="left_leg has a <collision>"),
-        pytest.raises(RobotError, match="moves no mass.*or make it a fixed joint"),
+        pytest.raises(RobotError, match=r"moves no mass.*or make it a fixed joint"),
     ):
         read_mjcf(without_inertial(biped(joint("planar")), "left_leg"))
 

@@ -27,10 +27,15 @@ from heelstrike.sim.files.settings import unreadable
 from heelstrike.sim.files.stored_run import stored_run
 from heelstrike.sim.files.table import to_csv
 from heelstrike.sim.run import Run
-from heelstrike.whole_file import write_whole
+from heelstrike.whole_file import check_target, write_whole
 
 NETCDF, TABLE = ".nc", ".csv"
-"""Endings of the names of files that runs are written to."""
+KEPT = "the run is still in memory, to be saved elsewhere"
+ENDINGS = {
+    NETCDF: "NetCDF, which load_run reads",
+    TABLE: "a table of text, for other programs",
+}
+"""Endings of the names of files that runs are written to, and what these are."""
 
 
 def save(run: Run, path: str | os.PathLike[str]) -> Path:
@@ -55,52 +60,60 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
         the method is one that could not be read again. The run is as it was, and so is an older
         file.
     """
-    kept = "the run is still in memory, to be saved elsewhere"
     if check_run_file(path) == TABLE:
-        return _written(path, to_csv(run), kept)
+        return _written(path, to_csv(run))
     if reason := unreadable(run.method):
         raise RunFileError(
             f"cannot write {path}: a run by {type(run.method).__name__} could not be read again: "
-            f"{reason}; {kept}, as run.to_dataset() or array by array"
+            f"{reason}; {KEPT}, as run.to_dataset() or array by array"
         )
     try:
         # HDF5 crashes on a disk that is full. In memory it never meets one.
         image = _image(run)
     except MemoryError as error:
         raise RunFileError(
-            f"cannot write {path}: no memory left to make the file in; {kept}"
+            f"cannot write {path}: no memory left to make the file in; {KEPT}"
         ) from error
     except Exception as error:  # names that NetCDF cannot hold, arrays of other shapes
         raise RunFileError(
-            f"cannot write {path}: {type(error).__name__}: {error}; {kept}"
+            f"cannot write {path}: {type(error).__name__}: {error}; {KEPT}"
         ) from error
-    return _written(path, image.getbuffer(), kept)
+    return _written(path, image.getbuffer())
 
 
-def check_run_file(path: str | os.PathLike[str]) -> str:
+def check_run_file(path: str | os.PathLike[str], *endings: str) -> str:
     """Return the ending of the name of a file for a run; refuse it if nothing is written so.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    *endings : str
+        Those that it may have, by default all that there are.
 
     Raises
     ------
     RunFileError
-        With the endings there are.
+        With the endings that it may have, or why there can be no such file.
     """
     if not isinstance(path, str | os.PathLike):
         raise RunFileError(f"a run is written to a file, as 'walk.nc'; this is {path!r}")
+    try:
+        check_target(path)
+    except WriteError as error:
+        raise RunFileError(f"{error}; {KEPT}") from error
     ending = Path(path).suffix.lower()
-    if ending not in (NETCDF, TABLE) and not Path(path).is_dir():
-        raise RunFileError(
-            f"cannot write {path}: the name of a run ends in {NETCDF} (NetCDF, which load_run reads) "
-            f"or {TABLE} (a table of text, for other programs)"
-        )
+    if ending not in (endings or ENDINGS):
+        known = " or ".join(f"{each} ({ENDINGS[each]})" for each in endings or ENDINGS)
+        raise RunFileError(f"cannot write {path}: the name of a run ends in {known}")
     return ending
 
 
-def _written(path: str | os.PathLike[str], content: str | memoryview, kept: str) -> Path:
+def _written(path: str | os.PathLike[str], content: str | memoryview) -> Path:
     try:
         return write_whole(path, content)
     except WriteError as error:
-        raise RunFileError(f"{error}; {kept}") from error
+        raise RunFileError(f"{error}; {KEPT}") from error
 
 
 def _image(run: Run) -> io.BytesIO:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -48,10 +48,10 @@ def to_csv(run: Run) -> str:
         if each.dims[:1] != ("time",):
             continue
         labels = [_labels(data, dim, size) for dim, size in zip(each.dims, each.shape, strict=True)]
-        unit = each.attrs.get("units", "")
+        unit, of = each.attrs.get("units", ""), str(each.dims[1]) if each.ndim > 1 else ""
         for place in np.ndindex(each.shape[1:]):
             words = [str(name), *(labels[k][i] for k, i in enumerate(place, start=1))]
-            its = _unit_of(unit, run.robot, each.dims[1:2], place)
+            its = _unit_of(unit, run.robot, of, place)
             headings.append(" ".join(words) + (f" [{its}]" if its not in ("", "1") else ""))
             columns.append(each.values[(slice(None), *place)].tolist())
     text = io.StringIO()
@@ -62,22 +62,22 @@ def to_csv(run: Run) -> str:
     return text.getvalue()
 
 
-def _labels(data: Any, dim: str, size: int) -> Sequence[str]:
+def _labels(data: Any, dim: Hashable, size: int) -> Sequence[str]:
     """What counts along a dimension, which may have numbers only."""
     return list(map(str, data[dim].values if dim in data.coords else range(size)))
 
 
-def _unit_of(unit: str, robot: Robot, dims: Sequence[str], place: Sequence[int]) -> str:
+def _unit_of(unit: str, robot: Robot, of: str, place: Sequence[int]) -> str:
     """Unit of a number of a joint, where hinges and slides have their own: ``m or rad``."""
     model = robot.model
-    joints = {
+    joints: dict[str, Sequence[int]] = {
         "coordinate": range(robot.nj),
-        "coupling": model.coupling_joint[:, 0],
-        "brake": model.brake_joint,
+        "coupling": model.coupling_joint[:, 0].tolist(),
+        "brake": model.brake_joint.tolist(),
     }
-    if " or " not in unit or not dims or dims[0] not in joints:
+    if " or " not in unit or of not in joints:
         return unit
-    turns = bool(model.axis[joints[dims[0]][place[0]], 0])
+    turns = bool(model.axis[joints[of][place[0]], 0])
     return next(one for one in unit.split(" or ") if (one in OF_HINGES) is turns)
 
 
