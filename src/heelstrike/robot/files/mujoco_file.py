@@ -21,7 +21,11 @@ from heelstrike.robot.files.options import Options
 from heelstrike.robot.files.ros.xacro import expanded
 from heelstrike.robot.files.screening.screening import Screened, screen
 from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
-from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
+from heelstrike.robot.files.screening.urdf_check import (
+    check_urdf,
+    check_urdf_tree,
+    refuse_macros,
+)
 from heelstrike.robot.files.screening.xml_tree import xml_text
 from heelstrike.robot.files.sdf.translation import as_mjcf
 from heelstrike.robot.files.urdf import (
@@ -138,6 +142,7 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
         with _warnings_into(remarks):
             urdf = xml.tag == "robot"
             if urdf:
+                refuse_macros(xml, label)
                 translate_dialects(xml)
             if urdf and not options.lenient:
                 check_urdf(xml, label)

@@ -83,20 +83,13 @@ def check_urdf(root: Element, label: str) -> None:
     Raises
     ------
     RobotError
-        For numbers that are none, negative masses and the like, names given twice, and macros that
-        nobody expanded.
+        For numbers that are none, negative masses and the like, and names given twice.
 
     Warns
     -----
     RobotWarning
         Of unknown elements and attributes, and joints without the limits that URDF wants.
     """
-    for element in root.iter():
-        if element.tag.startswith("xacro:"):
-            raise RobotError(
-                f"{label}: <{element.tag}> is a macro of xacro, so this is not a URDF file yet. "
-                "Load it with xacro=True, if you trust it: expanding a macro runs what it says."
-            )
     for kind in ("link", "joint"):
         counts = Counter(element.get("name", "") for element in root.iterfind(kind))
         twice = [name for name, count in counts.items() if count > 1]
@@ -119,6 +112,22 @@ def check_urdf(root: Element, label: str) -> None:
         shown = "; ".join(strange[:SHOWN])
         more = f"; and {len(strange) - SHOWN} more" if len(strange) > SHOWN else ""
         warn(f"{label}: this URDF may not say what is meant: {shown}{more}.")
+
+
+def refuse_macros(root: Element, label: str) -> None:
+    """Refuse a file whose macros nobody expanded.
+
+    Raises
+    ------
+    RobotError
+        With the macro, and how it is expanded.
+    """
+    for element in root.iter():
+        if element.tag.startswith("xacro:"):
+            raise RobotError(
+                f"{label}: <{element.tag}> is a macro of xacro, so this is not a URDF file yet. "
+                "Load it with xacro=True, if you trust it: expanding a macro runs what it says."
+            )
 
 
 def check_urdf_tree(root: Element, label: str) -> None:
