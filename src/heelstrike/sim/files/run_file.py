@@ -13,6 +13,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, WriteError
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset
@@ -138,6 +139,7 @@ def _image(run: Run) -> io.BytesIO:
     return image
 
 
+@takes(RunFileError)
 def load_run(
     path: str | os.PathLike[str], robot: Robot | None = None, classes: Sequence[type] = ()
 ) -> Run:
