@@ -71,7 +71,7 @@ def _is_several(value: object) -> bool:
 
 
 def _are_items(value: object) -> bool:
-    return isinstance(value, Iterable) and not isinstance(value, (str, bytes))
+    return isinstance(value, Iterable) and not isinstance(value, bytes)  # one name, too
 
 
 _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {

@@ -61,8 +61,6 @@ class Push:
         object.__setattr__(self, "force", _pair("force", self.force))
         if self.point is not None:
             object.__setattr__(self, "point", _pair("point", self.point))
-        if isinstance(self.link, bool) or not isinstance(self.link, str | int | np.integer):
-            raise SimulationError(f"a push acts on a link, by its name or index; got {self.link!r}")
         for name, lowest in (("start", -np.inf), ("duration", 0.0)):
             value = getattr(self, name)
             number = isinstance(value, float | int | np.number) and np.isfinite(value)
