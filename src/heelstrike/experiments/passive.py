@@ -81,8 +81,8 @@ def passive_walk(robot: Robot, ground: Ground) -> LimitCycle:
     except LimitCycleError as error:
         raise LimitCycleError(
             f"no walk of {robot.name!r} was found that repeats on a slope of "
-            f"-{np.rad2deg(descent):.4g} degrees with friction {friction:g}: {error} There is one "
-            f"on {_ground_for(robot)}, with friction 0.75."
+            f"-{np.rad2deg(descent):.4g} degrees with friction {friction:g}: "
+            f"{str(error).rstrip('.')}. There is one on {_ground_for(robot)}, with friction 0.75."
         ) from error
 
 
