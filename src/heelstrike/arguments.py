@@ -38,7 +38,6 @@ INSTEAD = {
     "Push": "hs.Push(link, force=(fx, fz), start=..., duration=...) makes one",
     "Trial": "hs.Trial(robot=..., controller=..., state=...) makes one",
     "Run": "hs.simulate(...) or hs.load_run(file) makes one",
-    "Scheme": "hs.Scheme names them",
 }
 """How to come by what is wanted, by the name of its class."""
 
