@@ -256,6 +256,8 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
             f"{label}: {', '.join(strange)} have collision shapes that are none, or of a kind that "
             "heelstrike does not know; they are left out."
         )
+    # An ornament whose mesh is not there is told of already.
+    weightless = [name for name in weightless if name not in missing or name not in ornaments]
     if weightless:
         have, weigh = ("has", "it weighs") if len(weightless) == 1 else ("have", "they weigh")
         warn(
