@@ -36,9 +36,8 @@ def solve_contact_kernel(
 ) -> int:
     """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
 
-    The modes of the answer are tried first. Unless their certificate is clean, the solvers in
-    ``order`` are called in turn until one is certified and clean; an answer that is certified
-    but not clean stands if those after it do no better, and does not count as a fallback.
+    The modes of the answer are tried first. Unless their answer is certified and contradicts none
+    of them, the solvers in ``order`` are called in turn until one is certified.
 
     Parameters
     ----------

@@ -93,8 +93,10 @@ class Tally(Bundle):
     ----------
     iterations, solver, last_fallbacks : int
         Iterations of all solvers; code of the one that succeeded; how many failed before it.
-    solves, shortcuts, fallbacks, failures : int
-        ``shortcuts`` are the solves answered by the modes that were guessed.
+    solves, shortcuts, fallbacks, failures, combinations, relaxed : int
+        ``shortcuts`` are the solves answered by the modes that were guessed; ``combinations`` those
+        that went on to the last resort; ``relaxed`` those that ask for less than a problem without
+        a solution did, which the caller counts.
     """
 
     iterations: int = cell(int)
@@ -104,6 +106,8 @@ class Tally(Bundle):
     shortcuts: int = cell(int)
     fallbacks: int = cell(int)
     failures: int = cell(int)
+    combinations: int = cell(int)
+    relaxed: int = cell(int)
 
 
 class Yardstick(Bundle):

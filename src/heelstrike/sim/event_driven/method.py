@@ -320,7 +320,7 @@ def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Recor
     for contact in range(phase.watched):
         phase.hit[contact] = 0
         phase.plastic[contact] = phase.closed[contact]
-    solved, _ = collide(model, nudge, memory, phase, phase.begin)
+    solved, _, _ = collide(model, nudge, memory, phase, phase.begin)
     for contact in range(phase.watched):
         phase.plastic[contact] = 0
     for contact in range(phase.first_dry):
