@@ -233,6 +233,12 @@ def _advice(run: Run, gait: Gait | None, limits: tuple[Limit, ...]) -> Iterator[
             f"{run.solver.failures} contact problems have no certified solution: try another "
             "solver or a smaller step before believing this run."
         )
+    if run.certificates.energy_gain > 0.0:
+        yield (
+            f"restitution with friction made {run.certificates.energy_gain:.3g} J in impacts "
+            "(Kane's paradox; events ENERGY_GAIN): less restitution or friction, or "
+            "TimeStepping(bounded_restitution=True), which scales restitution back there."
+        )
     if run.status is RunStatus.DIVERGED:
         yield "Numbers grew beyond all bounds: a smaller time step, or smaller gains."
     first = limits[0] if limits else None
