@@ -20,9 +20,8 @@ friction (Kane's paradox): that is measured, and told by an event::
 
     Δ(½ vᵀ M v) = ½ p (w⁻ + w⁺),   w⁻ = J v_f,  w⁺ = w⁻ + G p
 
-Asked for it, a step scales restitution back in such an impact until it makes none: without any,
-and with friction and restitution that all contacts share, every impact loses energy (Moreau;
-Glocker 2013), so that there is a share of e between zero and one.
+Asked for it, a step scales restitution back in such an impact until it makes none. There is such a
+share of e: an impact without restitution never makes energy.
 
 Between a stop and the ground, or two walls, there may be no way out of a penetration. If it is no
 more than rounding and turning explain, the problem is asked again with negative gaps counted as
