@@ -214,8 +214,7 @@ def test_floor_of_a_solve() -> None:
     assert not solve_contact(WALLS, free, 0.0).certificate.valid
     solution = solve_contact(WALLS, free, 0.0, floor=1e-2)
     assert solution.certificate.valid
-    # Each misses by 1e-10, or one of them by both, or what is between.
-    assert 1.0 - 1e-6 <= 1e10 * solution.certificate.non_penetration <= 2.0 + 1e-6
+    assert solution.certificate.non_penetration == pytest.approx(1e-10, rel=1e-6)
     assert not solve_contact(WALLS, [-1e-2, 0.0, -1e-2, 0.0], 0.0, floor=1e-2).certificate.valid
 
 

@@ -76,6 +76,9 @@ class Settings(Bundle):
     amendments : int
         How often the modes of the answer are amended before a solver is asked; zero where they are
         no guess.
+    patient : int
+        Not zero if an answer that is certified, and not clean, is compared with those of all
+        solvers, as where contacts jam, and one that is a little sharper is quite another.
     skewed : int
         Not zero if the matrix may be asymmetric, as in a general complementarity problem.
     """
@@ -83,6 +86,7 @@ class Settings(Bundle):
     tolerance: float = cell(float)
     floor: float = cell(float)
     amendments: int = cell(int)
+    patient: int = cell(int)
     skewed: int = cell(int)
 
 

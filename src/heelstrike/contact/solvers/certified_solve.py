@@ -44,6 +44,7 @@ from heelstrike.contact.workspace import (
     Equations,
     Integers,
     ReducedProblem,
+    Settings,
     StickingRows,
     Yardstick,
 )
@@ -83,10 +84,10 @@ def is_doubtful(count: int, worst: float, tolerance: float, yardstick: Yardstick
 
 
 @kernel
-def is_clean(count: int, worst: float, tolerance: float, yardstick: Yardstick) -> bool:
+def is_clean(count: int, worst: float, settings: Settings, yardstick: Yardstick) -> bool:
     """Whether no better answer is to be had: the residual is nil, or the impulses are rounded."""
-    rounding = count * UNIT_ROUNDOFF * yardstick.effort
-    return worst <= min(tolerance, max(CLEAN, rounding))
+    rounding = count * UNIT_ROUNDOFF * yardstick.effort if settings.patient == 0 else 0.0
+    return worst <= min(settings.tolerance, max(CLEAN, rounding))
 
 
 @kernel
@@ -179,10 +180,10 @@ def seek(
 ) -> tuple[int, float]:
     """Try what a solver proposes until an answer is certified, and keep the best.
 
-    Of modes that were guessed and amended the answer has to be clean. Returns how it ended, and the
-    residual of the answer, which was ``best`` so far.
+    Of modes that were guessed and amended, or if patient, the answer has to be clean. Returns how
+    it ended, and the residual of the answer, which was ``best`` so far.
     """
-    tolerance = work.settings.tolerance
+    settings = work.settings
     call = 0
     while True:
         outcome = propose(solver, call, problem, best, answer.mode, work)
@@ -195,9 +196,9 @@ def seek(
         if worst < best:
             best = worst
             keep(problem.count, work.trial, answer)
-        if solver != WARM_START and best <= tolerance:
+        if solver != WARM_START and settings.patient == 0 and best <= settings.tolerance:
             return SOLVED, best
-        if is_clean(problem.count, worst, tolerance, work.yardstick):
+        if is_clean(problem.count, worst, settings, work.yardstick):
             return SOLVED, best
 
 
@@ -233,6 +234,7 @@ def try_solvers(
     Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`.
     """
     tally, reduced, tolerance = work.tally, work.reduced, work.settings.tolerance
+    patient = work.settings.patient != 0
     begin(problem, work, answer)
     status = UNCERTIFIED
     best = math.inf
@@ -249,7 +251,8 @@ def try_solvers(
         before = best
         tally.combinations += solver == COMBINATIONS
         outcome, best = seek(solver, problem, best, work, answer)
-        if attempt < 0 and outcome != SOLVED and not (outcome == UNCERTIFIED and best <= tolerance):
+        agrees = outcome == UNCERTIFIED and best <= tolerance and not patient
+        if attempt < 0 and outcome != SOLVED and not agrees:
             continue
         settled, best = release(problem, best, work, answer)
         if attempt < 0 and not settled:
@@ -258,9 +261,10 @@ def try_solvers(
             tally.solver = solver
         if best <= tolerance:
             status = SOLVED
-            tally.shortcuts += attempt < 0
-            break
-        if attempt == 0 or outcome == RAY:
+            if outcome == SOLVED or not patient:
+                tally.shortcuts += attempt < 0
+                break
+        elif attempt == 0 or outcome == RAY:
             status = outcome if outcome != SOLVED else UNCERTIFIED
     if status != SOLVED:
         tally.failures += 1
