@@ -31,6 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
@@ -185,6 +186,7 @@ class TimeStepping(Method):
     bounded_restitution: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         if not 0.0 < self.step < float("inf"):
             raise SimulationError(f"the time step must be a positive number, got {self.step}")
         if not 0.0 <= self.activation < float("inf"):
