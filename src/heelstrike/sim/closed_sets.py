@@ -42,7 +42,9 @@ class EventKind(enum.IntEnum):
         No contact force, or several, agreed with the laws of motion and friction. With an impulse:
         the velocity jumped without a collision. Without: one of the solutions was chosen.
     ``ENERGY_GAIN``
-        Newton's restitution with friction made energy in an impact (Kane's paradox).
+        Newton's restitution with friction made energy in an impact (Kane's paradox), by the point
+        with the largest impulse; ``run.certificates.energy_gain`` is how much. Under
+        ``TimeStepping(bounded_restitution=True)`` it would have, and was scaled back.
     ``JOINT_STOP``
         A joint reached the end of its range, with the impulse that took, or was pressed against it
         by an impact elsewhere (or, held by a latch, pulled off it: the impulse is negative then);

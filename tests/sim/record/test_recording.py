@@ -55,10 +55,10 @@ def test_worst_values_come_out_under_their_names() -> None:
     simulation = hs.Simulation(box(), state=state)
     tally = simulation._memory.tally
     tally.penetration, tally.complementarity, tally.cone = 1e-3, 2e-12, 3e-12
-    tally.non_penetration = 4e-12
+    tally.non_penetration, tally.energy_gain = 4e-12, 5.0
     found = simulation.record.certificates
     assert found == Certificates(
-        penetration=1e-3, complementarity=2e-12, cone=3e-12, non_penetration=4e-12
+        penetration=1e-3, complementarity=2e-12, cone=3e-12, non_penetration=4e-12, energy_gain=5.0
     )
 
 

@@ -322,7 +322,7 @@ def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Recor
     for contact in range(phase.watched):
         phase.hit[contact] = 0
         phase.plastic[contact] = phase.closed[contact]
-    solved, _ = collide(model, nudge, memory, phase, phase.begin)
+    solved, _, _ = collide(model, nudge, memory, phase, phase.begin)
     for contact in range(phase.watched):
         phase.plastic[contact] = 0
     for contact in range(phase.first_dry):
@@ -691,6 +691,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.assembly.solver.settings.amendments = 0
+    memory.assembly.solver.settings.patient = 1
     if rows_of(memory.loops) > 0:
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED

@@ -236,6 +236,12 @@ def _advice(run: Run, gait: Gait | None, limits: tuple[Limit, ...]) -> Iterator[
         )
     if run.doubt:
         yield f"{run.doubt}."
+    if run.certificates.energy_gain > 0.0:
+        yield (
+            f"restitution with friction made {run.certificates.energy_gain:.3g} J in impacts "
+            "(Kane's paradox; events ENERGY_GAIN): less restitution or friction, or "
+            "TimeStepping(bounded_restitution=True), which scales restitution back there."
+        )
     if run.status is RunStatus.DIVERGED:
         yield "Numbers grew beyond all bounds: a smaller time step, or smaller gains."
     first = limits[0] if limits else None
