@@ -206,9 +206,8 @@ def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: I
 
 
 @kernel
-def stays_wedged(memory: Memory, impact: Impact) -> bool:
+def stays_wedged(steps: int, impact: Impact) -> bool:
     """Whether a wedge lasts, and is not as old as when it is asked again: 1, 2, 4, 8, ... steps."""
-    steps = memory.tally.steps
     age = steps - impact.since
     return impact.wedged == steps - 1 and age & (age - 1) != 0
 
@@ -422,7 +421,7 @@ def solve_restitution(
 
 @kernel
 def note_gain(
-    model: Model, time: float, step: float, memory: Memory, impact: Impact, record: Record
+    model: Model, time: float, step: float, impact: Impact, memory: Memory, record: Record
 ) -> None:
     """Tell of energy that restitution made, by the contact point with the largest impulse."""
     force = memory.contacts.force

@@ -850,7 +850,7 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
     again = True
     solved = True
     near = joints = count = 0
-    impact.relaxed = int(stays_wedged(memory, impact))
+    impact.relaxed = int(stays_wedged(memory.tally.steps, impact))
     at_once = impact.relaxed == 1
     while again:
         free_velocity(model, work, time, memory)
@@ -961,7 +961,7 @@ def decide(
     )
     note_brakes(model, clock.time, work.step, record, memory.loops)
     if work.impact.gains == 1:
-        note_gain(model, clock.time, work.step, memory, work.impact, record)
+        note_gain(model, clock.time, work.step, work.impact, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 
