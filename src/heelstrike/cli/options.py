@@ -91,6 +91,16 @@ Pushed = Annotated[
 SavedGait = Annotated[
     Path | None, typer.Option("--gait", help="Walk this saved gait instead of designing one.")
 ]
+ControlledBy = Annotated[
+    str | None,
+    typer.Option(
+        "--controller",
+        metavar="LAW|MODULE:NAME|FILE.py:NAME",
+        help="Law that moves the joints, by its name; or one of yours, a class or function of "
+        "(robot, gait), whose code is then run.",
+        show_default="ComputedTorque",
+    ),
+]
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
 Friction = Annotated[float, typer.Option(help="Friction coefficient of the ground.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, and nothing else.")]
