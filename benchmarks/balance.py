@@ -11,8 +11,9 @@ way that its steps should take it. Seeds below 1000 were used while the controll
 `small` tells what is left, step by step, of the error of the capture point after a push of 3 N s;
 `multipliers` by what factor small errors shrink in a step (:func:`heelstrike.floquet_multipliers`);
 `drag` of how many drags of 60 N s it recovers, link by link, in eight directions within 0.1, 0.2
-and 0.3 s, as a hand drags in the live view; `stand` the largest pushes of a robot that stands; `commands` how often it starts, walks at
-three speeds and stops. `--robot` may be a file, of three dimensions with `--projected`.
+and 0.3 s, as a hand drags in the live view; `stand` the largest pushes of a robot that stands;
+`commands` how often it starts, walks at three speeds and stops. `--robot` may be a file, of three
+dimensions with `--projected`.
 
 Run: python benchmarks/balance.py [price small multipliers push drag hard stand commands]
      [--robot bravo7] [--projected] [--torque 150] [--phases 20] [--rise 5] [--links trunk]
@@ -152,8 +153,8 @@ def drags(walker: Walker, phases: int, links: list[str] | None) -> None:
     away from it; a hand that follows the link pulls evenly, as here, at its centre of mass.
     """
     impulse, angles = DRAG * walker.unit, np.arange(0, 360, 45)
-    moving = [name for name, mass in zip(walker.robot.link_names, walker.robot.model.mass, strict=True)
-              if mass > 0.0]  # fmt: skip
+    robot = walker.robot
+    moving = [robot.link_names[i] for i in np.flatnonzero(robot.model.mass > 0.0)]
     for link in moving if links is None else links:
         for duration in DRAG_DURATIONS:
             failed = {

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
-from heelstrike.cli.options import _built_in
+from heelstrike.cli.options import built_in
 from heelstrike.robot import builtin_robots
 
 
@@ -45,8 +45,8 @@ def test_options_that_all_of_them_have(command: str) -> None:
 
 
 def test_names_of_robots_are_completed() -> None:
-    assert _built_in("rab") == ["rabbit", "rabbit_optimtraj"]
-    assert _built_in("my_robot.ur") == []  # where the shell completes files
+    assert built_in("rab") == ["rabbit", "rabbit_optimtraj"]
+    assert built_in("my_robot.ur") == []  # where the shell completes files
     words = {"COMP_WORDS": "heelstrike inspect bra", "COMP_CWORD": "2"}
     done = subprocess.run(
         [sys.executable, "-c", "from heelstrike.cli.main import app; app(prog_name='heelstrike')"],

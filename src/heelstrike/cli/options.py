@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from heelstrike.sim.method import Method
 
 
-def _built_in(incomplete: str) -> list[str]:
+def built_in(incomplete: str) -> list[str]:
     """Complete the name of a built-in robot; where there is none, shells complete a file's."""
     from heelstrike.robot.library import builtin_robots
 
@@ -35,9 +35,7 @@ class Way(StrEnum):
 
 RobotName = Annotated[
     str,
-    typer.Argument(
-        help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=_built_in
-    ),
+    typer.Argument(help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=built_in),
 ]
 Floating = Annotated[
     bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")

@@ -13,7 +13,14 @@ import numpy as np
 from heelstrike.analysis.limit_cycle import LimitCycle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import GaitError, HeelstrikeError
-from heelstrike.experiments.laws import Entry, gait_for, law_called, law_that_steps, laws_of
+from heelstrike.experiments.laws import (
+    Entry,
+    check_law,
+    gait_for,
+    law_called,
+    law_that_steps,
+    laws_of,
+)
 from heelstrike.experiments.passive import passive_walk
 from heelstrike.experiments.walk import beginning, design, typical_step
 from heelstrike.gait import Gait, load_gait
@@ -104,7 +111,8 @@ class WalkStage(Stage):
     Raises
     ------
     HeelstrikeError
-        If a robot or gait cannot be loaded, or a gait belongs to none of the robots.
+        If a robot or gait cannot be loaded, or a gait belongs to none of the robots, or a law can
+        drive none of them.
     """
 
     def __init__(
@@ -122,6 +130,9 @@ class WalkStage(Stage):
         }
         self._asked = tuple(self._robots)
         self._name = self._asked[0]
+        for law in self._first.laws:
+            if all(law.needs(each) for each in self._robots.values()):
+                check_law(law, self._robots[self._name])
         self._methods, self._method_names = methods, method_names
         self._gaits: dict[tuple[Any, ...], Gait | LimitCycle] = {}
         robot_at_first = self._robots[self._name]
