@@ -74,6 +74,8 @@ def test_one_that_fell_has_its_exit_status(tmp_path: Path) -> None:
         (("run.nc", "bravo7"), "not both"),
         (("bravo7", "rabbit"), "one robot is walked"),
         (("run.nc", "--steps", "3"), "--steps"),
+        (("run.nc", "--controller", "JointPD"), "--controller"),
+        (("bravo7", "--controller", "JointsPD"), "Did you mean 'JointPD'"),
         (("run.nc", "--package-path", "."), "--package-path"),
         (("run.nc",), "there is no file"),
         (("bravo7", "--out", "report.pdf"), "prints it to PDF"),

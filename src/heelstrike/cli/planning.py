@@ -46,8 +46,8 @@ def hint_of_balance(*runs: Run) -> None:
         law = law_that_steps(runs[0].robot)
         if law is not None:
             tell(
-                "ComputedTorque follows the gait, wherever a push takes the robot; "
-                f"--controller {law.name} steps where balance needs it."
+                "ComputedTorque follows the gait and does not look after the robot's balance; "
+                f"--controller {law.name} does."
             )
 
 

@@ -430,7 +430,7 @@ def test_what_cannot_begin_says_why() -> None:
 class Slow(Broken):
     """A stage that shows where it would begin before it fails."""
 
-    def outline(self, values: Any) -> tuple[hs.Robot, hs.State, hs.Ground]:  # noqa: ARG002
+    def outline(self, values: Any) -> tuple[hs.Robot, hs.State, hs.Ground]:
         return walking.bravo7(), walking.gait().initial_state, hs.Ground()
 
 
