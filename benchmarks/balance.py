@@ -319,7 +319,7 @@ def stand(walker: Walker, rise: float) -> None:
     rise *= walker.unit
     for name, sign in (("forwards", 1.0), ("backwards", -1.0)):
         firm, most = 0.0, 0.0
-        for count in range(1, 100):
+        for count in range(1, 200):
             impulse = rise * count
             push = hs.Push(2, force=(10.0 * sign * impulse, 0.0), start=1.0, duration=0.1)
             run = hs.simulate(
