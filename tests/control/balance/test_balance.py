@@ -182,7 +182,7 @@ def test_it_stands_with_bent_knees() -> None:
     legs = simulation.parameters.legs
     joints = simulation.state.q[walking.bravo7().model.actuator_joint]
     bent = legs.bend * (joints[legs.knee] - legs.straight)
-    assert bent == pytest.approx(0.2, abs=0.01)
+    assert np.all(bent > 0.19)
 
 
 @pytest.mark.parametrize(
