@@ -158,6 +158,7 @@ def test_a_fall_on_point_feet_is_explained(
     assert "error: the robot fell" in said
     assert "stands on point feet" in said
     assert "the first step" in said
+    assert "--controller VirtualConstraints" in said
     # The first step succeeds.
     result = CliRunner().invoke(app, ["walk", "rabbit", *options, "--steps", "1"])
     assert result.exit_code == 0, result.stderr

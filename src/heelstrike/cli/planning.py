@@ -38,12 +38,12 @@ def law_asked(words: str | None, robot: Robot | None = None) -> Entry | None:
 
 
 def hint_of_balance(*runs: Run) -> None:
-    """Name the law that steps where balance needs it, where computed torque was pushed or fell."""
-    from heelstrike.experiments.laws import law_that_steps
+    """Name a law that looks after the balance, where computed torque was pushed or fell."""
+    from heelstrike.experiments.laws import law_that_balances
     from heelstrike.sim import RunStatus
 
     if any(run.pushes or run.status is RunStatus.FELL for run in runs):
-        law = law_that_steps(runs[0].robot)
+        law = law_that_balances(runs[0].robot)
         if law is not None:
             tell(
                 "ComputedTorque follows the gait and does not look after the robot's balance; "

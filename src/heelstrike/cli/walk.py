@@ -170,9 +170,7 @@ def walk(
     if html is not None and len(run.time):
         wrote(save_html(run, html, gait=followed, command=this_command()))
         tell(f"{html}: the walk as one page, for any browser")
-    if law is None:
-        hint_of_balance(run)
-    _tell_outcome(run, planned, steps, saved, as_json=as_json)
+    _tell_outcome(run, planned, steps, saved, usual=law is None, as_json=as_json)
 
 
 def _through_time(
@@ -222,6 +220,7 @@ def _tell_outcome(
     steps: int,
     saved: tuple[Saved, ...],
     *,
+    usual: bool,
     as_json: bool,
 ) -> None:
     """Show the figures of a walk and say how it went, by the exit status, too."""
@@ -253,5 +252,7 @@ def _tell_outcome(
         tell(reason + ("" if exact else " --method event-driven keeps to it for longer."))
     elif not (walked or gait or exact):
         tell("Legs of one length scuff the ground; --method event-driven lets them swing through.")
+    if usual:
+        hint_of_balance(run)
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)

@@ -42,7 +42,7 @@ def watch(
     robots: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="ROBOT...",
+            metavar="ROBOT",
             help="Built-in robots, and MJCF, URDF or SDF files; the first walks at first.",
             show_default="bravo7",
             autocompletion=built_in,

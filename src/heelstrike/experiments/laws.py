@@ -322,8 +322,16 @@ def check_law(law: Entry, robot: Robot) -> None:
 
 def law_that_steps(robot: Robot) -> Entry | None:
     """Return the law that steps where balance needs it; None if the robot cannot have it."""
-    law = law_called("FootstepFeedback")
-    return None if law.needs(robot) else law
+    return _first_of(robot, "FootstepFeedback")
+
+
+def law_that_balances(robot: Robot) -> Entry | None:
+    """Return a law that looks after the balance of a robot on whatever feet; None if none does."""
+    return _first_of(robot, "FootstepFeedback", "VirtualConstraints")
+
+
+def _first_of(robot: Robot, *names: str) -> Entry | None:
+    return next((law for law in map(law_called, names) if not law.needs(robot)), None)
 
 
 def gait_for(robot: Robot) -> Gait:
