@@ -10,8 +10,12 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
+    METHOD,
+    METHODS,
+    USUAL_METHOD,
     Debug,
     Friction,
+    Method,
     OnGround,
     built_in,
     method_called,
@@ -20,19 +24,10 @@ from heelstrike.cli.options import (
 from heelstrike.cli.planning import law_asked
 from heelstrike.cli.terminal import spoken, stage, tell
 from heelstrike.cli.values import ground_called
-from heelstrike.cli.walk import Method, Scheme
 from heelstrike.interruption import acknowledge
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
-
-METHODS = (
-    Scheme.IMPACT_RESOLVED.value,
-    Method.EVENT_DRIVEN.value,
-    Method.COMPLIANT.value,
-    *(scheme.value for scheme in Scheme if scheme is not Scheme.IMPACT_RESOLVED),
-)
-"""Names that :func:`~heelstrike.cli.options.method_called` knows, the usual one first."""
 
 
 # As many arguments as the command has options: a person's.
@@ -62,12 +57,8 @@ def watch(
         ),
     ] = None,
     method: Annotated[
-        str | None,
-        typer.Option(
-            metavar="|".join(METHODS),
-            help="Way through time, or discretisation of time stepping.",
-            show_default=f"{METHODS[0]}; {Method.EVENT_DRIVEN} without motors",
-        ),
+        Method | None,
+        typer.Option(help=METHOD, show_default=USUAL_METHOD),
     ] = None,
     step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
     ground: OnGround = "flat",
@@ -88,12 +79,6 @@ def watch(
     the address that is printed. Robots, gaits and laws that are named here are in its lists, beside
     those that are built in. Ctrl-C ends it.
     """
-    if method == Method.TIME_STEPPING.value:  # as the other commands call it
-        method = METHODS[0]
-    if method is not None and method not in METHODS:
-        raise typer.BadParameter(
-            f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method"
-        )
     with stage("loading"):
         from heelstrike.view.live.server import check_installed
 
@@ -107,10 +92,13 @@ def watch(
             method_called(name, step)
         named = robots or ["bravo7"]
         first = First(
-            method=method, step=step, gait=gait, friction=friction,
+            method=None if method is None else method.value,
+            step=step,
+            gait=gait,
+            friction=friction,
             laws=[law for words in controller or () if (law := law_asked(words))],
             **_shape(ground, surface),
-        )  # fmt: skip
+        )
         walks = WalkStage(named, method_called, METHODS, first, **how)
         viewer = view(stage=walks, rate=speed, port=port)
     tell(f"watch at {viewer.url}")
