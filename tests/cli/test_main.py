@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
-from heelstrike.cli.options import METHODS, _built_in, method_called
+from heelstrike.cli.options import METHODS, built_in, method_called
 from heelstrike.robot import builtin_robots
 from heelstrike.robot.inspection import Inspection
 from heelstrike.sim import Scheme, TimeStepping
@@ -103,8 +103,8 @@ def test_advice_names_options_and_not_keywords_of_python(tmp_path: Path) -> None
 
 
 def test_names_of_robots_are_completed() -> None:
-    assert _built_in("rab") == ["rabbit", "rabbit_optimtraj"]
-    assert _built_in("my_robot.ur") == []  # where the shell completes files
+    assert built_in("rab") == ["rabbit", "rabbit_optimtraj"]
+    assert built_in("my_robot.ur") == []  # where the shell completes files
     words = {"COMP_WORDS": "heelstrike inspect bra", "COMP_CWORD": "2"}
     done = subprocess.run(
         [sys.executable, "-c", "from heelstrike.cli.main import app; app(prog_name='heelstrike')"],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,9 @@ import walking
 from synthetic_runs import box, make_run
 from typer.testing import CliRunner
 
+import heelstrike as hs
 from heelstrike.cli.main import app
+from heelstrike.cli.planning import hint_of_balance
 from heelstrike.sim import RunStatus
 from heelstrike.view.report import writing
 
@@ -74,6 +77,8 @@ def test_one_that_fell_has_its_exit_status(tmp_path: Path) -> None:
         (("run.nc", "bravo7"), "not both"),
         (("bravo7", "rabbit"), "one robot is walked"),
         (("run.nc", "--steps", "3"), "--steps"),
+        (("run.nc", "--controller", "JointPD"), "--controller"),
+        (("bravo7", "--controller", "JointsPD"), "Did you mean 'JointPD'"),
         (("run.nc", "--package-path", "."), "--package-path"),
         (("run.nc",), "there is no file"),
         (("bravo7", "--out", "report.pdf"), "prints it to PDF"),
@@ -88,3 +93,14 @@ def test_requests_that_make_no_sense(
     assert result.exit_code == 2
     assert told in " ".join(result.stderr.replace("│", " ").split())
     assert not list(tmp_path.iterdir())
+
+
+def test_a_push_under_computed_torque_names_the_law_that_keeps_the_balance(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    run = walking.walk(steps=1)
+    hint_of_balance(run)
+    assert not capsys.readouterr().err
+    push = hs.Push("trunk", force=(5.0, 0.0), start=0.1, duration=0.1)
+    hint_of_balance(run, replace(run, pushes=(push,)))
+    assert "--controller FootstepFeedback does" in capsys.readouterr().err

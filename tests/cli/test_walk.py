@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -157,6 +158,7 @@ def test_a_fall_on_point_feet_is_explained(
     assert "error: the robot fell" in said
     assert "stands on point feet" in said
     assert "the first step" in said
+    assert "--controller VirtualConstraints" in said
     # The first step succeeds.
     result = CliRunner().invoke(app, ["walk", "rabbit", *options, "--steps", "1"])
     assert result.exit_code == 0, result.stderr
@@ -245,6 +247,11 @@ def test_interrupted_by_ctrl_c(
         (["--push", "head:60:1:0.1"], "link 'head', which robot 'bravo7' does not have"),
         (["--pose", "left_kne=1"], "Did you mean 'left_knee'?"),
         (["--forward", "up"], "is not one of 'x', 'y'"),
+        (["--controller", "Footsteps"], "no controller 'Footsteps'. Did you mean"),
+        (["--controller", "nosuch.py:make"], "there is no file nosuch.py"),
+        (["rabbit", "--controller", "WholeBody"], "(needs flat feet). It can have ComputedTorque,"),
+        (["--controller", "StandingLQR", "--step-length", "0.2"], "by no gait"),
+        (["compass_gait", "--controller", "JointPD"], "(no motors). No law by name can"),
         (["compass_gait"], "walks down a slope only"),
         (["compass_gait", "--ground", "slope:-3", "--step-length", "0.2"], "has no motors"),
     ],
@@ -253,7 +260,7 @@ def test_interrupted_by_ctrl_c(
 def test_wrong_input(options: list[str], said: str, tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["walk", "--out", str(tmp_path / "out"), *options])
     assert result.exit_code == 2
-    assert said in " ".join(result.stderr.split())
+    assert said in " ".join(result.stderr.replace("│", " ").split())
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     assert not (tmp_path / "out" / "run.nc").exists()
@@ -340,6 +347,42 @@ def test_a_push_and_a_slope_reach_the_walk(walk: Callable[..., Any], tmp_path: P
     assert (push.force, push.start, push.duration) == ((20.0, 0.0), 0.2, 0.1)
     assert run.ground.slope == math.radians(-0.2)
     assert abs(run.gap[0, run.robot.feet[0].contacts[0]]) < 1e-12
+
+
+def test_the_law_that_keeps_its_balance_is_named_and_does(
+    walk: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Where computed torque falls of a push the advice is followed, and the robot walks on."""
+    push = ["--push", "trunk:400:0.3:0.1", "--steps", "3"]
+    result = walk(*push)
+    assert result.exit_code == 1
+    (advice,) = re.findall(r"--controller \w+", result.stderr)
+    result = walk(*push, *advice.split())
+    assert result.exit_code == 0, result.stderr
+    assert "--controller" not in result.stderr
+    assert "alarm" in hs.load_run(tmp_path / "out" / "run.nc").log
+    assert "--controller" not in walk("--steps", "1").stderr
+
+
+def test_a_law_of_ones_own_walks_and_its_code_is_named(
+    walk: Callable[..., Any], tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import heelstrike as hs\n"
+        "def make(robot, gait):\n    return hs.ComputedTorque(robot, gait)\n"
+    )
+    result = walk("--steps", "1", "--controller", f"{file}:make")
+    assert result.exit_code == 0, result.stderr
+    assert f"the code of {file} has been run" in result.stderr.replace("\n", "")
+
+
+def test_a_law_that_stands_takes_no_steps_and_is_well(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    options = ["--steps", "1", "--controller", "StandingLQR", "--animation", "none", "--out", out]
+    result = CliRunner().invoke(app, ["walk", *options])
+    assert result.exit_code == 0, result.stderr
+    assert not (tmp_path / "out" / "gait.json").exists()
 
 
 def test_a_passive_walker_starts_on_its_cycle(tmp_path: Path) -> None:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
 import pytest
+import walking
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
@@ -62,6 +64,26 @@ def test_time_stepping_is_called_as_everywhere(made: dict[str, Any]) -> None:
     assert made["stage"].fitted({})["method"] == "time-stepping"
 
 
+def test_robots_gaits_and_laws_of_ones_own_are_in_the_lists(
+    made: dict[str, Any], tmp_path: Path
+) -> None:
+    files = [tmp_path / name for name in ("robot.xml", "a.json", "b.json", "mine.py")]
+    robot, first, second, law = map(str, files)
+    walking.bravo7().save(robot)
+    for gait in (first, second):
+        walking.gait().save(gait)
+    files[3].write_text("def make(robot, gait):\n    raise AssertionError\n")
+    laws = ("--controller", f"{law}:make", "--controller", "joint-pd")
+    result = asked(robot, "rabbit", "--gait", first, "--gait", second, *laws)
+    assert isinstance(result.exception, MadeError), result.output
+    assert f"the code of {law} has been run" in result.output.replace("\n", "")
+    stage = made["stage"]
+    lists = {control.name: control.options for control in stage.controls(stage.fitted({}))}
+    assert lists["robot"][:3] == (robot, "rabbit", "bravo7")
+    assert lists["gait"][:2] == ("a.json", "b.json")
+    assert lists["controller"][:2] == (f"{law}:make", "JointPD")
+
+
 def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]) -> None:
     asked("--ground", "rough:0.004:9")
     assert made["stage"].fitted({})["roughness"] == 0.004
@@ -76,6 +98,8 @@ def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]
     [
         (["--method", "euler"], f"'euler' is not one of '{METHODS[0]}', '{METHODS[1]}'"),
         (["bravo8"], "bravo8"),
+        (["rabbit", "--controller", "FootstepFeedback"], "needs flat feet"),
+        (["--controller", "mine.py"], "say which law of it is meant"),
         (["--gait", "nosuch.json"], "nosuch.json"),
         (["--ground", "slop:3"], "Did you mean slope:DEGREES"),
         (["--port", "70000"], "less than or equal to 65535"),

@@ -12,6 +12,7 @@ from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
     SEVERAL,
     AsJson,
+    ControlledBy,
     Debug,
     Friction,
     Method,
@@ -23,7 +24,7 @@ from heelstrike.cli.options import (
     method_called,
     reads_robots,
 )
-from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.planning import law_asked, planned_walk
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, tell_interruption, wrote
 from heelstrike.cli.values import ground_called, pushes_called
 
@@ -50,6 +51,7 @@ def compare(
             show_default=f"{', '.join(USUAL)}",
         ),
     ] = None,
+    controller: ControlledBy = None,
     gait: SavedGait = None,
     steps: Steps = 3,
     step: Annotated[
@@ -80,9 +82,10 @@ def compare(
     machine = hs.load_robot(robot, **how)
     for each in pushes:
         each.place(machine)
+    law = law_asked(controller, machine)
     ways = method or USUAL
     methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-    start = beginning(machine, planned_walk(machine, gait, surface), surface)
+    start = beginning(machine, planned_walk(machine, gait, surface, law), surface, law)
     doing = f"walking {steps} steps by {len(methods)} methods"
     with stage(doing, when_slow="(compiling each of them, once: about a minute)"):
         comparison = hs.compare(

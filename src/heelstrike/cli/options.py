@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from heelstrike.sim.method import Method as TimeMethod
 
 
-def _built_in(incomplete: str) -> list[str]:
+def built_in(incomplete: str) -> list[str]:
     """Complete the name of a built-in robot; where there is none, shells complete a file's."""
     from heelstrike.robot.library import builtin_robots
 
@@ -55,9 +55,7 @@ class Way(StrEnum):
 
 RobotName = Annotated[
     str,
-    typer.Argument(
-        help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=_built_in
-    ),
+    typer.Argument(help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=built_in),
 ]
 Floating = Annotated[
     bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
@@ -127,6 +125,16 @@ Pushed = Annotated[
 ]
 SavedGait = Annotated[
     Path | None, typer.Option("--gait", help="Walk this saved gait instead of designing one.")
+]
+ControlledBy = Annotated[
+    str | None,
+    typer.Option(
+        "--controller",
+        metavar="LAW|MODULE:NAME|FILE.py:NAME",
+        help="Law that moves the joints, by its name; or one of yours, a class or function of "
+        "(robot, gait), whose code is then run.",
+        show_default="ComputedTorque",
+    ),
 ]
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
 Friction = Annotated[float, typer.Option(help="Friction coefficient of the ground.")]

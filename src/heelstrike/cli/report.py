@@ -14,6 +14,7 @@ from heelstrike.cli.options import (
     SEVERAL,
     USUAL_METHOD,
     AsJson,
+    ControlledBy,
     Debug,
     Friction,
     Method,
@@ -24,7 +25,7 @@ from heelstrike.cli.options import (
     method_called,
     reads_robots,
 )
-from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.planning import hint_of_balance, law_asked, planned_walk
 from heelstrike.cli.terminal import (
     FAILED,
     output,
@@ -41,8 +42,9 @@ if TYPE_CHECKING:
     from heelstrike.gait import Gait
     from heelstrike.sim import Run
 
-OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "floating", "projected",
-             "forward", "pose", "mirror", "package_path", "xacro", "xacro_arg")  # fmt: skip
+OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "controller", "floating",
+             "projected", "forward", "pose", "mirror", "package_path", "xacro",
+             "xacro_arg")  # fmt: skip
 """Options that say how a robot walks, and nothing to a run that is read."""
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"
@@ -61,6 +63,7 @@ def report(
         ),
     ],
     out: Annotated[Path, typer.Option(dir_okay=False, help="Page to write.")] = Path("report.html"),
+    controller: ControlledBy = None,
     gait: SavedGait = None,
     steps: Steps = 10,
     method: Annotated[
@@ -104,9 +107,10 @@ def report(
         machine = load_robot(what[0], **how)
         for each in pushes:
             each.place(machine)
+        law = law_asked(controller, machine)
         ways = method or [Method.TIME_STEPPING if machine.nu else Method.EVENT_DRIVEN]
         methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-        planned = planned_walk(machine, gait, surface)
+        planned = planned_walk(machine, gait, surface, law)
         followed = planned if isinstance(planned, Gait) else None
         runs = {}
         for name, through in methods.items():
@@ -115,6 +119,7 @@ def report(
                     machine,
                     planned,
                     steps=steps,
+                    law=law,
                     method=through,
                     ground=surface,
                     pushes=pushes,
@@ -125,6 +130,8 @@ def report(
         only = next(iter(runs.values()))
         shown = runs if len(runs) > 1 else only
         wrote(report(shown, out, gait=followed, command=this_command()))
+    if not files and controller is None:
+        hint_of_balance(*runs.values())
     _tell(runs, followed, out, as_json=as_json)
 
 

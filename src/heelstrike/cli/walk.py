@@ -14,6 +14,7 @@ from heelstrike.cli.options import (
     METHOD,
     USUAL_METHOD,
     AsJson,
+    ControlledBy,
     Debug,
     Friction,
     Method,
@@ -25,7 +26,7 @@ from heelstrike.cli.options import (
     method_called,
     reads_robots,
 )
-from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.planning import hint_of_balance, law_asked, planned_walk
 from heelstrike.cli.terminal import (
     FAILED,
     complain,
@@ -75,6 +76,7 @@ def walk(
         float | None, typer.Option(help="Height of the swing foot's path in m.", show_default=SUITS)
     ] = None,
     gait: SavedGait = None,
+    controller: ControlledBy = None,
     steps: Steps = 20,
     method: Annotated[
         Method | None,
@@ -125,6 +127,7 @@ def walk(
         machine = load_robot(robot, **how)
         for each in pushes:
             each.place(machine)
+        law = law_asked(controller, machine)
         through = _through_time(method, step, passive=not machine.nu)
         results = Results(out)
         if html is not None:
@@ -132,7 +135,7 @@ def walk(
         if table is not None:
             check_run_file(table, TABLE)
     planned = planned_walk(
-        machine, gait, surface, length=step_length, duration=step_duration, clearance=clearance
+        machine, gait, surface, law, length=step_length, duration=step_duration, clearance=clearance
     )
     followed = planned if isinstance(planned, Gait) else None
     wrote(*results.save_gait(followed))
@@ -141,6 +144,7 @@ def walk(
             machine,
             planned,
             steps=steps,
+            law=law,
             method=through,
             ground=surface,
             pushes=pushes,
@@ -153,7 +157,7 @@ def walk(
     if table is not None:
         wrote(run.save(table))
         tell(f"{table}: the walk as a table")
-    _tell_outcome(run, planned, steps, saved, as_json=as_json)
+    _tell_outcome(run, planned, steps, saved, usual=law is None, as_json=as_json)
 
 
 def _through_time(method: Method | None, step: float, *, passive: bool) -> TimeMethod:
@@ -188,7 +192,13 @@ def _save(results: Results, run: Run, gait: Gait | None, animation: Animation) -
 
 
 def _tell_outcome(
-    run: Run, planned: Gait | LimitCycle, steps: int, saved: tuple[Saved, ...], *, as_json: bool
+    run: Run,
+    planned: Gait | LimitCycle | None,
+    steps: int,
+    saved: tuple[Saved, ...],
+    *,
+    usual: bool,
+    as_json: bool,
 ) -> None:
     """Show the figures of a walk and say how it went, by the exit status, too."""
     from heelstrike.experiments.walk import steps_taken, why_unstable
@@ -209,15 +219,17 @@ def _tell_outcome(
         tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
         raise typer.Exit(INTERRUPTED)
     taken = steps_taken(run, planned)
-    walked = run.completed and taken >= steps
+    walked = run.completed and (planned is None or taken >= steps)
     if not run.completed:
         complain(run.message)
     elif not walked:
         complain(f"the robot took {taken} of {steps} steps in {run.time[-1]:.3g} s")
     exact = isinstance(run.method, EventDriven)
-    if not walked and (reason := why_unstable(planned)):
+    if not walked and planned is not None and (reason := why_unstable(planned)):
         tell(reason + ("" if exact else " --method event-driven keeps to it for longer."))
     elif not (walked or gait or exact):
         tell("Legs of one length scuff the ground; --method event-driven lets them swing through.")
+    if usual:
+        hint_of_balance(run)
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)

@@ -10,6 +10,7 @@ import pytest
 import walking
 
 import heelstrike as hs
+from heelstrike.dynamics import link_poses
 from heelstrike.sim import EventKind
 from heelstrike.view.live import live_simulation
 from heelstrike.view.live import session as sessions
@@ -424,6 +425,28 @@ def test_what_cannot_begin_says_why() -> None:
     assert not session.playing
     # What acts at once on a walk begins one where there is none.
     assert ask(session, "choose", name="friction", value=0.3).startswith("there is no such gait")
+
+
+class Slow(Broken):
+    """A stage that shows where it would begin before it fails."""
+
+    def outline(self, values: Any) -> tuple[hs.Robot, hs.State, hs.Ground]:
+        return walking.bravo7(), walking.gait().initial_state, hs.Ground()
+
+
+def test_where_it_begins_is_seen_before_there_is_a_simulation() -> None:
+    """The robot in its pose, and no forces; once a walk has begun it stays instead."""
+    session, shown = watching(Slow(walker()))
+    assert session.live is None
+    expected = link_poses(walking.bravo7(), walking.gait().initial_state.q)
+    pose = shown.field("pose").reshape(-1, 3)
+    np.testing.assert_array_equal(pose, np.column_stack((expected.origin, expected.angle)))
+    assert not shown.field("force").any()
+    walks, shown = watching(walker())
+    go_on(walks, 0.1)
+    walks._stage = Slow(walker())
+    ask(walks, "reset")
+    assert len(shown.course) > 1
 
 
 def test_updates_come_however_many_commands_do(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,11 @@ from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
 from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.support import foot_sums
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view.drawing import legs
@@ -108,6 +112,26 @@ class Layout:
             wide = self.widths[name]
             table[:, begin : begin + wide] = found[name].reshape(len(every), wide)
         return table
+
+    def still(self, state: State, ground: Ground) -> Floats:
+        """Return the frame of a robot of which nothing is known but where it is, (1, width)."""
+        robot, poses = self.robot, link_poses(self.robot, state.q)
+        seen = contact_kinematics(robot, state.q, state.v, ground)
+        known: dict[str, Any] = {
+            "time": 0.0,
+            "pose": np.column_stack((poses.origin, poses.angle)),
+            "point": contact_positions(robot, state.q),
+            "normal": seen.normal,
+            "force": 0.0,
+            "center": center_of_mass(robot, state.q),
+            "joint": state.q[self.joints],
+            "torque": 0.0,
+        }
+        frame = np.full(self.width, np.nan)
+        for name, numbers in known.items():
+            begin, wide = self.begin[name], self.widths[name]
+            frame[begin : begin + wide] = np.ravel(numbers)
+        return frame[None]
 
     def _pushes(
         self, since: Floats, until: Floats, motion: Motion, pushes: Iterable[Push]

@@ -15,7 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Event, Run
@@ -309,8 +312,10 @@ class Session:
             self._show_scene(self._run)
         else:
             try:
+                if self.live is None:
+                    self._show_outline(self._stage.outline(wanted))
                 simulation = self._stage.simulation(wanted, self._tell_busy)
-                self._tell_busy("compiling the simulator, once: about 20 s")
+                self._tell_busy("loading the simulator (compiling it, once: about 20 s)")
                 live = LiveSimulation(simulation)
                 run = live.record()
                 if not len(run.time):  # a controller that is not asked but for good
@@ -326,19 +331,32 @@ class Session:
             self._show_scene(run)
         self._tell()
 
-    def _show_scene(self, run: Run) -> None:
-        """Show a course from its beginning on: of a simulation what has been of it."""
-        self._layout = Layout(run.robot)
-        times = self.history.time
+    def _begin_scene(self, robot: Robot, ground: Ground, method: str) -> None:
+        """Show a robot on its ground, of which frames are still to come."""
+        self._layout = Layout(robot)
         self._board.begin(
             {
-                "scene": scene(run.robot, run.ground),
+                "scene": scene(robot, ground),
                 "layout": self._layout.described(),
                 "events": [kind.name.lower() for kind in EventKind],
-                "method": str(run.method),
-                "live": self.live is not None,
+                "method": method,
+                "live": self._stage is not None,
             }
         )
+
+    def _show_outline(self, outline: tuple[Robot, State, Ground] | None) -> None:
+        """Show where the robot is to begin, while its simulation is being made."""
+        if outline is None:
+            return
+        robot, state, ground = outline
+        self._begin_scene(robot, ground, "")
+        assert self._layout is not None
+        self._board.add(self._layout.still(state, ground))
+
+    def _show_scene(self, run: Run) -> None:
+        """Show a course from its beginning on: of a simulation what has been of it."""
+        times = self.history.time
+        self._begin_scene(run.robot, run.ground, str(run.method))
         if not len(times):
             return
         shown = np.arange(times[0], times[-1], DENSEST)
