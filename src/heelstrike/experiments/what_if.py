@@ -1,0 +1,169 @@
+"""The same walk again with something changed: what a report tries by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+import heelstrike.control
+from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried
+from heelstrike.analysis.diagnosis.falls import first_cause
+from heelstrike.analysis.stability.trial import Trial
+from heelstrike.analysis.support import walking_steps
+from heelstrike.contact.ground import Ground
+from heelstrike.control import ComputedTorque
+from heelstrike.errors import HeelstrikeError
+from heelstrike.experiments.walk import beginning, walk
+from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Effort
+from heelstrike.gait import Gait, optimize_gait
+from heelstrike.robot import Robot
+from heelstrike.sim import Controller, Push, Run
+from heelstrike.sim.method import Method
+from heelstrike.sim.time_stepping.method import TimeStepping
+
+TOLD = {
+    "push-forwards": "largest push forwards on the trunk, 0.1 s in mid-step",
+    "push-backwards": "largest push backwards",
+    "slope-up": "steepest climb, begun unseen",
+    "slope-down": "steepest descent, begun unseen",
+}
+"""Disturbances of the zoo that a report tries, in its words."""
+EFFORT = Effort(strides=4, halvings=5)
+"""How finely their sizes are searched."""
+BY = TimeStepping(step=1e-3)
+"""The method of these trials, whatever that of the walk: they take some forty walks."""
+PHASE = Chance(phase=0.5, seed=0)
+"""When in a step a push begins."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """A walk, with all that decides how it goes.
+
+    Attributes
+    ----------
+    robot : Robot
+    gait : Gait
+    law : callable
+        Takes a robot and its gait, returns the controller; computed torque by default.
+    ground : Ground
+    pushes : sequence of Push
+    method : Method
+    steps : int
+        Steps that it is to take.
+    """
+
+    robot: Robot
+    gait: Gait
+    law: Callable[[Robot, Gait], Controller] = ComputedTorque
+    ground: Ground = field(default_factory=Ground)
+    pushes: Sequence[Push] = ()
+    method: Method = field(default_factory=lambda: TimeStepping(step=1e-3))
+    steps: int = 10
+
+    def run(self, progress: Callable[[float], None] | None = None) -> Run:
+        """Walk."""
+        return walk(
+            self.robot, self.gait, steps=self.steps, controller=self.law(self.robot, self.gait),
+            method=self.method, ground=self.ground, pushes=self.pushes, progress=progress,
+        )  # fmt: skip
+
+
+def changed(case: Case, change: Change) -> Case:
+    """Return a walk with a change made.
+
+    Raises
+    ------
+    GaitError
+        If there is no gait as asked for.
+    """
+    value = change.value
+    match change.lever:
+        case Lever.CONTROLLER:
+            return replace(case, law=getattr(heelstrike.control, str(value)))
+        case Lever.FRICTION:
+            numbers = case.ground.numbers()
+            more = np.maximum(numbers["friction"], value)
+            return replace(case, ground=Ground.of_numbers(numbers | {"friction": more}))
+        case Lever.TORQUE_LIMIT:
+            model = case.robot.model
+            ends = {
+                "torque_lower": np.minimum(model.torque_lower, -float(value)),
+                "torque_upper": np.maximum(model.torque_upper, float(value)),
+            }
+            return replace(case, robot=replace(case.robot, model=model.replaced(**ends)))
+        case Lever.GAIT_FRICTION:
+            return replace(case, gait=_designed(case, friction=float(value)))
+        case Lever.GAIT_CLEARANCE:
+            return replace(case, gait=_designed(case, clearance=float(value)))
+        case Lever.GAIT_SPEED:
+            duration = case.gait.step_duration / float(value)
+            return replace(case, gait=_designed(case, step_duration=duration))
+        case Lever.GAIT_JOINT_RANGES:
+            joint = case.robot.joint_index(change.where)
+            ends = (
+                float(case.robot.model.lower[joint]) + float(value),
+                float(case.robot.model.upper[joint]) - float(value),
+            )
+            return replace(case, gait=_designed(case, joint_ranges={change.where: ends}))
+        case Lever.TIME_STEP:
+            return replace(case, method=replace(case.method, step=float(value)))  # type: ignore[type-var]
+
+
+def _designed(case: Case, **asked: object) -> Gait:
+    gait = case.gait
+    given: dict[str, object] = {
+        "step_length": gait.step_length,
+        "step_duration": gait.step_duration,
+        "friction": gait.friction,
+        "clearance": gait.clearance,
+    }
+    return optimize_gait(case.robot, **(given | asked))  # type: ignore[arg-type]
+
+
+def try_changes(case: Case, asked: Sequence[Change]) -> Iterator[Tried]:
+    """Walk again with each change by itself, until the first that makes the walk last."""
+    for change in asked:
+        what = change.lever.value
+        try:
+            other = changed(case, change)
+            run = other.run()
+        except HeelstrikeError as error:
+            yield Tried(what, str(error), None, change)
+            continue
+        fall = first_cause(run, other.gait)
+        lasted = run.completed and fall is None
+        steps = f"{len(walking_steps(run))} steps in {float(run.time[-1]):.3g} s"
+        yield Tried(what, steps if fall is None else f"{steps}, then {fall}", lasted, change)
+        if lasted:
+            return
+
+
+def try_disturbances(
+    case: Case, progress: Callable[[str], None] | None = None
+) -> Iterator[Tried]:
+    """Find the largest push and slope that a walk stands, one after the other.
+
+    The walk is the one without its own pushes, on level ground of the friction that it has, by time
+    stepping at 1 ms.
+    """
+    friction = float(case.ground.model().friction.min())
+    start = beginning(case.robot, case.gait)
+    trial = Trial(
+        robot=case.robot, controller=case.law(case.robot, case.gait), state=start.state,
+        step_length=case.gait.step_length, step_duration=case.gait.step_duration,
+        method=BY, ground=Ground(friction=friction),
+    )  # fmt: skip
+    for disturbance in DISTURBANCES:
+        if disturbance.name not in TOLD:
+            continue
+        if progress is not None:
+            progress(disturbance.name)
+        found = disturbance.measure(trial, PHASE, EFFORT)
+        lasts = found.failed > 0.0
+        yield Tried(
+            TOLD[disturbance.name],
+            f"{found}" if lasts else "does not walk on for 7 s even undisturbed", lasts
+        )  # fmt: skip
