@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 import heelstrike.control
-from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried
+from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
 from heelstrike.analysis.diagnosis.falls import first_cause
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.analysis.support import walking_steps
@@ -19,9 +19,10 @@ from heelstrike.experiments.walk import beginning, walk
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Effort
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot
-from heelstrike.sim import Controller, Push, Run
+from heelstrike.sim import Controller, Push, Run, RunStatus
 from heelstrike.sim.method import Method
 from heelstrike.sim.time_stepping.method import TimeStepping
+from heelstrike.sim.whole_run import whole
 
 TOLD = {
     "push-forwards": "largest push forwards on the trunk, 0.1 s in mid-step",
@@ -36,6 +37,18 @@ BY = TimeStepping(step=1e-3)
 """The method of these trials, whatever that of the walk: they take some forty walks."""
 PHASE = Chance(phase=0.5, seed=0)
 """When in a step a push begins."""
+
+
+NO_CONTROLLER = Tried(
+    "pushes, slopes, changes",
+    "not tried: the file of a run does not hold its controller; “heelstrike report ROBOT” tries "
+    "them",
+)
+NO_GAIT = Tried(
+    "pushes, slopes, changes",
+    "not tried: pushes and slopes begin on level ground, on which nothing walks without motors",
+)
+"""Why nothing was tried."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,11 +116,11 @@ def changed(case: Case, change: Change) -> Case:
             return replace(case, gait=_designed(case, step_duration=duration))
         case Lever.GAIT_JOINT_RANGES:
             joint = case.robot.joint_index(change.where)
-            ends = (
+            room = (
                 float(case.robot.model.lower[joint]) + float(value),
                 float(case.robot.model.upper[joint]) - float(value),
             )
-            return replace(case, gait=_designed(case, joint_ranges={change.where: ends}))
+            return replace(case, gait=_designed(case, joint_ranges={change.where: room}))
         case Lever.TIME_STEP:
             return replace(case, method=replace(case.method, step=float(value)))  # type: ignore[type-var]
 
@@ -123,13 +136,42 @@ def _designed(case: Case, **asked: object) -> Gait:
     return optimize_gait(case.robot, **(given | asked))  # type: ignore[arg-type]
 
 
+def tried_beside(case: Case | None, run: Run) -> tuple[Tried, ...]:
+    """Try beside a run what a report shows: what to change if it fell, pushes and slopes.
+
+    Parameters
+    ----------
+    case : Case or None
+        What the run is one of; nothing if it followed no gait.
+    run : Run
+        The run.
+
+    Returns
+    -------
+    tuple of Tried
+        What came of it, or why it was not tried.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If Ctrl-C ended a walk.
+    """
+    if run.status is RunStatus.INTERRUPTED:
+        return ()
+    if case is None:
+        return (NO_GAIT,)
+    fall = first_cause(run, case.gait)
+    asked = () if fall is None else changes(run, fall, case.gait)
+    return (*try_changes(case, asked), *try_disturbances(case))
+
+
 def try_changes(case: Case, asked: Sequence[Change]) -> Iterator[Tried]:
     """Walk again with each change by itself, until the first that makes the walk last."""
     for change in asked:
         what = change.lever.value
         try:
             other = changed(case, change)
-            run = other.run()
+            run = whole(other.run())
         except HeelstrikeError as error:
             yield Tried(what, str(error), None, change)
             continue
@@ -141,9 +183,7 @@ def try_changes(case: Case, asked: Sequence[Change]) -> Iterator[Tried]:
             return
 
 
-def try_disturbances(
-    case: Case, progress: Callable[[str], None] | None = None
-) -> Iterator[Tried]:
+def try_disturbances(case: Case) -> Iterator[Tried]:
     """Find the largest push and slope that a walk stands, one after the other.
 
     The walk is the one without its own pushes, on level ground of the friction that it has, by time
@@ -159,11 +199,10 @@ def try_disturbances(
     for disturbance in DISTURBANCES:
         if disturbance.name not in TOLD:
             continue
-        if progress is not None:
-            progress(disturbance.name)
         found = disturbance.measure(trial, PHASE, EFFORT)
-        lasts = found.failed > 0.0
-        yield Tried(
-            TOLD[disturbance.name],
-            f"{found}" if lasts else "does not walk on for 7 s even undisturbed", lasts
-        )  # fmt: skip
+        outcome = str(found)
+        if not found.failed > 0.0:
+            outcome = f"none: undisturbed it does not walk on for {trial.settling:g} s"
+        elif not found.recovered > 0.0:
+            outcome = f"none: {found.failed:.2g} {found.unit} is too much"
+        yield Tried(TOLD[disturbance.name], outcome)

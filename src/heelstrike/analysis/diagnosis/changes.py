@@ -131,8 +131,8 @@ def _changes(run: Run, fall: Fall, gait: Gait | None) -> Iterator[Change]:
     law = "" if FOOTHOLD in run.log else balancing_law(run.robot, gait)
     balance = Change(
         Lever.CONTROLLER, law,
-        reason="it sets the next foot where the robot can be caught, and keeps the zero moment point "
-        "within the sole",
+        reason="it sets the next foot where the robot can be caught, and keeps the zero moment "
+        "point within the sole",
     )  # fmt: skip
     match fall.cause:
         case Cause.SLIPPED:
@@ -158,8 +158,8 @@ def _changes(run: Run, fall: Fall, gait: Gait | None) -> Iterator[Change]:
             if law:
                 yield Change(
                     Lever.CONTROLLER, law, fall.where,
-                    "it drives every joint towards what it plans; or mend the sign, the gain or the "
-                    "number that the controller gives this joint",
+                    "it drives every joint towards what it plans; or mend the sign, the gain or "
+                    "the number that the controller gives this joint",
                 )  # fmt: skip
         case Cause.NUMERICAL:
             step = getattr(run.method, "step", None)
@@ -211,5 +211,8 @@ def _stronger_motors(fall: Fall, gait: Gait | None) -> Iterator[Change]:
             f"the gait alone needs {gait.margins.peak_torque:.3g} N m",
         )  # fmt: skip
     yield Change(
-        Lever.GAIT_SPEED, 0.75, fall.where, "a slower gait asks its motors for less speed and torque"
+        Lever.GAIT_SPEED,
+        0.75,
+        fall.where,
+        "a slower gait asks its motors for less speed and torque",
     )

@@ -73,8 +73,9 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     run : Run
         The run.
     gait : Gait, optional
-        The gait that it followed. Without it, torques at their limits and joints at their stops
-        count when they last, and late steps by the steps of the run itself.
+        The gait that it followed. Without it, torques at their limits count when they last, late
+        steps by the steps of the run itself, and joints at their stops where nothing else is seen:
+        the gait may go there.
 
     Returns
     -------
@@ -92,7 +93,10 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     if run.completed and not _sinks(walk):
         return None
     end = float(run.time[-1])
-    chain = _unrecovered(find_symptoms(walk), end, RECOVERED * walk.step_duration)
+    found = find_symptoms(walk)
+    if gait is None and any(each.cause is not Cause.JOINT_STOP for each in found):
+        found = tuple(each for each in found if each.cause is not Cause.JOINT_STOP)
+    chain = _unrecovered(found, end, RECOVERED * walk.step_duration)
     if not chain:
         chain = [Symptom(Cause.UNKNOWN, end, end)]
     first = chain[0]
@@ -117,7 +121,7 @@ def _sinks(walk: Walk) -> bool:
 
 
 def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Symptom]:
-    """Symptoms between the last calm and the end, what a controller only answers after its cause."""
+    """Symptoms since the last calm before the end; what a controller answers after its cause."""
     first, latest = 0, 0.0
     for i, each in enumerate(found):
         if i and each.time - latest > calm:

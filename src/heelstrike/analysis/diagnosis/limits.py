@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.actuation import torque_bounds
-from heelstrike.analysis.friction import friction_use
+from heelstrike.analysis.friction import friction_coefficient, friction_use
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.run import Run
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.bool_]
 
 REACHED = 1.0 - 1e-6
 """Share of a limit from which it is reached, but for rounding."""
@@ -50,43 +51,51 @@ class Limit:
     detail: str
 
 
-def limits(run: Run) -> tuple[Limit, ...]:
+def limits(run: Run, *, until: float = math.inf) -> tuple[Limit, ...]:
     """List the limits of a run: those that were reached in the order of time, then the closest.
 
     Parameters
     ----------
     run : Run
         The run.
+    until : float
+        Rows after this time (s) are left out, such as those of a fall.
 
     Returns
     -------
     tuple of Limit
         One for each foot, motor and joint that has a limit.
     """
-    return tuple(sorted(_limits(run), key=lambda limit: (limit.reached, -limit.used)))
+    return tuple(
+        sorted(_limits(run, run.time <= until), key=lambda limit: (limit.reached, -limit.used))
+    )
 
 
-def _limits(run: Run) -> Iterator[Limit]:
-    if not len(run.time):
+def _limits(run: Run, shown: Rows) -> Iterator[Limit]:
+    if not shown.any():
         return
-    yield from _of_feet(run)
-    yield from _of_motors(run)
-    yield from _of_joints(run)
+    yield from _of_feet(run, shown)
+    yield from _of_motors(run, shown)
+    yield from _of_joints(run, shown)
 
 
-def _of_feet(run: Run) -> Iterator[Limit]:
-    use = friction_use(run).foot
+def _of_feet(run: Run, shown: Rows) -> Iterator[Limit]:
+    use, friction = friction_use(run).foot, friction_coefficient(run)
     zmp = zero_moment_point(run)
     alone = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
     for i, (foot, sole) in enumerate(zip(run.robot.feet, soles(run.robot), strict=True)):
-        if (found := _largest(run, use[:, i])) is not None:
+        if (found := _largest(run, use[:, i], shown)) is not None:
             k, used, reached = found
             time = float(run.time[k])
-            detail = f"at {time:.3g} s"
+            there = float(friction[k, foot.contacts[0]])
+            detail = f"{used * there:.3g} of {there:.3g} at {time:.3g} s"
             yield Limit(f"friction of the {_in_words(foot.name)}", "friction", used, time, reached,
                         detail)  # fmt: skip
         half = 0.5 * (sole.toe - sole.heel)
-        if has_length(run.robot, sole) and (found := _largest(run, 1.0 - alone[:, i] / half)) is not None:
+        if (
+            has_length(run.robot, sole)
+            and (found := _largest(run, 1.0 - alone[:, i] / half, shown)) is not None
+        ):
             k, used, reached = found
             time = float(run.time[k])
             margin = max(float(alone[k, i]), 0.0)
@@ -95,7 +104,7 @@ def _of_feet(run: Run) -> Iterator[Limit]:
             yield Limit(name, "zero moment point", used, time, reached, detail)
 
 
-def _of_motors(run: Run) -> Iterator[Limit]:
+def _of_motors(run: Run, shown: Rows) -> Iterator[Limit]:
     model = run.robot.model
     lower, upper, _ = torque_bounds(run)
     for i, name in enumerate(run.robot.actuator_names):
@@ -103,7 +112,7 @@ def _of_motors(run: Run) -> Iterator[Limit]:
         ends = np.where(torque < 0.0, lower[:, i], upper[:, i])
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(torque == 0.0, 0.0, torque / ends)
-        if np.isfinite(ends).any() and (found := _largest(run, share)) is not None:
+        if np.isfinite(ends).any() and (found := _largest(run, share, shown)) is not None:
             k, used, reached = found
             unit = "N m" if model.axis[model.actuator_joint[i], 0] != 0.0 else "N"
             time = float(run.time[k])
@@ -112,7 +121,7 @@ def _of_motors(run: Run) -> Iterator[Limit]:
         joint = model.actuator_joint[i]
         fastest = float(model.no_load_speed[joint])
         speed = np.abs(run.velocity[:, joint])
-        if np.isfinite(fastest) and (found := _largest(run, speed / fastest)) is not None:
+        if np.isfinite(fastest) and (found := _largest(run, speed / fastest, shown)) is not None:
             k, used, reached = found
             unit = "rad/s" if model.axis[joint, 0] != 0.0 else "m/s"
             time = float(run.time[k])
@@ -120,14 +129,14 @@ def _of_motors(run: Run) -> Iterator[Limit]:
             yield Limit(f"speed of {_in_words(name)}", "speed", used, time, reached, detail)
 
 
-def _of_joints(run: Run) -> Iterator[Limit]:
+def _of_joints(run: Run, shown: Rows) -> Iterator[Limit]:
     model = run.robot.model
     for joint, name in enumerate(run.robot.joint_names):
         low, high = float(model.lower[joint]), float(model.upper[joint])
         if not (np.isfinite(low) and np.isfinite(high) and high > low):
             continue
         angle = run.position[:, joint]
-        found = _largest(run, np.abs(angle - 0.5 * (low + high)) / (0.5 * (high - low)))
+        found = _largest(run, np.abs(angle - 0.5 * (low + high)) / (0.5 * (high - low)), shown)
         if found is None:
             continue
         k, used, reached = found
@@ -138,8 +147,9 @@ def _of_joints(run: Run) -> Iterator[Limit]:
         yield Limit(f"range of {_in_words(name)}", "joint", used, time, reached, detail)
 
 
-def _largest(run: Run, share: Floats) -> tuple[int, float, float] | None:
+def _largest(run: Run, share: Floats, shown: Rows) -> tuple[int, float, float] | None:
     """Row of the largest share (nt,), the share, and when it first reached 1 (s)."""
+    share = np.where(shown, share, np.nan)
     if not np.isfinite(share).any():
         return None
     k = int(np.nanargmax(np.where(np.isfinite(share), share, np.nan)))

@@ -156,7 +156,9 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
         )  # fmt: skip
         before = np.maximum(rows[1:] - 1, 0)
         down = [
-            -float(motion.contact_velocity[row, list(run.robot.feet[landing.foot].contacts), 1].min())
+            -float(
+                motion.contact_velocity[row, list(run.robot.feet[landing.foot].contacts), 1].min()
+            )
             for row, landing in zip(before, landings, strict=True)
         ]
         worst = int(np.argmax(down))
@@ -177,7 +179,10 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
     if run.robot.nu:
         transport = cost_of_transport(run, motion=motion)
         yield Measure(
-            "cost of transport", transport.absolute, "", f"{transport.positive:.3g} of positive work"
+            "cost of transport",
+            transport.absolute,
+            "",
+            f"{transport.positive:.3g} of positive work",
         )
         held, power = np.diff(run.time), np.abs(actuator_power(run)).sum(axis=1)
         if held.sum() > 0.0:

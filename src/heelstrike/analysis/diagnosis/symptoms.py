@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 SLOW = 1e-3
-"""Speed up to which a foot does not slide but creeps, in heights of the centre of mass by √(h/g)."""
+"""Speed up to which a foot creeps and does not slide, in heights h by √(h/g)."""
 SLID = 0.01
 """How far a pressed foot slides in one go, in heights of the centre of mass."""
 TIPPED, ROLLING = 0.01, 0.03
@@ -280,7 +280,7 @@ def _slips(walk: Walk) -> Iterator[Symptom]:
     friction = friction_coefficient(run)
     for foot in run.robot.feet:
         contacts = list(foot.contacts)
-        for first, last in _spells(run, sliding[:, contacts].any(axis=1)):
+        for first, last in _spells(run, np.asarray(sliding[:, contacts].any(axis=1))):
             after = min(last + 1, len(slid) - 1)
             distance = float((slid[after] - slid[first])[contacts].max())
             if distance < SLID * walk.height:
@@ -298,7 +298,7 @@ def _tips(walk: Walk) -> Iterator[Symptom]:
     A foot that has lost the ground so may rattle from its toe to its heel: where it began counts.
     """
     run, edge = walk.run, walk.edge
-    lost = ~(edge == FLAT).any(axis=1)
+    lost = np.asarray(~(edge == FLAT).any(axis=1))
     for first, last in _spells(run, lost):
         on = edge[first][edge[first] != NOTHING_PUSHES]
         if run.time[last] - run.time[first] < ROLLING or not len(on) or abs(on.sum()) != len(on):
@@ -315,7 +315,9 @@ def _tips(walk: Walk) -> Iterator[Symptom]:
 
 def _landings_amiss(walk: Walk) -> Iterator[Symptom]:
     """Find feet that meet the ground in mid-swing, at the speed at which they swing."""
-    run, left, landed = walk.run, {}, {}
+    run = walk.run
+    left: dict[int, float] = {}
+    landed: dict[int, float] = {}
     for stance in stances(run):
         foot, time = stance.foot, stance.touchdown
         others = [when for other, when in landed.items() if other != foot]
@@ -454,7 +456,9 @@ def _runaways(walk: Walk) -> Iterator[Symptom]:
 def _departures(walk: Walk) -> Iterator[Symptom]:
     """Find joints that leave the gait while their motors do nothing against it, or help."""
     run, error = walk.run, walk.error
-    if error is None or FOOTHOLD in run.log:  # a law that plans its steps leaves the gait on purpose
+    if (
+        error is None or FOOTHOLD in run.log
+    ):  # a law that plans its steps leaves the gait on purpose
         return
     away = np.abs(error)
     let = (away > LEAVES) & (run.torque * error >= 0.0)

@@ -31,16 +31,18 @@ def packed(time: Floats, columns: Mapping[str, Floats]) -> dict[str, Any]:
     -------
     dict
         ``rows``; ``time`` in base64 of little-endian float64; ``columns``, name and numbers a row
-        and rows of each, 1 or n, with the least value and the step of each number a row; ``numbers``
-        in base64, one after the other, and each row by row. Of a number with a step, rows are the
-        third differences of whole steps from the least value, with the sign as last bit, plus one;
-        0 of what is not known; in bytes of seven bits, the lowest first, of which all but the last
-        have the eighth bit. Without a step, rows are little-endian float32.
+        and rows of each, 1 or n, with the least value and the step of each number a row;
+        ``numbers`` in base64, one after the other, and each row by row. Of a number with a step,
+        rows are the third differences of whole steps from the least value, with the sign as last
+        bit, plus one; 0 of what is not known; in bytes of seven bits, the lowest first, of which
+        all but the last have the eighth bit. Without a step, rows are little-endian float32.
     """
     layout, parts = [], []
     for name, values in columns.items():
         table = values.reshape(len(time), -1)
-        if len(table) > 1 and np.array_equal(table, table[:1].repeat(len(table), 0), equal_nan=True):
+        if len(table) > 1 and np.array_equal(
+            table, table[:1].repeat(len(table), 0), equal_nan=True
+        ):
             table = table[:1]
         least, step = [], []
         for column in table.T:
@@ -49,7 +51,13 @@ def packed(time: Floats, columns: Mapping[str, Floats]) -> dict[str, Any]:
             step.append(by)
             parts.append(_coded(column, low, by))
         layout.append(
-            {"name": name, "width": table.shape[1], "rows": len(table), "least": least, "step": step}
+            {
+                "name": name,
+                "width": table.shape[1],
+                "rows": len(table),
+                "least": least,
+                "step": step,
+            }
         )
     return {
         "rows": len(time),
@@ -79,7 +87,7 @@ def _coded(column: Floats, low: float, step: float) -> bytes:
         change = np.diff(change, prepend=0)
     code = np.zeros(len(column), dtype=np.int64)
     code[known] = 1 + np.where(change < 0, -2 * change - 1, 2 * change)
-    length = 1 + sum((code >> 7 * k > 0).astype(np.int64) for k in range(1, 5))
+    length = 1 + (code[:, None] >> np.arange(7, 35, 7) > 0).sum(axis=1)
     coded = np.zeros(int(length.sum()), dtype=np.uint8)
     begin = np.cumsum(length) - length
     for k in range(int(length.max(initial=0))):
