@@ -13,6 +13,8 @@ from synthetic_runs import box, make_run
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
+from heelstrike.experiments import what_if
+from heelstrike.experiments.zoo.disturbances import Effort
 from heelstrike.sim import RunStatus
 from heelstrike.view.report import writing
 
@@ -48,13 +50,42 @@ def test_a_run_is_reported_with_the_gait_beside_it(folder: Path, tmp_path: Path)
 def test_a_robot_is_walked_by_several_methods(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
     gait = str(folder / "gait.json")
-    ways = ("--method", "time-stepping", "--method", "paper-symplectic")
-    result = report("bravo7", "--gait", gait, "--steps", "1", *ways, "--out", str(out))
+    ways = ("--method", "time-stepping", "--method", "moreau-jean")
+    result = report(
+        "bravo7", "--gait", gait, "--steps", "1", "--no-tries", *ways, "--out", str(out)
+    )
     assert result.exit_code == 0, result.stderr
     assert [line.partition(":")[0] for line in result.stdout.splitlines()] == [
-        "time-stepping", "paper-symplectic"
+        "time-stepping", "moreau-jean"
     ]  # fmt: skip
     assert "Differences from time-stepping" in out.read_text(encoding="utf-8")
+
+
+def test_a_fall_is_explained_and_its_mend_tried(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(what_if, "EFFORT", Effort(strides=1, halvings=0))
+    gait, out = str(folder / "gait.json"), tmp_path / "report.html"
+    walk = ("bravo7", "--gait", gait, "--steps", "3", "--push", "trunk:300:1:0.1", "--json")
+    result = report(*walk, "--out", str(out))
+    assert result.exit_code == 1, result.stderr
+    (found,) = json.loads(result.stdout).values()
+    assert found["fall"]["cause"] == "tipped forward"
+    assert found["changes"][0]["lever"] == "controller"
+    assert found["changes"][0]["value"] == "FootstepFeedback"
+    assert [each["lasted"] for each in found["tried"]] == [True, None, None, None, None]
+    text = out.read_text(encoding="utf-8")
+    for part in ("What happened, causes before consequences", "a push of 300 N on the trunk",
+                 "hs.FootstepFeedback(robot, gait)", "Tried: it walks", "Tried beside this run",
+                 "largest push forwards", "steepest climb"):  # fmt: skip
+        assert part in text, part
+
+
+def test_a_run_from_a_file_says_why_nothing_was_tried(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "report.html"
+    result = report(str(folder / "run.nc"), "--out", str(out))
+    assert "does not hold its controller" in out.read_text(encoding="utf-8")
+    assert "not tried" in result.stdout
 
 
 def test_one_that_fell_has_its_exit_status(tmp_path: Path) -> None:
@@ -74,6 +105,7 @@ def test_one_that_fell_has_its_exit_status(tmp_path: Path) -> None:
         (("run.nc", "bravo7"), "not both"),
         (("bravo7", "rabbit"), "one robot is walked"),
         (("run.nc", "--steps", "3"), "--steps"),
+        (("run.nc", "--no-tries"), "--tries"),
         (("run.nc", "--package-path", "."), "--package-path"),
         (("run.nc",), "there is no file"),
         (("bravo7", "--out", "report.pdf"), "prints it to PDF"),

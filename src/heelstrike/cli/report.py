@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from heelstrike.gait import Gait
     from heelstrike.sim import Run
 
-OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "floating", "projected",
-             "forward", "pose", "mirror", "package_path")  # fmt: skip
+OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "tries", "floating",
+             "projected", "forward", "pose", "mirror", "package_path")  # fmt: skip
 """Options that say how a robot walks, and nothing to a run that is read."""
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"

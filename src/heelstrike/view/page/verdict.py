@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from heelstrike.analysis.actuation import distance_travelled
 from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
 from heelstrike.analysis.diagnosis.falls import Fall, first_cause
-from heelstrike.analysis.diagnosis.limits import REACHED, Limit, limits
+from heelstrike.analysis.diagnosis.limits import Limit, limits
 from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom
 from heelstrike.analysis.support import walking_steps
 from heelstrike.gait.gait import Gait
@@ -19,8 +19,6 @@ from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.view.style import in_words
-
-__all__ = ["REACHED", "Limit", "Verdict", "judge", "told"]
 
 SHOWN = 4
 """Links of the chain of a fall that its sentence has."""
