@@ -83,6 +83,8 @@ def test_pushes_and_slopes_that_a_walk_withstands() -> None:
 
 
 def test_what_cannot_be_tried_says_why() -> None:
+    (lost,) = what_if.try_disturbances(falls.KNOWN["ice"].case())
+    assert lost.outcome == "not tried: undisturbed it does not walk on for 7 s"
     run = make_run(pendulum(), [0.0, 0.1])
     (tried,) = what_if.tried_beside(None, run)
     assert tried.lasted is None

@@ -200,9 +200,13 @@ def try_disturbances(case: Case) -> Iterator[Tried]:
         if disturbance.name not in TOLD:
             continue
         found = disturbance.measure(trial, PHASE, EFFORT)
-        outcome = str(found)
         if not found.failed > 0.0:
-            outcome = f"none: undisturbed it does not walk on for {trial.settling:g} s"
-        elif not found.recovered > 0.0:
+            yield Tried(
+                "pushes and slopes",
+                f"not tried: undisturbed it does not walk on for {trial.settling:g} s",
+            )
+            return
+        outcome = str(found)
+        if not found.recovered > 0.0:
             outcome = f"none: {found.failed:.2g} {found.unit} is too much"
         yield Tried(TOLD[disturbance.name], outcome)

@@ -28,11 +28,11 @@ def test_a_walk_that_reaches_nothing() -> None:
     assert verdict.good
     assert verdict.headline.startswith("bravo7 walks: 2 steps, 0.")
     assert verdict.headline.endswith(
-        "Nothing has to change for this walk; no push and no slope was tried."
+        "Nothing has to change for this walk. No push and no slope was tried."
     )
     push = Tried("largest push", "5 N s (not 6)")
     tried = judge(walking.walk(steps=2), walking.gait(), tried=[push])
-    assert tried.headline.endswith("tried beside it: largest push: 5 N s (not 6).")
+    assert tried.headline.endswith("Tried beside it: largest push: 5 N s (not 6).")
     assert tried.tried == (push,)
     assert verdict.advice == ()
     assert {limit.kind for limit in verdict.limits} == {
@@ -94,6 +94,16 @@ def test_a_fall_names_what_came_first() -> None:
     assert "torque of right hip" not in {v.name for v in verdict.limits if v.reached < math.inf}
     without = judge(falls.run_of("pushed forwards"))
     assert "its gait is not known here" in without.headline
+
+
+def test_a_walk_without_reserve_is_told_so() -> None:
+    """It lasts, and its feet use all of the friction that there is."""
+    force = pushes(walking.bravo7(), [[0], [0]])
+    force[1, :, 1] = 0.75 * force[1, :, 0]
+    verdict = judge(make_run(walking.bravo7(), [0.0, 0.1], force=force))
+    assert verdict.good
+    assert "friction of the right foot has no reserve at 0.1 s" in verdict.advice[0]
+    assert "Nothing has to change" not in verdict.headline
 
 
 def test_what_was_seen_to_work_comes_first() -> None:

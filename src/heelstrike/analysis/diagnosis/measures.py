@@ -25,6 +25,8 @@ Floats = NDArray[np.float64]
 
 MID_SWING = (0.2, 0.8)
 """Parts of a swing between which its clearance counts: the foot is on the ground at both ends."""
+ROUNDING = 1e-9
+"""Slip (m) of points that stick, but for rounding."""
 STEPPED = 0.1
 """Shortest swing that counts (s): what is shorter is chatter."""
 
@@ -167,7 +169,9 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
             f"downwards, at {landings[worst].touchdown:.3f} s",
         )  # fmt: skip
     if run.robot.nc:
-        yield Measure("slip of a pressed contact point", 1e3 * max_slip(run), "mm", "in all")
+        slip = max_slip(run)
+        slid = 1e3 * slip if slip > ROUNDING else 0.0
+        yield Measure("slip of a pressed contact point", slid, "mm", "in all")
     if gait is not None:
         error = tracking_error(run, gait)
         row, joint = np.unravel_index(int(np.abs(error.position).argmax()), error.position.shape)

@@ -78,6 +78,8 @@ def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) ->
     found = limits(run, until=math.inf if fall is None else fall.time)
     asked = () if fall is None else changes(run, fall, gait)
     advice = tuple(_advice(run, fall, asked, gait, tried))
+    if fall is None and found and math.isfinite(found[0].reached):
+        advice += (_no_reserve(found[0]),)
     good = run.completed and fall is None and not run.solver.failures
     parts = [_does(run, fall)]
     if fall is not None:
@@ -90,7 +92,9 @@ def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) ->
     if advice:
         parts.append(f"To change: {advice[0]}")
     elif good:
-        parts.append(f"Nothing has to change for this walk; {_what_was_tried(tried)}.")
+        parts.append("Nothing has to change for this walk.")
+    if good:
+        parts.append(f"{_what_was_tried(tried)}.")
     return Verdict(good, " ".join(parts), found, advice, fall, asked, tuple(tried))
 
 
@@ -156,7 +160,7 @@ def told(symptom: Symptom, robot: Robot, *, when: bool = True) -> str:
     match symptom.cause:
         case Cause.SLIPPED:
             return (
-                f"the {where} slides{at}, by "
+                f"the {where} slides{at} by "
                 f"{number('distance_m', 1e3):.3g} mm, on a ground of friction {given['friction']}"
             )
         case Cause.TIPPED_FORWARD:
@@ -202,8 +206,8 @@ def _percent(share: float) -> str:
 
 def _what_was_tried(tried: Sequence[Tried]) -> str:
     if not tried:
-        return "no push and no slope was tried"
-    return "tried beside it: " + "; ".join(f"{each.what}: {each.outcome}" for each in tried)
+        return "No push and no slope was tried"
+    return "Tried beside it: " + "; ".join(f"{each.what}: {each.outcome}" for each in tried)
 
 
 def _advice(
@@ -223,6 +227,23 @@ def _advice(
         yield f"{_in_words(each)}{reason}.{seen}"
     if fall is not None and not asked:
         yield _without_a_change(fall, gait)
+
+
+RESERVE = {
+    "friction": "optimize_gait(robot, friction=...) for less than there is keeps some",
+    "zero moment point": "optimize_gait(robot, zmp_margin=...) keeps some",
+    "torque": "a gait of smaller step_length, or another step_duration, may ask for less",
+    "speed": "a slower gait, or another reduction of the motor, keeps some",
+    "joint": "optimize_gait(robot, joint_ranges=...) keeps some",
+}
+"""What gives a walk that lasts a reserve, by the kind of limit that it reaches."""
+
+
+def _no_reserve(limit: Limit) -> str:
+    return (
+        f"the walk lasts, but {limit.name} has no reserve at {limit.reached:.3g} s: "
+        f"{RESERVE[limit.kind]}."
+    )
 
 
 def _seen(tried: Tried | None) -> str:

@@ -258,7 +258,7 @@ def _measures(named: Mapping[str, Run], gait: Gait | None) -> Iterator[str]:
     for name, run in named.items():
         of = f": {name}" if len(named) > 1 else ""
         rows = [
-            (each.name, f"{each.value:.4g} {each.unit}".strip(), each.detail)
+            (each.name, f"{each.value:.3g}\u00a0{each.unit}".strip(), each.detail)
             for each in measures(run, gait)
         ]
         if rows:
@@ -278,7 +278,7 @@ def _measures(named: Mapping[str, Run], gait: Gait | None) -> Iterator[str]:
             slides = " (N and m/s of slides)" if "N" in units else ""
             heading = ("", "peak torque (N m)", "rms (N m)", "peak speed (rad/s)",
                        "mean power (W)", "peak power (W)")  # fmt: skip
-            yield grid(heading, loads, f"Motors{slides}{of}")
+            yield f'<div class="wide">{grid(heading, loads, f"Motors{slides}{of}")}</div>'
 
 
 def _limits(name: str, verdict: Verdict, several: int) -> str:
