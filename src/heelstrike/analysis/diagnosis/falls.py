@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -97,6 +98,8 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     if gait is None and any(each.cause is not Cause.JOINT_STOP for each in found):
         found = tuple(each for each in found if each.cause is not Cause.JOINT_STOP)
     chain = _unrecovered(found, end, RECOVERED * walk.step_duration)
+    if not chain and run.completed:  # it squats
+        return None
     if not chain:
         chain = [Symptom(Cause.UNKNOWN, end, end)]
     first = chain[0]
@@ -122,7 +125,7 @@ def _sinks(walk: Walk) -> bool:
 
 def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Symptom]:
     """Symptoms since the last calm before the end; what a controller answers after its cause."""
-    first, latest = 0, 0.0
+    first, latest = 0, -math.inf
     for i, each in enumerate(found):
         if i and each.time - latest > calm:
             first = i
