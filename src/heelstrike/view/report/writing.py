@@ -17,6 +17,7 @@ from heelstrike.analysis.diagnosis.limits import REACHED, Limit
 from heelstrike.analysis.diagnosis.measures import measures, motor_loads
 from heelstrike.analysis.summary import lines, summarize
 from heelstrike.analysis.support import walking_steps
+from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.push import Push
@@ -50,6 +51,7 @@ PIXELS = 110
 """Dots an inch of what a figure does not draw as lines."""
 
 
+@takes(ViewError)
 def report(
     runs: Run | Mapping[str, Run] | Sequence[Run],
     path: str | os.PathLike[str],
