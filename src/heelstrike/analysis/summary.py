@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import json
 import math
 import string
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from heelstrike.analysis.actuation import cost_of_transport, torque_cost
+from heelstrike.analysis.diagnosis.falls import first_cause
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
@@ -55,6 +57,8 @@ class Summary:
         Name of the robot.
     status, message : str
         How the run ended.
+    first_cause : str
+        Why it did not go well, what came first in time first; nothing if it did.
     steps : int
         Walking steps taken: touchdowns of alternating feet.
     distance_m : float
@@ -99,6 +103,7 @@ class Summary:
     robot: str
     status: str
     message: str
+    first_cause: str
     steps: int
     distance_m: float
     duration_s: float
@@ -197,6 +202,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         If the gait does not fit the robot of the run.
     """
     motion = run_motion(run)
+    fall = first_cause(run, gait)
     duration = float(run.time[-1] - run.time[0]) if len(run.time) else 0.0
     tracking = tracking_error(run, gait) if gait is not None and len(run.time) else None
     zmp = zero_moment_point(run, motion=motion)
@@ -206,6 +212,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         robot=run.robot.name,
         status=run.status.value,
         message=run.message,
+        first_cause="" if fall is None else str(fall),
         steps=len(walking_steps(run)),
         distance_m=transport.distance,
         duration_s=duration,
@@ -241,6 +248,8 @@ def plain(value: Any) -> Any:
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
+    if isinstance(value, enum.Enum):
+        return value.value
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -256,6 +265,7 @@ class _Words(string.Formatter):
 # What a person reads, in letters that the consoles of Windows have.
 LINES = {
     "status": "{s.status}",
+    "first cause": "{s.first_cause}",
     "steps": "{s.steps}",
     "distance": "{s.distance_m:.4} m in {s.duration_s:.4} s ({s.speed:.3} m/s)",
     "gait": "{s.gait.step_length_m:.3} m in {s.gait.step_duration_s:.3} s a step, "
@@ -286,4 +296,5 @@ def lines(s: Summary) -> list[tuple[str, str]]:
         for label, line in LINES.items()
         if (s.gait is not None or label not in OF_A_GAIT)
         and (s.energy_gain_J > 0.0 or label != OF_A_GAIN)
+        and (s.first_cause or label != "first cause")
     ]

@@ -143,11 +143,11 @@ def certificates(run: Run) -> dict[str, str]:
     }
 
 
-def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
-    """Return what the script of a page shows, as JSON has it.
+def contents(run: Run, gait: Gait | None = None, *, shown: float | None = None) -> dict[str, Any]:
+    """Return what the script of a page shows, as JSON has it; `shown` is when it begins (s).
 
-    Numbers of the rows shown are those of the run to a float32's rounding, times are exact. Forces
-    are means from each row shown to the next.
+    Numbers of the rows shown are those of the run to `TOLERANCE` of their range, times are exact.
+    Forces are means from each row shown to the next.
     """
     rows = shown_rows(run)
     motion = run_motion(run)
@@ -168,7 +168,7 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
         "left_out": len(run.events) - len(events),
         "recorded": len(run.time),
         "tolerance": TOLERANCE,
-    }
+    } | ({} if shown is None else {"shown": shown})
 
 
 def _described(event: Event, run: Run) -> dict[str, Any]:

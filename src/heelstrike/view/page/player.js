@@ -271,9 +271,9 @@
     }));
   }
   at("rows").textContent = `This page holds ${count} of ${run.recorded} rows of the record, those `
-    + "beside events and about impacts among them; its numbers are those of the record to "
-    + `${run.tolerance.toExponential(0)} of their size. Between rows places are drawn on straight `
-    + "lines; forces are means from each row to the next.";
+    + "beside events and about impacts among them; times are exact, other numbers are those of the "
+    + `record to ${run.tolerance.toExponential(1)} of the range of their curve. Between rows places `
+    + "are drawn on straight lines; forces are means from each row to the next.";
 
   function all() {
     kept.clear();
