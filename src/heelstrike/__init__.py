@@ -124,6 +124,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import RunStatus as RunStatus
     from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import Simulation as Simulation
+    from heelstrike.sim import SimulationWarning as SimulationWarning
     from heelstrike.sim import Snapshot as Snapshot
     from heelstrike.sim import TimeStepping as TimeStepping
     from heelstrike.sim import load_run as load_run
@@ -184,6 +185,7 @@ _HOME = {
     "Sensed": "heelstrike.control",
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
+    "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",

@@ -78,6 +78,8 @@ class Summary:
         Largest distance that a contact point slid while pressed, over the whole run.
     penetration_max_m, complementarity_max : float
         Worst values over all steps, from the certificates; the latter is relative.
+    energy_gain_J : float
+        Kinetic energy that restitution with friction made in impacts.
     solver : SolverCount
         How the contact problems were solved.
     torque_cost_N2m2s : float
@@ -120,6 +122,7 @@ class Summary:
     compile_s: float
     wall_s: float
     real_time_factor: float
+    energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
 
     @property
     def speed(self) -> float:
@@ -219,6 +222,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         slip_max_m=max_slip(run),
         penetration_max_m=run.certificates.penetration,
         complementarity_max=run.certificates.complementarity,
+        energy_gain_J=run.certificates.energy_gain,
         solver=run.solver,
         torque_cost_N2m2s=torque_cost(run),
         cost_of_transport=transport.absolute,
@@ -263,6 +267,7 @@ LINES = {
     "slip": "{s.slip_max_m:.2} m",
     "penetration": "{s.penetration_max_m:.2} m",
     "contact problems": "{s.solver}; complementarity {s.complementarity_max:.2}",
+    "energy made by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "cost of transport": "{s.cost_of_transport:.3} "
     "({s.cost_of_transport_positive:.3} positive work)",
     "torques at their limit": "{s.saturations}",
@@ -270,6 +275,7 @@ LINES = {
     "compilation {s.compile_s:.3} s",
 }
 OF_A_GAIT = ("gait", "joint tracking error")
+OF_A_GAIN = "energy made by impacts"
 
 
 def lines(s: Summary) -> list[tuple[str, str]]:
@@ -278,5 +284,6 @@ def lines(s: Summary) -> list[tuple[str, str]]:
     return [
         (label, write(line, s=s))
         for label, line in LINES.items()
-        if s.gait is not None or label not in OF_A_GAIT
+        if (s.gait is not None or label not in OF_A_GAIT)
+        and (s.energy_gain_J > 0.0 or label != OF_A_GAIN)
     ]

@@ -37,9 +37,10 @@ def solve_contact_kernel(
 ) -> int:
     """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
 
-    The modes of the answer are tried first. Unless their certificate is clean, the solvers in
-    ``order`` are called in turn until one is certified and clean; an answer that is certified
-    but not clean stands if those after it do no better, and does not count as a fallback.
+    The modes of the answer are tried first. Unless their answer is certified and contradicts none
+    of them, the solvers in ``order`` are called in turn until one is certified; if patient, until
+    one is clean, and an answer that is certified but not clean stands if those after it do no
+    better, and does not count as a fallback.
 
     Parameters
     ----------
@@ -223,6 +224,7 @@ def run_solvers(
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
     work.settings.amendments = 0  # nobody has guessed the modes
+    work.settings.patient = 1
     work.settings.skewed = 0 if semidefinite else 1
     problem = ContactProblem.allocate(
         nc=count, count=count, delassus=matrix, free=offset, friction=friction,

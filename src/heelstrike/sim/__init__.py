@@ -44,7 +44,7 @@ from heelstrike.sim.run import Certificates, Event, Logged, Run, SolverCount, Ti
 from heelstrike.sim.setting import Setting as Setting
 from heelstrike.sim.simulation import Simulation, simulate
 from heelstrike.sim.snapshot import Snapshot, load_snapshot
-from heelstrike.sim.time_stepping import TimeStepping
+from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
 
 __all__ = [
     "Batch",
@@ -67,6 +67,7 @@ __all__ = [
     "RunStatus",
     "Scheme",
     "Simulation",
+    "SimulationWarning",
     "Snapshot",
     "SolverCount",
     "TimeStepping",

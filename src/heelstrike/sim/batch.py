@@ -76,7 +76,9 @@ class Batch:
         Deepest penetration of a contact point, in m.
     complementarity, cone, non_penetration : (n,) float
         Largest relative residuals of the contact problems.
-    solves, shortcuts, fallbacks, failures : (n,) int
+    energy_gain : (n,) float
+        Kinetic energy that restitution made (J).
+    solves, shortcuts, fallbacks, failures, combinations, relaxed : (n,) int
         Contact problems of each run, and how they were solved; see
         :class:`~heelstrike.sim.run.SolverCount`.
     threads : int
@@ -97,10 +99,13 @@ class Batch:
     complementarity: Floats
     cone: Floats
     non_penetration: Floats
+    energy_gain: Floats
     solves: Integers
     shortcuts: Integers
     fallbacks: Integers
     failures: Integers
+    combinations: Integers
+    relaxed: Integers
     threads: int
     timing: Timing
     _runs: tuple[Run | None, ...] | None = field(default=None, repr=False)

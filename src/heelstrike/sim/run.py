@@ -144,12 +144,16 @@ class Certificates:
         Deepest penetration of a contact point, in metres.
     complementarity, cone, non_penetration : float
         Largest residuals of the contact problems, relative to the size of their data.
+    energy_gain : float
+        Kinetic energy that Newton's restitution with friction made, of all impacts together (J).
+        Events of kind ``ENERGY_GAIN`` tell when.
     """
 
     penetration: float
     complementarity: float
     cone: float
     non_penetration: float
+    energy_gain: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -163,6 +167,10 @@ class SolverCount:
     solves, shortcuts, fallbacks, failures : int
         Contact problems; those answered by the modes of the step before, verified; those that
         needed another solver; those that none could certify.
+    combinations : int
+        Of the latter two, those that came to the last resort, combinations of contact modes.
+    relaxed : int
+        Steps that were asked for less than to leave the ground and to bounce: in a wedge.
     """
 
     name: str
@@ -170,6 +178,8 @@ class SolverCount:
     shortcuts: int
     fallbacks: int
     failures: int
+    combinations: int = 0
+    relaxed: int = 0
 
     def __str__(self) -> str:
         backed = f" with {self.fallbacks} fallbacks" if self.fallbacks else ""
@@ -177,6 +187,8 @@ class SolverCount:
             "by the modes of the step before": self.shortcuts,
             f"by {self.name}{backed}": self.solves - self.shortcuts - self.failures,
             "unsolved": self.failures,
+            "by combinations of modes, or not even so": self.combinations,
+            "steps left in a wedge": self.relaxed,
         }
         parts = ", ".join(f"{count} {how}" for how, count in counts.items() if count)
         return f"{self.solves}: {parts}" if parts else "none"
@@ -353,6 +365,15 @@ class Run:
     def completed(self) -> bool:
         """Whether the run lasted as long as it was asked to."""
         return self.status is RunStatus.COMPLETED
+
+    @property
+    def doubt(self) -> str:
+        """Why the run may mean little though it was completed; empty if nothing is known."""
+        if not len(self.time):
+            return ""
+        begun = max(0.0, -float(self.gap[0].min(initial=0.0)))
+        sunk = self.certificates.penetration - begun
+        return "; ".join(self.method.doubts(self.robot, self.position[0], sunk))
 
     @property
     def final_state(self) -> State:

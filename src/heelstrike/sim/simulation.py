@@ -554,15 +554,21 @@ class Simulation:
                 f"the simulation could not go on at {self._now}: {reason}"
                 if reason
                 else f"the state stopped being finite at {self._now}; try a smaller step or softer "
-                "gains"
+                f"gains{self._doubts}"
             )
         if outcome is Outcome.SOLVER_FAILED:
             reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
                 f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
+                f"{self._doubts}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
+
+    @property
+    def _doubts(self) -> str:
+        doubts = self.method.doubts(self.robot, self._setting.state.q)
+        return "".join(f". {doubt[0].upper()}{doubt[1:]}" for doubt in doubts)
 
     def _not_finite(self, actuator: int, when: str) -> tuple[RunStatus, str]:
         return RunStatus.CONTROLLER_FAILED, (

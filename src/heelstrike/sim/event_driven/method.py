@@ -143,9 +143,9 @@ class EventDriven(Method):
         Longest step in seconds; an open contact point that would touch the ground and leave it
         again within a quarter of this may only be seen thanks to its velocity.
     output_period : float or None
-        Seconds between two rows of the record, which come from the dense output and cost no
-        accuracy; None for a row at every step. Events have rows of their own: one, or two if
-        velocities jump.
+        Seconds between two rows of the record, which come from the dense output: they change no
+        step, and are up to some ten times as wrong as the ends of steps. None for a row at every
+        step. Events have rows of their own: one, or two if velocities jump.
     solver : str
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``.
     swing_feet_pass : bool
@@ -322,7 +322,7 @@ def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Recor
     for contact in range(phase.watched):
         phase.hit[contact] = 0
         phase.plastic[contact] = phase.closed[contact]
-    solved, _ = collide(model, nudge, memory, phase, phase.begin)
+    solved, _, _ = collide(model, nudge, memory, phase, phase.begin)
     for contact in range(phase.watched):
         phase.plastic[contact] = 0
     for contact in range(phase.first_dry):
@@ -691,6 +691,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.assembly.solver.settings.amendments = 0
+    memory.assembly.solver.settings.patient = 1
     if rows_of(memory.loops) > 0:
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED

@@ -132,12 +132,14 @@ def check_gait(gait: object) -> None:
 def certificates(run: Run) -> dict[str, str]:
     """Return the worst values of a run's certificates, label by label."""
     worst = run.certificates
+    made = {"energy made by restitution": f"{worst.energy_gain:.3g} J"}
     return {
         "deepest penetration": f"{worst.penetration:.3g} m",
         "residual of complementarity": f"{worst.complementarity:.3g} of the data",
         "residual of the friction cone": f"{worst.cone:.3g} of the data",
         "residual of non-penetration": f"{worst.non_penetration:.3g} of the data",
         "contact problems": str(run.solver),
+        **(made if worst.energy_gain > 0.0 else {}),
     }
 
 

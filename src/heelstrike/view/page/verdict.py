@@ -67,7 +67,8 @@ class Verdict:
     Attributes
     ----------
     good : bool
-        Whether it lasted as long as it was asked to and every contact problem was certified.
+        Whether it lasted as long as it was asked to, every contact problem was certified and
+        nothing puts its numbers in doubt.
     headline : str
         Does it walk, how close to its limits, what to change: in one line.
     limits : tuple of Limit
@@ -99,7 +100,7 @@ def judge(run: Run, gait: Gait | None = None) -> Verdict:
     """
     limits = tuple(sorted(_limits(run), key=lambda limit: (limit.reached, -limit.used)))
     advice = tuple(_advice(run, gait, limits))
-    good = run.completed and not run.solver.failures
+    good = run.completed and not run.solver.failures and not run.doubt
     parts = [_does(run)]
     if limits:
         first = limits[0]
@@ -232,6 +233,14 @@ def _advice(run: Run, gait: Gait | None, limits: tuple[Limit, ...]) -> Iterator[
         yield (
             f"{run.solver.failures} contact problems have no certified solution: try another "
             "solver or a smaller step before believing this run."
+        )
+    if run.doubt:
+        yield f"{run.doubt}."
+    if run.certificates.energy_gain > 0.0:
+        yield (
+            f"restitution with friction made {run.certificates.energy_gain:.3g} J in impacts "
+            "(Kane's paradox; events ENERGY_GAIN): less restitution or friction, or "
+            "TimeStepping(bounded_restitution=True), which scales restitution back there."
         )
     if run.status is RunStatus.DIVERGED:
         yield "Numbers grew beyond all bounds: a smaller time step, or smaller gains."
