@@ -14,11 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 import heelstrike as hs
-from heelstrike.cli import walk as walk_module
 from heelstrike.cli.main import app
-from heelstrike.cli.options import method_called
 from heelstrike.experiments.results import OF_MOTORS
-from heelstrike.sim import Scheme
 from heelstrike.view.figures import FIGURES
 
 STEPS = 3  # of the walk in conftest.py
@@ -402,13 +399,6 @@ def test_a_passive_walker_starts_on_its_cycle(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert "of 4 steps" in result.stderr
     assert "--method event-driven lets them swing through" in result.stderr
-
-
-def test_schemes_are_those_of_the_library() -> None:
-    assert [scheme.name for scheme in walk_module.Scheme] == [scheme.name for scheme in Scheme]
-    for scheme in walk_module.Scheme:
-        assert method_called(scheme, 1e-4) == hs.TimeStepping(step=1e-4, scheme=Scheme[scheme.name])
-        assert Scheme[scheme.name].label == scheme.value
 
 
 def test_page_of_a_walk(walk: Callable[..., Any], tmp_path: Path) -> None:

@@ -233,6 +233,7 @@ class Session:
 
     def _rate(self, _: str, command: Mapping[str, Any]) -> None:
         self.rate = min(max(_finite(command["value"]), RATES[0]), RATES[1])
+        self._goal = self.cursor  # what the machine owes the rate before is let go
 
     def _hold(self, viewer: str, command: Mapping[str, Any]) -> None:
         live = self._needs_live()
