@@ -661,6 +661,8 @@ class Simulation:
                 "begin another simulation with it, from state=simulation.state"
             )
         self._kernel = compiled.function.finish()
+        if python is not None:  # loops do not call it, and Numba need not look for its addresses
+            self._kernel = compiled.function.separate
         voltage = commands_voltage(controller, robot)
         self.method.set_clock(setting, clock)
         self._setting, self._logs, self._python_log = setting, ready, told
@@ -669,10 +671,10 @@ class Simulation:
         self._endings = () if law is None else law.function.endings
         self._why_stopped = ""
         self._control.voltage = voltage
-        self._name = f"{type(controller).__name__}.torque"
+        self._name: str = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
-        self._shown = read_only(memory.contacts)
+        self._shown: Contacts = read_only(memory.contacts)
         if law is not None:
             self._name = f"controller {law.function.name!r}"
         self._take_gains(law, voltage)

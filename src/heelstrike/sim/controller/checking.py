@@ -28,7 +28,7 @@ SCRATCH = ("kinematics.acceleration", "kinematics.force", "kinematics.composite"
 FREE = ("robot", "memory", "log", "torque")
 """What a law may write to."""
 
-SELDOM = 200
+SELDOM = 50
 """Calls of a query that are not worth compiling it."""
 
 Arrays = Callable[[str, Any, bool], Any]
@@ -78,14 +78,17 @@ class CheckedCall:
         torque = self._given["torque"]
         before = self._kept.copy(), torque.copy()
         shown = self._shown
+        refused: Exception
         try:
-            self._call(*(t if name == "t" else shown[name] for name in self._names))
-        except (IndexError, ValueError):
+            self._call(*[t if name == "t" else shown[name] for name in self._names])
+            return
+        except (IndexError, ValueError) as error:
             if not self._repeats:
                 raise
-            self._kept[:], torque[:] = before
-            self._call_by_name(t)
-            raise
+            refused = error
+        self._kept[:], torque[:] = before
+        self._call_by_name(t)
+        raise refused
 
     def _call_by_name(self, t: Any) -> None:
         """Call it with arrays that say what they are when they refuse something."""
@@ -129,15 +132,20 @@ class _Query:
 def _what_indices_follow_from(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
     """Return sizes of arrays, whole numbers, and which bundles they are."""
     return tuple(
-        each.shape
-        if isinstance(each, np.ndarray)
-        else id(each)
-        if isinstance(each, Bundle)
-        else None
-        if isinstance(each, float | tuple)
-        else each
-        for each in arguments
+        [
+            each.shape
+            if isinstance(each, np.ndarray)
+            else id(each)
+            if isinstance(each, Bundle)
+            else None
+            if isinstance(each, _NO_INDICES)
+            else each
+            for each in arguments
+        ]
     )
+
+
+_NO_INDICES = (float, tuple)
 
 
 def _shown(name: str, bundle: Bundle, arrays: Arrays, queries: Queries) -> Bundle:

@@ -110,7 +110,7 @@ class ControllerFunction:
     def begin(self) -> None:
         """Have another process compile it meanwhile, where that is worth it."""
         if self.is_ours and self.compiles:
-            self._separate.begin()
+            self.separate.begin()
 
     def finish(self) -> Any:
         """Compile it, or load its machine code, in the form that loops call.
@@ -121,7 +121,7 @@ class ControllerFunction:
             If it cannot be compiled.
         """
         try:
-            return self._separate.finish()
+            return self.separate.finish()
         except CompileError as error:
             raise ControllerError(
                 f"controller {self.name!r} cannot be compiled; @controller(compile=False) runs it "
@@ -129,7 +129,8 @@ class ControllerFunction:
             ) from error
 
     @cached_property
-    def _separate(self) -> SeparateKernel:
+    def separate(self) -> SeparateKernel:
+        """Its machine code, which loops find by its address."""
         # Stock controllers have tests that see to their indices.
         function = kernel(self.function) if self.is_ours else within_bounds(self.function)
         return SeparateKernel(

@@ -38,6 +38,7 @@ class EndOfRun(Exception):  # noqa: N818 - no error
 
 
 _PACKAGE = str(Path(__file__).parents[2])
+_CALLER = str(Path(__file__).parents[1] / "simulation.py")
 
 
 def tell(message: str, error: BaseException, on_error: OnError) -> None:
@@ -55,17 +56,22 @@ def tell(message: str, error: BaseException, on_error: OnError) -> None:
     while frame and frame.f_back and _is_of_package(frame.f_code.co_filename):
         frame = frame.f_back
     place = (frame.f_code.co_filename, frame.f_lineno) if frame else ("<unknown>", 0)
-    warnings.warn_explicit(f"{message}\n{_traceback_of(error)}", ControllerWarning, *place)
+    trace = _traceback_of(error)
+    warnings.warn_explicit(f"{message}\n{trace}" if trace else message, ControllerWarning, *place)
 
 
 def _traceback_of(error: BaseException) -> str:
-    """Return the traceback of an error without how this package came to call the controller."""
+    """Return the traceback of an error from where this package called the controller.
+
+    Nothing for errors that have none of their own: of what is noticed afterwards, and of compiled
+    code, where Numba knows no line.
+    """
     whole = traceback.TracebackException.from_exception(error)
-    frames = list(whole.stack)
+    called = [i for i, each in enumerate(whole.stack) if each.filename == _CALLER]
+    frames = list(whole.stack)[called[-1] + 1 if called else 0 :]
     outside = [i for i, each in enumerate(frames) if not _is_of_package(each.filename)]
-    if outside:
-        whole.stack = traceback.StackSummary.from_list(frames[outside[0] :])
-    return "".join(whole.format()).rstrip()
+    whole.stack = traceback.StackSummary.from_list(frames[outside[0] if outside else 0 :])
+    return "".join(whole.format()).rstrip() if frames else ""
 
 
 def _is_of_package(filename: str) -> bool:
