@@ -170,6 +170,8 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     clock.calls += 1
                 if not limit_torque(model, control, memory):
                     return BAD_CONTROLLER
+                if control.robot.ending >= 0:
+                    clock.finishing = 1
                 code = decide(scene, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
                     report(scene, control, memory, work, record, clock)

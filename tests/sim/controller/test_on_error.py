@@ -84,7 +84,9 @@ def test_an_error_is_told_with_the_traceback_of_the_controller(name: str) -> Non
     words = str(warning.message)
     assert words.startswith(run.message)
     assert warning.filename == __file__
-    error, line = ("RuntimeError", "out_of_power") if "object" in name else ("ValueError", "raising")
+    error, line = (
+        ("RuntimeError", "out_of_power") if "object" in name else ("ValueError", "raising")
+    )
     assert f"in {line}\n    raise {error}(" in words, words
     assert words.count("Traceback") == 1, words
     assert "simulation.py" not in words, words
