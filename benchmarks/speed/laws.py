@@ -13,9 +13,9 @@ from speed.race import STEP
 from speed.scenarios import walk_gait
 from speed.stopwatch import best_of, timed
 
-STEPS = 100
+STEPS = 1000
 """Steps of a piece that is timed."""
-PIECES = 5
+PIECES = 3
 """Pieces of a walk: what is looked at in Python at first is compiled after the first."""
 
 
@@ -46,5 +46,5 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: AR
 
     works = {name: lambda law=law, checked=checked: walk(law, checked)
              for name, (law, checked) in ways.items()}  # fmt: skip
-    best = best_of(works, seconds=1.0 if quick else 60.0, least=2)
+    best = best_of(works, seconds=1.0 if quick else 30.0, least=2)
     return {name: 1e6 * seconds for name, seconds in best.items()}

@@ -14,6 +14,7 @@ import walking
 import heelstrike as hs
 from heelstrike.sim import OnError, RunStatus
 from heelstrike.sim.method import Method
+from heelstrike.view.live.live_simulation import LiveSimulation
 
 METHODS = [hs.TimeStepping(), hs.EventDriven(max_step=1e-3), hs.Compliant()]
 Action = Callable[[], Any]
@@ -107,7 +108,7 @@ def test_what_is_recorded_does_not_hang_on_who_is_told(name: str) -> None:
     assert len(one.time) == (0 if "at once" in name else 20)
 
     controller, options = CONTROLLERS[name]()
-    with pytest.raises((RuntimeError, ValueError), match="power|battery") as raised:
+    with pytest.raises((RuntimeError, ValueError), match=r"power|battery") as raised:
         run_of(controller, on_error="raise", **options)
     assert one.message in raised.value.__notes__
 
@@ -115,7 +116,7 @@ def test_what_is_recorded_does_not_hang_on_who_is_told(name: str) -> None:
 @pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
 def test_it_is_told_under_every_method(method: Method) -> None:
     for controller in (Acting(out_of_power, 5), faulty()):
-        with pytest.warns(hs.ControllerWarning, match="power|battery"):
+        with pytest.warns(hs.ControllerWarning, match=r"power|battery"):
             assert run_of(controller, method=method).status is RunStatus.CONTROLLER_FAILED
 
 
@@ -229,6 +230,16 @@ def test_compare_hands_it_on() -> None:
     assert len(told) == 2
     with pytest.raises(ValueError, match="law without power"):
         hs.compare(walking.bravo7(), faulty(), on_error="raise", **options)
+
+
+def test_a_simulation_that_is_watched_warns_instead_of_raising() -> None:
+    simulation = hs.Simulation(
+        walking.bravo7(), faulty(), state=walking.gait().initial_state, on_error="raise"
+    )
+    live = LiveSimulation(simulation)
+    with pytest.warns(hs.ControllerWarning, match="law without power"):
+        live.advance(0.05)
+    assert not live.can_go_on
 
 
 def test_a_word_that_is_none_is_refused() -> None:
