@@ -372,6 +372,8 @@ class Simulation:
         ------
         SimulationError
             If the simulation has come to its end.
+        Exception
+            With ``on_error="raise"``, what the controller raised.
         """
         return self._advance(FAR, self._clock.index + 1)
 
@@ -398,6 +400,8 @@ class Simulation:
         SimulationError
             If the simulation has come to its end, the time is past, or there is no room for the
             record.
+        Exception
+            With ``on_error="raise"``, what the controller raised.
         """
         instant = -np.inf
         if np.isfinite(until):

@@ -43,6 +43,7 @@ class Memory(hs.Bundle):
     program: Program = hs.part(Program)
     jacobian: Any = hs.array(3, "nv")
     short: Any = hs.array(2, "nv")
+    center: Any = hs.array(2)
 
 
 class Told(hs.Bundle):
@@ -61,12 +62,13 @@ def spring(state: Any, first: int, springs: Any, torque: Any) -> None:
 
 
 @hs.controller
-def composed(state, robot, parameters: Both, memory: Memory, log: Told, torque):  # type: ignore[no-untyped-def]
+def composed(state, contacts, robot, parameters: Both, memory: Memory, log: Told, torque):  # type: ignore[no-untyped-def]
     """Springs on either side; beside them, equations and a programme are solved."""
     memory.calls += 1
     spring(state, 0, parameters.right, torque)
     spring(state, 3, parameters.left, torque)
     robot.foot_jacobian(state, memory.calls % 2, memory.jacobian)
+    robot.center_of_mass(state, memory.center)
     for i in range(3):
         for j in range(3):
             memory.equations.system[i, j] = 1.0 / (1.0 + i + j)
@@ -94,6 +96,8 @@ def composed(state, robot, parameters: Both, memory: Memory, log: Told, torque):
             spring(state, 4, parameters.left, torque)
         elif parameters.fault == 4:
             memory.jacobian[3, memory.calls % 2] = 1.0
+        elif parameters.fault == 5:
+            robot.center_of_mass(state, contacts.position[1])
 
 
 def law(fault: int = 0) -> Any:
@@ -148,6 +152,7 @@ def test_a_checked_law_computes_the_same_in_python_and_when_queries_are_compiled
         (2, "writes to memory.short[2, 0], beyond its shape (2, 9)"),
         (3, "reads state.joint_position[6], beyond its shape (6,)"),
         (4, "writes to memory.jacobian[3, 0], beyond its shape (3, 9)"),
+        (5, "writes to contacts.position[1][0]: only its torque and its memory are its own"),
     ],
 )
 def test_a_checked_law_is_caught_at_its_300th_call(fault: int, words: str) -> None:

@@ -130,10 +130,10 @@ class _Query:
 
 
 def _what_indices_follow_from(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Return sizes of arrays, whole numbers, and which bundles they are."""
+    """Return sizes of arrays, whether they may be written, whole numbers, and which bundles."""
     return tuple(
         [
-            each.shape
+            (each.shape, each.flags.writeable)
             if isinstance(each, np.ndarray)
             else id(each)
             if isinstance(each, Bundle)
