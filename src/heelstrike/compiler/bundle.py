@@ -153,7 +153,14 @@ def part(kind: type[Bundle], *, address: bool = False, flat: bool = False) -> An
     -------
     Member
         What the class of the bundle makes a member of.
+
+    Raises
+    ------
+    TypeError
+        If it is no class of bundles.
     """
+    if not (isinstance(kind, type) and issubclass(kind, Bundle)):
+        raise TypeError(f"a part is declared by its class of heelstrike.Bundle, got {kind!r}")
     return Member("part", kind, address=address, flat=flat)
 
 

@@ -105,12 +105,10 @@ class Simulation:
     on_error : OnError or str
         What becomes of an error in the controller: ``"warn"`` tells of it in a
         :class:`~heelstrike.ControllerWarning` with its traceback, ``"raise"`` raises it, ``"stop"``
-        does neither. The simulation ends in any case, and its record stays.
+        does neither. The simulation ends in any case, and its record stays. An attribute, too.
 
     Attributes
     ----------
-    on_error : OnError
-        As above; another may be set.
     status : RunStatus
         How it goes: ``COMPLETED`` and ``INTERRUPTED`` can go on, the others are its end.
     message : str

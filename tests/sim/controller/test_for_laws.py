@@ -130,6 +130,12 @@ def test_a_law_of_parts_solves_equations_and_programmes() -> None:
     np.testing.assert_allclose(run.torque, wanted, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("wrong", [float, "Springs", Springs(kp=1.0, kd=1.0)])
+def test_a_part_is_a_class_of_bundles(wrong: Any) -> None:
+    with pytest.raises(TypeError, match=r"a part is declared by its class of heelstrike\.Bundle"):
+        hs.part(wrong)
+
+
 def test_equations_that_leave_something_free() -> None:
     equations = LinearEquations.allocate(unknowns=2)
     equations.system[:] = [[1.0, 1.0, 2.0], [2.0, 2.0, 4.0]]
