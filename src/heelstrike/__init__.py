@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import array as array
     from heelstrike.compiler.bundle import cell as cell
     from heelstrike.compiler.bundle import number as number
+    from heelstrike.compiler.bundle import part as part
     from heelstrike.contact import ActiveContacts as ActiveContacts
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
@@ -116,6 +117,8 @@ if TYPE_CHECKING:
     from heelstrike.robot.human import human as human
     from heelstrike.sim import Batch as Batch
     from heelstrike.sim import Compliant as Compliant
+    from heelstrike.sim import ControllerWarning as ControllerWarning
+    from heelstrike.sim import EndOfRun as EndOfRun
     from heelstrike.sim import EventDriven as EventDriven
     from heelstrike.sim import HuntCrossley as HuntCrossley
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
@@ -147,9 +150,11 @@ _HOME = {
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
+    "ControllerWarning": "heelstrike.sim",
     "DisturbanceResponse": "heelstrike.analysis.stability.response",
     "Encoder": "heelstrike.control",
     "Encoders": "heelstrike.control",
+    "EndOfRun": "heelstrike.sim",
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
@@ -228,6 +233,7 @@ _HOME = {
     "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
+    "part": "heelstrike.compiler.bundle",
     "report": "heelstrike.view.report",
     "saltation_matrix": "heelstrike.contact",
     "simulate": "heelstrike.sim",

@@ -27,7 +27,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, simulate
-from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.closed_sets import OnError, RunStatus
 from heelstrike.sim.method import Method
 
 if TYPE_CHECKING:
@@ -185,12 +185,13 @@ def compare(
     reference: str | None = None,
     control_period: float | None = None,
     pushes: Sequence[Push] = (),
+    on_error: OnError | str = OnError.WARN,
 ) -> Comparison:
     """Simulate the same thing by several methods and tell how far their answers differ.
 
     Parameters
     ----------
-    robot, controller, state, duration, ground, control_period, pushes
+    robot, controller, state, duration, ground, control_period, pushes, on_error
         As in :func:`heelstrike.simulate`.
     methods : sequence of Method, or mapping of names to them
         Ways through time; a sequence is named after their classes and options.
@@ -234,6 +235,7 @@ def compare(
                 ground=ground,
                 control_period=control_period,
                 pushes=pushes,
+                on_error=on_error,
             )
         except SimulationError as error:
             if name == first:

@@ -10,6 +10,8 @@ class RunStatus(enum.Enum):
 
     ``COMPLETED``, ``FELL``
         The time is up; the centre of mass sank below half its first height.
+    ``STOPPED``
+        The controller ended it, for a reason of its own: see :class:`~heelstrike.EndOfRun`.
     ``DIVERGED``
         The state stopped being finite.
     ``SOLVER_FAILED``
@@ -20,10 +22,25 @@ class RunStatus(enum.Enum):
 
     COMPLETED = "completed"
     FELL = "fell"
+    STOPPED = "stopped"
     DIVERGED = "diverged"
     INTERRUPTED = "interrupted"
     SOLVER_FAILED = "solver_failed"
     CONTROLLER_FAILED = "controller_failed"
+
+
+class OnError(enum.StrEnum):
+    """What becomes of an error in a controller; the run ends in any case, with its data.
+
+    ``WARN``, ``STOP``
+        A warning tells of it, with its traceback; nothing but status and message does.
+    ``RAISE``
+        It is raised.
+    """
+
+    WARN = "warn"
+    STOP = "stop"
+    RAISE = "raise"
 
 
 class EventKind(enum.IntEnum):

@@ -273,7 +273,8 @@ class Run:
         what is clipped within them is not counted.
     timing : Timing
     error : BaseException or None
-        What the controller raised, if that ended the run.
+        What the controller raised, if that ended the run; a ControllerError if it did what it may
+        not.
     pushes : tuple of Push
         What pushed the robot.
     log : mapping of str to Logged

@@ -17,6 +17,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import NUMBERS, SCALES, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.contacts.brakes import brakes_of
 from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.push import Push
@@ -50,6 +51,7 @@ class Setup(TypedDict, total=False):
     latched: Iterable[str | int] | None
     braked: Iterable[str | int]
     checked: bool
+    on_error: OnError | str
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ class Setting:
         Which of its brakes are on as it begins.
     checked : bool
         Whether compiled controllers run in Python, every index looked at.
+    on_error : OnError
+        What becomes of an error in the controller.
     """
 
     robot: Robot
@@ -87,6 +91,7 @@ class Setting:
     held: tuple[bool, ...]
     braked: tuple[bool, ...]
     checked: bool
+    on_error: OnError
 
 
 def checked_setting(
@@ -101,6 +106,7 @@ def checked_setting(
     latched: Iterable[str | int] | None = None,
     braked: Iterable[str | int] = (),
     checked: bool = False,
+    on_error: OnError | str = OnError.WARN,
 ) -> Setting:
     """Check what is to be simulated.
 
@@ -138,7 +144,17 @@ def checked_setting(
         held=latches_at(robot, state, ground, latched),
         braked=brakes_of(robot, braked),
         checked=checked,
+        on_error=checked_on_error(on_error),
     )
+
+
+def checked_on_error(on_error: OnError | str) -> OnError:
+    """Return what becomes of an error in a controller, or refuse what is no such thing."""
+    try:
+        return OnError(on_error)
+    except ValueError:
+        known = ", ".join(repr(each.value) for each in OnError)
+        raise SimulationError(f"on_error is one of {known}; got {on_error!r}") from None
 
 
 def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:

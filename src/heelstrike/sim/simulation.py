@@ -17,11 +17,11 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
-from heelstrike.robot.model import Integers
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
 from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
 from heelstrike.sim.contacts.latches import latches_at, latches_of
 from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
@@ -29,6 +29,8 @@ from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, commands_voltage, law_of, no_torque
+from heelstrike.sim.controller.raised import EndOfRun, tell
+from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
 from heelstrike.sim.memory import Memory, allocate_memory
@@ -97,10 +99,13 @@ class Simulation:
         Joints that their brakes hold as it begins, where they are. A controller in Python that has
         an attribute `braked`, or `latched`, says so itself at every call.
     checked : bool
-        Run a compiled controller in Python, some hundred times slower, and look at every index: one
-        that reads or writes beyond its arrays, or writes where it may not, ends the run with a
-        message that names the array and the index. Like any controller in Python it is then called
-        every `control_period`.
+        Run a compiled controller in Python and look at every index: one that reads or writes beyond
+        its arrays, or writes where it may not, ends the run with a message that names the array and
+        the index. Like any controller in Python it is then called every `control_period`.
+    on_error : OnError or str
+        What becomes of an error in the controller: ``"warn"`` tells of it in a
+        :class:`~heelstrike.ControllerWarning` with its traceback, ``"raise"`` raises it, ``"stop"``
+        does neither. The simulation ends in any case, and its record stays. An attribute, too.
 
     Attributes
     ----------
@@ -149,6 +154,7 @@ class Simulation:
         latched: Iterable[str | int] | None = None,
         braked: Iterable[str | int] = (),
         checked: bool = False,
+        on_error: OnError | str = OnError.WARN,
     ) -> None:
         begin, given = state.state if isinstance(state, Snapshot) else state, ground
         if isinstance(state, Snapshot) and ground is None:
@@ -156,7 +162,7 @@ class Simulation:
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
             stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, braked=braked,
-            checked=checked,
+            checked=checked, on_error=on_error,
         )  # fmt: skip
         law_of(controller, begin=True)
         self._begin(setting, checked_method(method))
@@ -222,6 +228,7 @@ class Simulation:
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
         self._complaint = ""
+        self.on_error = setting.on_error
         self.status = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
@@ -365,6 +372,8 @@ class Simulation:
         ------
         SimulationError
             If the simulation has come to its end.
+        Exception
+            With ``on_error="raise"``, what the controller raised.
         """
         return self._advance(FAR, self._clock.index + 1)
 
@@ -391,6 +400,8 @@ class Simulation:
         SimulationError
             If the simulation has come to its end, the time is past, or there is no room for the
             record.
+        Exception
+            With ``on_error="raise"``, what the controller raised.
         """
         instant = -np.inf
         if np.isfinite(until):
@@ -421,7 +432,13 @@ class Simulation:
             self.status, self.message = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
         wall_s = self._timing.wall_s + clock_time.perf_counter() - begin
         self._timing = Timing(self._timing.compile_s, wall_s)
+        self._tell_error(self.status, self.message)
         return self.status
+
+    def _tell_error(self, status: RunStatus, message: str) -> None:
+        """Do with an error in the controller as `on_error` says."""
+        if status is RunStatus.CONTROLLER_FAILED and self.error is not None:
+            tell(message, self.error, self.on_error)
 
     def _go(
         self,
@@ -438,7 +455,7 @@ class Simulation:
             elapsed = clock_time.perf_counter() - begin
             misdeed = self._watch.misdeed()
             if misdeed is not None:
-                return RunStatus.CONTROLLER_FAILED, (
+                return self._failed(
                     f"{self._name} {misdeed}; noticed at {self._now}"
                     + ("" if self._python else ". simulate(..., checked=True) tells more")
                 )
@@ -468,11 +485,13 @@ class Simulation:
                 wrong = self._ask() if outcome is Outcome.ASKING else ""
             except KeyboardInterrupt:
                 raise
+            except EndOfRun as end:  # of a compiled law: this instant stays undecided
+                return RunStatus.STOPPED, self._stopped(str(end))
             except BaseException as error:  # of the controller: loops raise nothing
                 self.error = error
                 return Outcome.RAISED
             if wrong:
-                return RunStatus.CONTROLLER_FAILED, wrong
+                return self._failed(wrong)
             if outcome is Outcome.RECORD_FULL:
                 if full := self._new_record():
                     return RunStatus.INTERRUPTED, full
@@ -480,6 +499,11 @@ class Simulation:
                 self._fork = self.snapshot() if self._can_be_kept else None
             elif outcome is not Outcome.ASKING:
                 return outcome
+
+    def _failed(self, message: str) -> tuple[RunStatus, str]:
+        """Return how a controller ends the simulation that did what it may not."""
+        self.error = ControllerError(message)
+        return RunStatus.CONTROLLER_FAILED, message
 
     def _report(self, progress: Callable[[float], None] | None) -> None:
         """Report progress; keep in mind what went wrong with that, if something did."""
@@ -495,9 +519,16 @@ class Simulation:
 
     def _ask(self) -> str:
         """Ask a controller in Python for torques; return what is wrong with them."""
-        torque = np.asarray(
-            self._python.torque(self.time, self.state, self._shown), dtype=np.float64
-        )
+        ending = self._control.robot
+        torque: Floats = self._memory.command
+        try:
+            torque = np.asarray(
+                self._python.torque(self.time, self.state, self._shown), dtype=np.float64
+            )
+        except EndOfRun as end:
+            self._why_stopped, ending.ending = str(end), 0
+        else:
+            ending.ending = self._numbers.control.robot.ending
         if torque.shape != (self.robot.nu,):
             return (
                 f"{self._name} returned shape {torque.shape} at {self._now}; robot "
@@ -535,6 +566,8 @@ class Simulation:
             return RunStatus.FELL, (
                 f"the robot fell at {self._now}: its centre of mass is below half its first height"
             )
+        if outcome is Outcome.STOPPED:
+            return RunStatus.STOPPED, self._stopped(self._why_stopped)
         if outcome is Outcome.RAISED:
             assert self.error is not None
             if isinstance(self._python, AskedLaw) and isinstance(self.error, ControllerError):
@@ -569,6 +602,13 @@ class Simulation:
     def _doubts(self) -> str:
         doubts = self.method.doubts(self.robot, self._setting.state.q)
         return "".join(f". {doubt[0].upper()}{doubt[1:]}" for doubt in doubts)
+
+    def _stopped(self, why: str) -> str:
+        """Say that the controller ended the run, and why."""
+        number = self._control.robot.ending
+        if not why and number < len(self._endings):
+            why = self._endings[number]
+        return f"the controller ended the run at {self._now}: {why or f'ending {number}'}"
 
     def _not_finite(self, actuator: int, when: str) -> tuple[RunStatus, str]:
         return RunStatus.CONTROLLER_FAILED, (
@@ -631,16 +671,20 @@ class Simulation:
                 "begin another simulation with it, from state=simulation.state"
             )
         self._kernel = compiled.function.finish()
+        if python is not None:  # loops do not call it, and Numba need not look for its addresses
+            self._kernel = compiled.function.separate
         voltage = commands_voltage(controller, robot)
         self.method.set_clock(setting, clock)
         self._setting, self._logs, self._python_log = setting, ready, told
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
+        self._endings = () if law is None else law.function.endings
+        self._why_stopped = ""
         self._control.voltage = voltage
-        self._name = f"{type(controller).__name__}.torque"
+        self._name: str = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
-        self._shown = read_only(memory.contacts)
+        self._shown: Contacts = read_only(memory.contacts)
         if law is not None:
             self._name = f"controller {law.function.name!r}"
         self._take_gains(law, voltage)
@@ -755,6 +799,9 @@ class Simulation:
                 raise SimulationError(f"the snapshot is damaged: {error}") from error
             raise
         self._memory, self._pushes, self._ground = memory, pushes, ground
+        self._why_stopped = ""
+        for numbers in (self._control, self._numbers.control):
+            numbers.robot.ending = NO_ENDING
 
     def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
         """Name the bundles that change as a simulation goes on, with the dot of their arrays."""
@@ -861,30 +908,35 @@ def simulate(
     **setup
         How it begins and what it is simulated with: `state`, which has to be given, `method`,
         `ground`, `control_period`, `record_every`, `stop_when_fallen`, `pushes`, `latched`,
-        `braked`, `checked`; see
-        :class:`Simulation`.
+        `braked`, `checked`, `on_error`; see :class:`Simulation`.
 
     Returns
     -------
     Run
         Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``. A
         controller that raises anything but KeyboardInterrupt, even SystemExit, ends the run with
-        status ``controller_failed``, as does one that writes beyond its arrays or changes the
-        robot; what was raised is in ``run.error``. While compiling, when there is nothing to keep,
-        Ctrl-C raises KeyboardInterrupt.
+        status ``controller_failed``, as does one that writes beyond its arrays, changes the robot,
+        or returns torques of the wrong shape; the error is in ``run.error``, and `on_error` says
+        what else becomes of it. Torques that are not finite end the run with that status, too, but
+        are no error. While compiling, when there is nothing to keep, Ctrl-C raises
+        KeyboardInterrupt.
 
     Raises
     ------
     SimulationError, ControllerError
         If the arguments are not usable, or the state is not one that the method can begin with;
-        raised before anything is simulated, except for a torque of the wrong shape, which ends the
-        run with status ``controller_failed``.
+        raised before anything is simulated.
+    Exception
+        With ``on_error="raise"``, what the controller raised.
     """
     check_duration(duration)
     simulation = Simulation(robot, controller, **setup)
-    simulation.advance(simulation._recorded_until + duration, progress=progress)
+    going = simulation.advance(simulation._recorded_until + duration, progress=progress)
     final = simulation._final()
-    return simulation._run(*simulation._decide_last(), final=final)
+    status, message = simulation._decide_last()
+    if status is not going:  # the last call of the controller is one more
+        simulation._tell_error(status, message)
+    return simulation._run(status, message, final=final)
 
 
 @dataclass(frozen=True)
@@ -895,6 +947,8 @@ class Ending:
     ----------
     status, message
         How, and the same in a person's words.
+    error : BaseException or None
+        What the controller raised, if that ended it.
     state, time
         Where the robot was, and when.
     events : (kinds,) int
@@ -907,6 +961,7 @@ class Ending:
 
     status: RunStatus
     message: str
+    error: BaseException | None
     state: State
     time: float
     events: Integers
@@ -939,7 +994,7 @@ def simulation_to_the_end(
     for each in simulation._records:
         simulation._count_events(each)
     return Ending(
-        status, message, state, simulation.time, simulation._event_counts,
+        status, message, simulation.error, state, simulation.time, simulation._event_counts,
         counted(memory), run,
     )  # fmt: skip
 

@@ -39,7 +39,9 @@ from heelstrike.sim.run import (
     events_of,
 )
 
-_ENDED_WELL = (RunStatus.COMPLETED, RunStatus.FELL, RunStatus.INTERRUPTED)
+_ENDED_WELL = (
+    RunStatus.COMPLETED, RunStatus.FELL, RunStatus.STOPPED, RunStatus.INTERRUPTED,
+)  # fmt: skip
 """Ends of runs of which every number is finite."""
 
 _DEFAULTS = {

@@ -7,6 +7,7 @@ from bisect import bisect_right
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.push import Push, pushes_of_numbers
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import CAN_GO_ON, Simulation
@@ -38,6 +39,8 @@ class LiveSimulation:
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
+        if simulation.on_error is OnError.RAISE:  # nobody is there to catch it
+            simulation.on_error = OnError.WARN
         self.held: dict[str, Hold] = {}
         self._given: tuple[Push, ...] | None = None
         self._added: tuple[Push, ...] = ()
