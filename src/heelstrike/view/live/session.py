@@ -259,6 +259,21 @@ class Session:
             f"{size:.3g} N on {in_words(robot.link_names[link])} for {RANDOM_PUSH_LASTS:g} s"
         )
 
+    def _pose(self, _: str, command: Mapping[str, Any]) -> None:
+        live = self._needs_live()
+        joint, position = str(command["joint"]), _finite(command["value"])
+        self.playing = False
+        if not self._at_end:
+            self._go_on_from_cursor()
+        if not live.can_go_on:
+            raise RefusedError(f"{live.message}. Begin anew, or move it at an earlier time")
+        live.move(joint, position)
+        self.history.take(live.record())
+        assert self._layout is not None
+        now = self.history.part(len(self.history) - 1, len(self.history) - 1)
+        self._board.look(self._layout.frames(now, [0, 0], self._pushes)[0])
+        self.cursor = self._goal = float(now.time[0])
+
     def _choose(self, _: str, command: Mapping[str, Any]) -> None:
         stage = self._needs_stage()
         name, value = str(command["name"]), command["value"]
@@ -529,6 +544,7 @@ _COMMANDS: dict[str, Any] = {
     "hold": Session._hold,
     "release": Session._release,
     "random push": Session._random_push,
+    "pose": Session._pose,
     "choose": Session._choose,
     "reset": Session._reset,
     "resume": Session._resume,
