@@ -16,7 +16,6 @@ from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
-from heelstrike.robot.coordinates import checked
 from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -39,6 +38,7 @@ from heelstrike.sim.run import Run, Timing, counted, joined, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
+    check_state,
     checked_pushes,
     checked_setting,
     identity_of,
@@ -237,7 +237,7 @@ class Simulation:
 
     @state.setter
     def state(self, state: State) -> None:
-        state = checked(self.robot, state)
+        check_state(self.robot, state)
         deep = self._depth(state, self._ground)
         if deep.any():
             point = int(np.argmax(deep))

@@ -259,14 +259,15 @@ class Layout:
 
 
 def movable(robot: Robot) -> NDArray[np.int64]:
-    """Joints of a robot but for those that carry its base through the world."""
+    """Joints of a robot but for those that carry all of it through the world."""
     model = robot.model
-    carried = np.zeros(robot.nq, dtype=bool)  # whether anything of a joint's chain has a mass
-    for joint in range(robot.nq):
+    slides = (model.axis[:, 0] == 0.0) & np.isneginf(model.lower) & np.isposinf(model.upper)
+    carries = np.zeros(robot.nq, dtype=bool)
+    for joint in np.flatnonzero(slides):
         parent = int(model.parent[joint])
-        carried[joint] = model.mass[joint] > 0.0 or (parent >= 0 and carried[parent])
-    carried[: 3 if robot.floating else 0] = False
-    return np.flatnonzero(carried)
+        carries[joint] = parent < 0 or carries[parent]
+    carries[: 3 if robot.floating else 0] = True
+    return np.flatnonzero(~carries)
 
 
 def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:

@@ -8,7 +8,6 @@
      shapes     [{link, foot, width, corners: [x, z, …]}] back to front, corners in link axes (m);
                 two corners are a bone `width` points wide, more are an outline; foot -1: of none
      contacts   [{foot, name}]; feet: [{name}]
-     pose       [[x, z, angle], …] of the links as the robot is built (m, m, rad)
      size       of the robot (m); weight (N), whose arrow is WEIGHT_LENGTH of the size
      ground     [x, z, …] corners (m); the first and last segment go on for ever
    frame: one instant; lists or typed arrays of numbers, NaN (or null) for what there is not
@@ -30,7 +29,7 @@
 "use strict";
 
 var HeelstrikeDrawing = (() => {
-  const WEIGHT_LENGTH = 0.35, LONGEST = 1.3, HEAD_LENGTH = 0.035, HEAD_WIDTH = 0.022;
+  const WEIGHT_LENGTH = 0.35, LONGEST = 0.9, HEAD_LENGTH = 0.035, HEAD_WIDTH = 0.022;
   const HIGHEST_CONE = 0.45; // of the size of the robot
   const NEAR_EDGE = 0.9; // share of the friction cone from which it warns
   const POINT = 100 / 72 / 540; // of the height of the picture
@@ -250,8 +249,9 @@ var HeelstrikeDrawing = (() => {
         color, cut: whole > length, width: Math.max(2, 2.5 * POINT * view.height) });
       if (name && whole > length) {
         const told = steady(name, `${words(newtons)} N`);
-        label({ context, colors }, told, toX(x + (0.6 * length * fx) / newtons) + 8,
-          toY(z + (0.6 * length * fz) / newtons), { color, align: "left" });
+        const right = name.at(-1) % 2; // those of a heel and its toe stand apart
+        label({ context, colors }, told, toX(x + (0.6 * length * fx) / newtons) + (right ? 8 : -8),
+          toY(z + (0.6 * length * fz) / newtons), { color, align: right ? "left" : "right" });
       }
     };
     for (let i = 0; i < scene.contacts.length; i++)

@@ -31,8 +31,7 @@ def scene(robot: Robot, ground: Ground) -> dict[str, Any]:
     Returns
     -------
     dict
-        Shapes by links, where those are in the reference configuration (m, m, rad), names of
-        contact points and feet, size (m), weight (N), corners (m).
+        Shapes by links, names of contact points and feet, size (m), weight (N), corners (m).
     """
     shape = body(robot)
     poses = link_poses(robot, robot.model.reference)
@@ -41,7 +40,6 @@ def scene(robot: Robot, ground: Ground) -> dict[str, Any]:
     return {
         "robot": robot.name,
         "shapes": _shapes(shape),
-        "pose": np.round(np.column_stack((poses.origin, poses.angle)), DIGITS).tolist(),
         "links": list(robot.link_names),
         "contacts": [
             {"name": in_words(name), "foot": foot_of.get(i, -1)}

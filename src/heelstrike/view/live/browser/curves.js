@@ -106,22 +106,24 @@ var HeelstrikeCurves = (view) => {
 
   /** Draw those that can be seen, up to the time of a frame and a little beyond. */
   function draw(vector) {
-    const { course } = view, cursor = vector[0], span = Number(at("span").value);
+    const { course } = view, cursor = vector[0], lasts = Number(at("span").value);
     const box = at("curves").getBoundingClientRect();
     if (!course.count || !box.width) return;
-    const to = Math.max(Math.min(course.end, cursor + 0.5 * span), course.time(0) + span);
+    const to = Math.max(Math.min(course.end, cursor + 0.5 * lasts), course.time(0) + lasts);
     for (const one of panels) {
       const place = one.canvas.getBoundingClientRect();
       if (place.bottom < 0 || place.top > innerHeight) continue;
       const { context, width, height } = view.sized(one.canvas);
-      const ends = one.held || { from: to - span, to };
+      const ends = one.held || { from: to - lasts, to };
       const first = Math.max(course.until(ends.from) - 1, 0), last = course.until(ends.to);
       const every = Math.max(1, Math.floor((last - first) / (2 * width)));
       const rows = [];
       for (let k = first; k < last; k += every) rows.push(k);
       const curves = one.panel.curves.map((curve) => ({ ...curve,
         values: rows.map((k) => course.numbers[k * course.width + curve.at]) }));
-      const sides = plot(context, { ...one.panel, curves, span: spanOf(one.panel) },
+      const span = spanOf(one.panel);
+      Object.assign(one.canvas.dataset, { span: span.join(" "), cursor });
+      const sides = plot(context, { ...one.panel, curves, span },
         rows.map((k) => course.time(k)),
         { width, height, from: ends.from, to: ends.to, cursor, dark: view.dark() });
       one.seen = { ...sides, from: ends.from, to: ends.to };

@@ -5,12 +5,13 @@
   const at = (name) => document.getElementById(name);
   const MOST_EVENTS = 20000; // the oldest go, as on the server
   const READ_FOR = 250; // ms that a number stays which changes all the time
+  const SAID_FOR = 6000; // ms that words of the page itself stay
   const ASKED_EVERY = 30; // ms between two seeks of one drag
   const RATES = [0.01, 0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 5, 10];
   const LAMPS = { good: "✓", warn: "!", bad: "✗", none: "–" };
 
   const system = matchMedia("(prefers-color-scheme: dark)");
-  let dirty = true, glance = null, wanted = null, asked = 0, dark = null;
+  let dirty = true, glance = null, wanted = null, asked = 0, told = 0, dark = null;
 
   /* What the parts of the page share. */
   const view = {
@@ -45,8 +46,11 @@
       texts.set(name, { text, since: now });
       return text;
     },
-    tell(text) {
-      at("note").textContent = at("note").title = text;
+    /** Say something below the picture; what the page says itself goes away again. */
+    tell(text, { stays = false } = {}) {
+      clearTimeout(told);
+      at("note").textContent = text;
+      if (!stays) told = setTimeout(() => { at("note").textContent = view.state.note; }, SAID_FOR);
     },
     curves: () => curves.canvases(),
     /** Let a canvas have as many pixels as it shows; return its context and size in CSS pixels. */
@@ -130,6 +134,7 @@
     at("name").title = message.method;
     document.title = `${view.scene.robot}: heelstrike`;
     document.querySelector("main").classList.toggle("looking", !view.live);
+    if (!view.live && tab() === "settings") open("plots");
     curves.begin();
     settings.begin();
     strip.showKinds();
@@ -171,7 +176,7 @@
     at("resume").disabled = view.closed || state.end || !state.returns;
     at("resume").title = state.returns ? "forget what came later, and simulate on from here (g)"
       : "the controller takes no part in snapshots: it cannot be taken back";
-    if (changed.note !== undefined) view.tell(state.note);
+    if (changed.note !== undefined) view.tell(state.note, { stays: true });
     if (at("waiting").hidden) showBanner(state.busy || state.message, state.busy);
     else if (state.busy) waitFor(state.busy);
     else if (state.note) waitFor(state.note);
@@ -211,7 +216,6 @@
       view.ask("seek", { time: wanted });
     }
     const { playing } = view.state, vector = view.current();
-    if (dirty && view.scene && !vector && view.scene.pose) picture.drawRest();
     if (!dirty || !vector) {
       sharing.paint();
       return;
@@ -254,14 +258,15 @@
   for (const [name, act] of Object.entries(press)) at(name).onclick = act;
   at("keys-close").onclick = () => at("keys").close();
   at("rate").onchange = () => view.ask("rate", { value: Number(at("rate").value) });
-  for (const tab of document.querySelectorAll("#tabs button"))
-    tab.onclick = () => open(tab.dataset.tab);
+  const tab = () => document.querySelector("main").dataset.tab;
+  for (const each of document.querySelectorAll("#tabs button"))
+    each.onclick = () => open(each.dataset.tab);
   /** Show one thing below the picture; the same again leaves the room to the picture. */
   function open(name) {
     const { dataset } = document.querySelector("main");
-    dataset.tab = dataset.tab === name ? "" : name;
-    for (const tab of document.querySelectorAll("#tabs button"))
-      tab.setAttribute("aria-pressed", String(tab.dataset.tab === dataset.tab));
+    dataset.tab = tab() === name ? "" : name;
+    for (const each of document.querySelectorAll("#tabs button"))
+      each.setAttribute("aria-pressed", String(each.dataset.tab === tab()));
     dirty = true;
   }
   if (innerWidth <= 640) open("settings"); // a telephone: the picture first

@@ -1,6 +1,6 @@
 /* The picture: where the camera is, what is drawn, and what is pulled at.
 
-   HeelstrikePicture(view) returns {draw, rest, followPull, settings, use}. */
+   HeelstrikePicture(view) returns {draw, followPull, zoom, settings, use}. */
 "use strict";
 
 var HeelstrikePicture = (view) => {
@@ -72,17 +72,6 @@ var HeelstrikePicture = (view) => {
     plane.dataset.pushed = Array.from(frame.push).filter((_, i) => i % 4 > 1)
       .reduce((sum, f) => sum + (Number.isFinite(f) ? f * f : 0), 0) ** 0.5;
     return frame;
-  }
-
-  /** Draw the robot as it is built, before there is a frame. */
-  function drawRest() {
-    const { context, width, height } = view.sized(plane), { pose } = view.scene;
-    const nothing = view.scene.contacts.map(() => [NaN, NaN]).flat();
-    const frame = { time: NaN, pose: pose.flat(), point: nothing, normal: nothing, force: nothing,
-      friction: [], center: [pose.at(-1)[0], NaN] };
-    aim(frame, width, height);
-    draw(context, view.scene, frame, { ...camera, width, height, dark: view.dark(), hide: view.hide });
-    plane.dataset.rest = "yes";
   }
 
   /** What is pulled at, and where to. */
@@ -242,7 +231,7 @@ var HeelstrikePicture = (view) => {
   }, { passive: false });
 
   return {
-    draw: drawFrame, drawRest, followPull, zoom,
+    draw: drawFrame, followPull, zoom,
     /** How it is looked at, as numbers: what a link to it carries. */
     settings: () => ({ zoom: camera.zoom === 1 ? "" : camera.zoom.toPrecision(3),
       at: camera.follows ? "" : `${camera.x.toFixed(3)},${camera.z.toFixed(3)}` }),
