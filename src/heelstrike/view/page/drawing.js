@@ -412,9 +412,10 @@ var HeelstrikeDrawing = (() => {
       context.lineTo(x - 5, y + 8 * side);
       context.lineTo(x + 5, y + 8 * side);
       context.fill();
-      if (taken.some((other) => other.side === side && Math.abs(other.x - x) < 60)) continue;
-      taken.push({ side, x });
-      const beyond = x > right - 50;
+      const beyond = x > right - 50, begin = beyond ? x - 50 : x - 6, end = begin + 56;
+      if (taken.some((other) => other.side === side && other.begin < end && begin < other.end))
+        continue;
+      taken.push({ side, begin, end });
       label({ context, colors }, words(value), x + (beyond ? -8 : 8), y + 6 * side,
         { color: colors.ink, align: beyond ? "right" : "left" });
     }
@@ -546,7 +547,7 @@ var HeelstrikeDrawing = (() => {
     context.font = LETTERS;
     for (const curve of panel.curves) {
       if (!curve.label) continue;
-      const wide = context.measureText(curve.label).width + 34;
+      const wide = context.measureText(curve.label).width + 32;
       if (x + wide > view.width) break;
       context.strokeStyle = curveColor(colors, curve);
       context.setLineDash(DASHES[(curve.dash || 0) % DASHES.length]);
