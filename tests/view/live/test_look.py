@@ -74,8 +74,9 @@ def test_it_fits_all_windows(chromium: Any, viewer: Viewer, scheme: str) -> None
         assert paper == f"rgb({', '.join(str(int(ink[k : k + 2], 16)) for k in (1, 3, 5))})"
 
 
-def test_nothing_jumps(chromium: Any, viewer: Viewer) -> None:
-    with Page(chromium, viewer) as seen:
+@pytest.mark.parametrize("width", [390, 1440])
+def test_nothing_jumps(chromium: Any, viewer: Viewer, width: int) -> None:
+    with Page(chromium, viewer, viewport={"width": width, "height": 860}) as seen:
         places = seen.page.evaluate(PLACES)
 
         def stays(when: str) -> None:

@@ -298,7 +298,8 @@
     let name = KEYS[event.key];
     if (event.shiftKey && event.key.startsWith("Arrow")) name = `event-${
       event.key === "ArrowLeft" ? "before" : "after"}`;
-    if (!name || at(name).disabled || !at(name).offsetParent) return;
+    // A button that is behind a tab can be pressed by its key; one that a run has not cannot.
+    if (!name || at(name).disabled || (!view.live && at(name).closest(".change"))) return;
     event.preventDefault();
     press[name]();
   });
