@@ -179,6 +179,8 @@ def test_a_snapshot_goes_on_in_another_process(
     # The same module, for a controller in Python is known by it and by its class.
     copy = tmp_path.joinpath(*__name__.split(".")).with_suffix(".py")
     copy.parent.mkdir(parents=True, exist_ok=True)
+    for folder in copy.relative_to(tmp_path).parents[:-1]:  # a package comes before one elsewhere
+        (tmp_path / folder / "__init__.py").touch()
     copy.write_text(Path(__file__).read_text(encoding="utf-8"))
     places = [str(tmp_path), str(Path(__file__).parents[1])]
     script = FRESH.replace("sys.path.insert(0, sys.argv[1])", f"sys.path[:0] = {places!r}")
