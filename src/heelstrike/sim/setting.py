@@ -181,6 +181,7 @@ def model_digest(model: Model) -> str:
 
 
 def check_state(robot: Robot, state: State) -> None:
+    """Refuse what is no state of a robot."""
     if not isinstance(state, State):
         raise SimulationError(
             f"state must be a State, got {type(state).__name__}; write State(q, v) with positions "

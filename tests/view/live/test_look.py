@@ -67,11 +67,11 @@ def test_it_fits_all_windows(chromium: Any, viewer: Viewer, scheme: str) -> None
                 if button.get_attribute("aria-pressed") == "false":
                     button.click()
                 assert seen.page.evaluate(LAID_OUT) == [], (width, tab)
-        paper, ink = seen.page.evaluate(
+        letters, ink = seen.page.evaluate(
             "[getComputedStyle(document.body).color, HeelstrikeDrawing.palette("
             f"{str(scheme == 'dark').lower()}).ink]"
         )
-        assert paper == f"rgb({', '.join(str(int(ink[k : k + 2], 16)) for k in (1, 3, 5))})"
+        assert letters == f"rgb({', '.join(str(int(ink[k : k + 2], 16)) for k in (1, 3, 5))})"
 
 
 @pytest.mark.parametrize("width", [390, 1440])

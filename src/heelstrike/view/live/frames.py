@@ -251,8 +251,8 @@ class Layout:
     def _of_feet(self, field: str) -> list[dict[str, Any]]:
         return [
             {
-                "label": in_words(foot.name).removesuffix(" foot"), "foot": i, "dash": DASHED if i else 0,
-                "at": self.begin[field] + i,
+                "label": in_words(foot.name).removesuffix(" foot"), "foot": i,
+                "dash": DASHED if i else 0, "at": self.begin[field] + i,
             }
             for i, foot in enumerate(self.robot.feet)
         ]  # fmt: skip

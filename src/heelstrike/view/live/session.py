@@ -268,7 +268,7 @@ class Session:
         if not live.can_go_on:
             raise RefusedError(f"{live.message}. Begin anew, or move it at an earlier time")
         live.move(joint, position)
-        self.history.take(live.record())
+        self.history.take(_seen(live))
         assert self._layout is not None
         now = self.history.part(len(self.history) - 1, len(self.history) - 1)
         self._board.look(self._layout.frames(now, [0, 0], self._pushes)[0])
@@ -327,9 +327,7 @@ class Session:
                 simulation = self._stage.simulation(wanted, self._tell_busy)
                 self._tell_busy("compiling the simulator, once: about 20 s")
                 live = LiveSimulation(simulation)
-                run = live.record()
-                if not len(run.time):  # a controller that is not asked but for good
-                    run = live.advance(None) or run
+                run = _seen(live)
             except HeelstrikeError as error:
                 self._note = str(error)
                 return
@@ -522,6 +520,12 @@ class Session:
     def _over_here(self) -> bool:
         """Whether viewers look at the end of what cannot go on."""
         return self._at_end and (self.live is None or not self.live.can_go_on)
+
+
+def _seen(live: LiveSimulation) -> Run:
+    """Return how a simulation is now, or a step later where its controller is asked for good."""
+    run = live.record()
+    return run if len(run.time) else live.advance(None) or run
 
 
 def _kind(event: Event) -> str:

@@ -577,5 +577,16 @@ var HeelstrikeDrawing = (() => {
     return found;
   }
 
-  return { draw, plot, strip, palette, footColor, words, heightOfGround, pressed };
+  /** Give a canvas the pixels of its screen; return its context and size in CSS pixels. */
+  function fit(canvas) {
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    const ratio = window.devicePixelRatio || 1;
+    const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+    const context = canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return { context, width, height };
+  }
+
+  return { draw, plot, strip, fit, palette, footColor, words, heightOfGround, pressed };
 })();

@@ -1,10 +1,10 @@
 /* Curves over time beside the picture, on the same cursor.
 
-   HeelstrikeCurves(view) returns {begin, draw, fit, canvases, settings, use}. */
+   HeelstrikeCurves(view) returns {begin, draw, scale, canvases, settings, use}. */
 "use strict";
 
 var HeelstrikeCurves = (view) => {
-  const { plot } = HeelstrikeDrawing;
+  const { plot, fit } = HeelstrikeDrawing;
   const at = (name) => document.getElementById(name);
   const ALL = "all";
   const WIDE = 1700; // pixels of a window that has room for all of them
@@ -66,7 +66,7 @@ var HeelstrikeCurves = (view) => {
   }
 
   /** Ends of an axis: what is usual between impacts. They grow, and shrink only with a new scene. */
-  function fit() {
+  function scale() {
     const { course } = view;
     if (!course || course.count === fitted) return;
     fitted = course.count;
@@ -113,7 +113,7 @@ var HeelstrikeCurves = (view) => {
     for (const one of panels) {
       const place = one.canvas.getBoundingClientRect();
       if (place.bottom < 0 || place.top > innerHeight) continue;
-      const { context, width, height } = view.sized(one.canvas);
+      const { context, width, height } = fit(one.canvas);
       const ends = one.held || { from: to - lasts, to };
       const first = Math.max(course.until(ends.from) - 1, 0), last = course.until(ends.to);
       const every = Math.max(1, Math.floor((last - first) / (2 * width)));
@@ -137,7 +137,7 @@ var HeelstrikeCurves = (view) => {
   at("curves").onscroll = () => view.redraw();
 
   return {
-    begin, draw, fit,
+    begin, draw, scale,
     canvases: () => panels.map((one) => one.canvas),
     settings: () => ({ curves: group || "", span: at("span").value === "3" ? "" : at("span").value }),
     use({ curves, span }) {

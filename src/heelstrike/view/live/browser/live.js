@@ -53,17 +53,6 @@
       if (!stays) told = setTimeout(() => { at("note").textContent = view.state.note; }, SAID_FOR);
     },
     curves: () => curves.canvases(),
-    /** Let a canvas have as many pixels as it shows; return its context and size in CSS pixels. */
-    sized(canvas) {
-      const ratio = window.devicePixelRatio || 1;
-      const width = canvas.clientWidth, height = canvas.clientHeight;
-      const wide = Math.round(width * ratio), high = Math.round(height * ratio);
-      if (canvas.width !== wide || canvas.height !== high)
-        [canvas.width, canvas.height] = [wide, high];
-      const context = canvas.getContext("2d");
-      context.setTransform(ratio, 0, 0, ratio, 0, 0);
-      return { context, width, height };
-    },
   };
   const texts = new Map();
   const picture = HeelstrikePicture(view), curves = HeelstrikeCurves(view);
@@ -227,7 +216,7 @@
     if (thorough) {
       looked = now;
       was = playing;
-      curves.fit();
+      curves.scale();
       settings.showJoints();
     }
     if (turn++ % 4 === 0 || !playing) { // curves need not be as smooth as the robot

@@ -4,7 +4,7 @@
 "use strict";
 
 var HeelstrikePicture = (view) => {
-  const { draw, palette, words, heightOfGround } = HeelstrikeDrawing;
+  const { draw, fit, palette, words, heightOfGround } = HeelstrikeDrawing;
   const at = (name) => document.getElementById(name);
   const WEIGHT_LENGTH = 0.35; // of the robot's size, the arrow of its weight
   const STRONGEST = 4; // weights of the robot, of a push
@@ -60,7 +60,7 @@ var HeelstrikePicture = (view) => {
 
   /** Draw a frame of the course; return it as it is drawn. */
   function drawFrame(vector) {
-    const { context, width, height } = view.sized(plane);
+    const { context, width, height } = fit(plane);
     const frame = view.course.frame(vector);
     aim(frame, width, height);
     const look = { ...camera, width, height, dark: view.dark(), hide: view.hide,

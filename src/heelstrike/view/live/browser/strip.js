@@ -16,7 +16,7 @@ var HeelstrikeStrip = (view) => {
 
   /** Draw it; of who stands, what is new is found now and then only. */
   function draw(vector, { thorough }) {
-    const { course, state } = view, { context, width, height } = view.sized(at("events"));
+    const { course, state } = view, { context, width, height } = HeelstrikeDrawing.fit(at("events"));
     const from = state.from || 0, to = Math.max(from, course.end);
     if (thorough || course.count < counted) {
       phases = course.phases(view.scene.weight);
