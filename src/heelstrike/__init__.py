@@ -241,11 +241,25 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     home = _HOME.get(name)
     if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        # With a name and without an object Python adds no guess of its own to the same line.
+        raise AttributeError(
+            f"module {__name__!r} has no attribute {name!r}{_meant(name)}", name=name
+        )
     value = getattr(importlib.import_module(home), name)
     globals()[name] = value  # the next look-up does not come here
     return value
 
 
+def _meant(name: str) -> str:
+    """Guess which public name somebody means who writes another."""
+    if name.startswith("_"):
+        return ""
+    import difflib
+
+    lower = {each.lower().replace("_", ""): each for each in _HOME}
+    near = difflib.get_close_matches(name.lower().replace("_", ""), lower, n=1, cutoff=0.7)
+    return f". Did you mean {lower[near[0]]!r}?" if near else ""
+
+
 def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(_HOME))
+    return sorted([*_HOME, *(name for name in globals() if name.startswith("__"))])

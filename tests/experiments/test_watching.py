@@ -10,8 +10,7 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.cli.options import method_called
-from heelstrike.cli.watch import METHODS
+from heelstrike.cli.options import METHODS, method_called
 from heelstrike.experiments.watching import (
     DESIGNED,
     ENCODERS,

@@ -10,11 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from heelstrike.cli import INTERRUPTED
-from heelstrike.cli.compare import Way
 from heelstrike.cli.options import (
+    SEVERAL,
+    USUAL_METHOD,
     AsJson,
     Debug,
     Friction,
+    Method,
     OnGround,
     Pushed,
     SavedGait,
@@ -40,7 +42,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import Run
 
 OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "floating", "projected",
-             "forward", "pose", "mirror", "package_path")  # fmt: skip
+             "forward", "pose", "mirror", "package_path", "xacro", "xacro_arg")  # fmt: skip
 """Options that say how a robot walks, and nothing to a run that is read."""
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"
@@ -62,11 +64,8 @@ def report(
     gait: SavedGait = None,
     steps: Steps = 10,
     method: Annotated[
-        list[Way] | None,
-        typer.Option(
-            help="Way through time; repeat the option to see several side by side.",
-            show_default="time-stepping; event-driven without motors",
-        ),
+        list[Method] | None,
+        typer.Option(help=SEVERAL, show_default=USUAL_METHOD),
     ] = None,
     step: Annotated[
         float, typer.Option(help="Time step in s of the methods that have one.")
@@ -105,7 +104,7 @@ def report(
         machine = load_robot(what[0], **how)
         for each in pushes:
             each.place(machine)
-        ways = method or [Way.TIME_STEPPING if machine.nu else Way.EVENT_DRIVEN]
+        ways = method or [Method.TIME_STEPPING if machine.nu else Method.EVENT_DRIVEN]
         methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
         planned = planned_walk(machine, gait, surface)
         followed = planned if isinstance(planned, Gait) else None

@@ -9,8 +9,12 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
+    METHOD,
+    METHODS,
+    USUAL_METHOD,
     Debug,
     Friction,
+    Method,
     OnGround,
     RobotName,
     SavedGait,
@@ -19,19 +23,10 @@ from heelstrike.cli.options import (
 )
 from heelstrike.cli.terminal import spoken, stage, tell
 from heelstrike.cli.values import ground_called
-from heelstrike.cli.walk import Method, Scheme
 from heelstrike.interruption import acknowledge
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
-
-METHODS = (
-    Scheme.IMPACT_RESOLVED.value,
-    Method.EVENT_DRIVEN.value,
-    Method.COMPLIANT.value,
-    *(scheme.value for scheme in Scheme if scheme is not Scheme.IMPACT_RESOLVED),
-)
-"""Names that :func:`~heelstrike.cli.options.method_called` knows, the usual one first."""
 
 
 # As many arguments as the command has options: a person's.
@@ -41,12 +36,8 @@ def watch(
     robot: RobotName = "bravo7",
     gait: SavedGait = None,
     method: Annotated[
-        str | None,
-        typer.Option(
-            metavar="|".join(METHODS),
-            help="Way through time, or discretisation of time stepping.",
-            show_default=f"{METHODS[0]}; {Method.EVENT_DRIVEN} without motors",
-        ),
+        Method | None,
+        typer.Option(help=METHOD, show_default=USUAL_METHOD),
     ] = None,
     step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
     ground: OnGround = "flat",
@@ -66,12 +57,6 @@ def watch(
     Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, to whoever has
     the address that is printed. Ctrl-C ends it.
     """
-    if method == Method.TIME_STEPPING.value:  # as the other commands call it
-        method = METHODS[0]
-    if method is not None and method not in METHODS:
-        raise typer.BadParameter(
-            f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method"
-        )
     with stage("loading"):
         from heelstrike.view.live.server import check_installed
 
@@ -84,7 +69,11 @@ def watch(
         for name in METHODS if method is None else (method,):
             method_called(name, step)
         first = First(
-            method=method, step=step, gait=gait, friction=friction, **_shape(ground, surface)
+            method=None if method is None else method.value,
+            step=step,
+            gait=gait,
+            friction=friction,
+            **_shape(ground, surface),
         )
         walks = WalkStage(robot, method_called, METHODS, first, **how)
         viewer = view(stage=walks, rate=speed, port=port)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
@@ -114,6 +115,7 @@ def solver_order(solver: str | Solver, *, fallback: bool = True) -> Integers:
     return np.array([choice.code for choice in (first, *others)], np.int64)
 
 
+@takes(ContactProblemError)
 def solve_contact(
     delassus: ArrayLike,
     free: ArrayLike,

@@ -21,6 +21,7 @@ from heelstrike.analysis import (
 )
 from heelstrike.analysis.intervals import IMPULSIVE, impulses_in_events
 from heelstrike.analysis.summary import plain
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
@@ -172,6 +173,7 @@ ALONE = {
 """Members of a difference and their headings: how runs lie apart, and what each is by itself."""
 
 
+@takes(SimulationError)
 def compare(
     robot: Robot,
     controller: Controller | None = None,

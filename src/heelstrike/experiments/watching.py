@@ -14,7 +14,7 @@ from heelstrike.analysis.limit_cycle import LimitCycle
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque, Encoder
 from heelstrike.errors import GaitError
-from heelstrike.experiments.passive import passive_walk
+from heelstrike.experiments.passive import USUAL_SLOPES, passive_walk
 from heelstrike.experiments.walk import beginning, design, typical_step
 from heelstrike.gait import Gait, load_gait
 from heelstrike.robot import Robot, builtin_robots, load_robot
@@ -139,7 +139,7 @@ class WalkStage(Stage):
                 found.append(_speed_control(robot))
         found.append(friction_control(self._first.friction))
         if self._first.ground is None:
-            found += self._shape_controls(passive)
+            found += self._shape_controls(robot)
         usual = "event-driven" if passive else self._method_names[0]
         asked = self._first.method if name == self._name else None
         found.append(Control("method", "method", asked or usual, self._method_names))
@@ -184,10 +184,10 @@ class WalkStage(Stage):
             self._robots[name] = load_robot(name)
         return self._robots[name]
 
-    def _shape_controls(self, passive: bool) -> list[Control]:
-        slope = self._first.slope
+    def _shape_controls(self, robot: Robot) -> list[Control]:
+        slope, passive = self._first.slope, robot.nu == 0
         if slope is None:
-            slope = DESCENT if passive else 0.0
+            slope = USUAL_SLOPES.get(robot.name, DESCENT) if passive else 0.0
         steepest = max(STEEPEST, abs(slope))
         shapes = [
             Control("slope", "slope", slope, low=-steepest, high=steepest, step=0.5, unit="°")

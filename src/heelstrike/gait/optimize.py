@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 
-from heelstrike.errors import InfeasibleGaitError
+from heelstrike.arguments import takes
+from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.kept_gait import KeptGait
@@ -14,6 +15,7 @@ from heelstrike.gait.request import JointRanges, Request
 from heelstrike.robot.robot import Robot
 
 
+@takes(GaitError)
 def optimize_gait(
     robot: Robot,
     *,

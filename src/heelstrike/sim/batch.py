@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, RobotError, SimulationError
@@ -153,6 +154,7 @@ class Batch:
         return f"{len(self)} runs: {', '.join(counts)}"
 
 
+@takes(SimulationError)
 def simulate_batch(
     robot: Robot | Sequence[Robot],
     controller: Controller | Sequence[Controller] | None = None,

@@ -111,6 +111,28 @@ class Event:
     contact: int
     impulse: tuple[float, float]
 
+    @property
+    def kind_in_words(self) -> str:
+        """Its kind as people write it."""
+        return self.kind.name.lower().replace("_", " ")
+
+    def place(self, robot: Robot) -> str:
+        """Name of the joint or contact point of a robot at which it happened; "" if at none.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot of the run.
+
+        Returns
+        -------
+        str
+            The name.
+        """
+        names = robot.joint_names if self.kind.of_joint else robot.contact_names
+        somewhere = self.kind is not EventKind.BRIDGE and 0 <= self.contact < len(names)
+        return names[self.contact] if somewhere else ""
+
 
 @dataclass(frozen=True)
 class Certificates:
@@ -470,17 +492,27 @@ class Run:
         return to_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`.
+        """Write the run as NetCDF (``.nc``), or as a table of text for other programs (``.csv``).
+
+        A NetCDF file is read again with :func:`heelstrike.load_run`. A table has a row for each
+        recorded time and a column for each number, headed by its name and unit as in
+        ``position left_knee [rad]``, and at last the events since the row before, in words. It
+        holds neither robot nor ground and cannot be loaded.
 
         Parameters
         ----------
         path : str or path
-            File to write.
+            File to write, whose name ends in .nc or .csv.
 
         Returns
         -------
         Path
-            The file.
+            The file. It appears whole or not at all.
+
+        Raises
+        ------
+        RunFileError
+            If the name ends in anything else or the file cannot be written. The run is as it was.
         """
         from heelstrike.sim.files.run_file import save
 

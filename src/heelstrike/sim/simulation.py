@@ -11,6 +11,7 @@ from typing import Any, NoReturn, Unpack
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
@@ -133,6 +134,7 @@ class Simulation:
     ('completed', 0.01)
     """
 
+    @takes(SimulationError)
     def __init__(
         self,
         robot: Robot,
@@ -853,6 +855,7 @@ class Simulation:
         )
 
 
+@takes(SimulationError)
 def simulate(
     robot: Robot,
     controller: Controller | None = None,

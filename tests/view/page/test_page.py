@@ -234,7 +234,7 @@ def test_bad_requests(tmp_path: Path) -> None:
     run = make_run(box(), [0.0, 0.1])
     with pytest.raises(ViewError, match=r"ends in \.html"):
         save_html(run, tmp_path / "run.txt")
-    with pytest.raises(hs.GaitError, match="load_gait"):
+    with pytest.raises(hs.ViewError, match="load_gait"):
         save_html(run, tmp_path / "run.html", gait="gait.json")  # type: ignore[arg-type]
     with pytest.raises(ViewError, match="there is no folder"):
         save_html(run, tmp_path / "none" / "run.html")

@@ -92,7 +92,7 @@ def test_bad_requests(tmp_path: Path) -> None:
     for wrong in ("run.nc", ["run.nc"], {"a": 3}):
         with pytest.raises(ViewError, match="load_run"):
             hs.report(wrong, tmp_path / "report.html")  # type: ignore[arg-type]
-    with pytest.raises(hs.GaitError, match="load_gait"):
+    with pytest.raises(hs.ViewError, match="load_gait"):
         hs.report(run, tmp_path / "report.html", gait="gait.json")  # type: ignore[arg-type]
     with pytest.raises(ViewError, match="no run"):
         hs.report([], tmp_path / "report.html")

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
@@ -133,6 +134,7 @@ class Compliant(Method):
     atol: float = 1e-7
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         for name in ("law", "stop"):
             law = getattr(self, name)
             if not isinstance(law, NormalLaw):

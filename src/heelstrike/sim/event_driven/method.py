@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
@@ -177,6 +178,7 @@ class EventDriven(Method):
     python_period: ClassVar[float | None] = 1e-3
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         for name in ("rtol", "atol", "max_step", "output_period"):
             value = getattr(self, name)
             if not (value is None and name == "output_period") and not 0.0 < value < np.inf:

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
@@ -173,6 +174,7 @@ class TimeStepping(Method):
     activation: float = 0.0
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         if not 0.0 < self.step < float("inf"):
             raise SimulationError(f"the time step must be a positive number, got {self.step}")
         if not 0.0 <= self.activation < float("inf"):

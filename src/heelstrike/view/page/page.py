@@ -10,6 +10,7 @@ from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.summary import lines, summarize
 from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
+from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, ViewError
 from heelstrike.sim.run import Event, Run
 from heelstrike.view.page.columns import TOLERANCE, packed
@@ -33,6 +34,7 @@ MOST_PHASES = 2000
 """Phases of support that a page shows below its timeline."""
 
 
+@takes(ViewError)
 def save_html(
     run: Run,
     path: str | os.PathLike[str],

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 
 from heelstrike.analysis.summary import lines, summarize
+from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view.figures import FIGURES, plot
@@ -43,6 +44,7 @@ PIXELS = 110
 """Dots an inch of what a figure does not draw as lines."""
 
 
+@takes(ViewError)
 def report(
     runs: Run | Mapping[str, Run] | Sequence[Run],
     path: str | os.PathLike[str],
