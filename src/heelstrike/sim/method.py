@@ -205,7 +205,9 @@ class Method(ABC):
             return time
         return clock.start + round((time - clock.start) / self.step_length) * self.step_length
 
-    def forget_ground(self, robot: Robot, work: Any, clock: Clock) -> None:  # noqa: B027
+    def forget_ground(  # noqa: B027
+        self, robot: Robot, work: Any, clock: Clock, *, stops: bool = False
+    ) -> None:
         """Forget what touches the ground, because another has been laid.
 
         Parameters
@@ -216,6 +218,8 @@ class Method(ABC):
             Its bundle.
         clock : Clock
             Clock of the simulation.
+        stops : bool
+            Forget what touches joint stops, too: the robot has been moved.
         """
 
     def rows_in(self, duration: float, record_every: int) -> int:

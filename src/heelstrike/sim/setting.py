@@ -122,7 +122,7 @@ def checked_setting(
     ground = FLAT if ground is None else ground
     if not isinstance(ground, Ground):
         raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-    _check_state(robot, state)
+    check_state(robot, state)
     if control_period is not None and not 0.0 < control_period < np.inf:
         raise SimulationError(f"control_period must be a positive number, got {control_period}")
     if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
@@ -196,7 +196,8 @@ def model_digest(model: Model) -> str:
     return _DIGESTS[model]
 
 
-def _check_state(robot: Robot, state: State) -> None:
+def check_state(robot: Robot, state: State) -> None:
+    """Refuse what is no state of a robot."""
     if not isinstance(state, State):
         raise SimulationError(
             f"state must be a State, got {type(state).__name__}; write State(q, v) with positions "

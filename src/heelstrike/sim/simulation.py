@@ -41,6 +41,7 @@ from heelstrike.sim.run import Run, Timing, counted, joined, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
+    check_state,
     checked_pushes,
     checked_setting,
     identity_of,
@@ -240,8 +241,26 @@ class Simulation:
 
     @property
     def state(self) -> State:
-        """Position and velocity now."""
+        """Position and velocity now; another may be set, but none with a foot in the ground."""
         return State(self._memory.q, self._memory.v)
+
+    @state.setter
+    def state(self, state: State) -> None:
+        check_state(self.robot, state)
+        deep = self._depth(state, self._ground)
+        if deep.any():
+            point = int(np.argmax(deep))
+            raise SimulationError(
+                f"contact point {self.robot.contact_names[point]!r} would be {deep[point]:.3g} m "
+                "in the ground; robot.placed(state, ground) gives a state that is not"
+            )
+        latches_at(self.robot, state, self._ground, self.latched)
+        self.method.check(replace(self._setting, ground=self._ground, state=state))
+        self._memory.q[:], self._memory.v[:] = state.q, state.v
+        loops = self._memory.loops
+        loops.brake_position[:] = state.q[self.robot.model.brake_joint]
+        self.method.forget_ground(self.robot, self._work, self._clock, stops=True)
+        self.method.reconsider(self._work)
 
     @property
     def contacts(self) -> Contacts:
@@ -263,14 +282,14 @@ class Simulation:
     def ground(self, ground: Ground) -> None:
         if not isinstance(ground, Ground):
             raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-        at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
-        deep = at.gap < min(-LAID, float(np.min(self.contacts.gap, initial=0.0)) - LAID)
-        if np.any(deep):
-            point = int(np.argmin(at.gap))
+        deep = self._depth(self.state, ground)
+        if deep.any():
+            at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
+            point = int(np.argmax(deep))
             raise SimulationError(
-                f"this ground would lie {-at.gap[point]:.3g} m above contact point "
+                f"this ground would lie {deep[point]:.3g} m above contact point "
                 f"{self.robot.contact_names[point]!r}; lower it by "
-                f"{float(np.max(-at.gap[deep] / at.normal[deep, 1])):.3g} m, or lay it before "
+                f"{float(np.max(deep / at.normal[:, 1])):.3g} m, or lay it before "
                 "the robot is there"
             )
         self.method.check(replace(self._setting, ground=ground, state=self.state))
@@ -278,6 +297,12 @@ class Simulation:
         if not all(np.array_equal(mine[name], its[name]) for name in mine):
             self.method.forget_ground(self.robot, self._work, self._clock)
         self._ground = ground
+
+    def _depth(self, state: State, ground: Ground) -> Floats:
+        """How deep points would be in a ground, (nc,) in m; 0 of those no deeper than now."""
+        gap = contact_kinematics(self.robot, state.q, state.v, ground).gap
+        now = float(np.min(self.contacts.gap, initial=0.0))
+        return np.where(gap < min(-LAID, now - LAID), -gap, 0.0)
 
     @property
     def latched(self) -> tuple[str, ...]:

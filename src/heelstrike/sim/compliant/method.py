@@ -196,10 +196,19 @@ class Compliant(Method):
         """Return how many rows and events a sample may add to the record."""
         return 1, 1 + 4 * robot.nc + robot.nv + robot.model.latches + robot.model.brakes
 
-    def forget_ground(self, robot: Robot, work: CompliantWorkspace, clock: Clock) -> None:  # noqa: ARG002
+    def forget_ground(
+        self,
+        robot: Robot,  # noqa: ARG002
+        work: CompliantWorkspace,
+        clock: Clock,
+        *,
+        stops: bool = False,
+    ) -> None:
         """Let no point be in a corner of it."""
         work.corners.first[:] = NO_FACE
         work.corners.second[:] = NO_FACE
+        if stops:
+            clock.begun = 0
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with a restitution of its own."""

@@ -260,14 +260,19 @@ class EventDriven(Method):
             check_steps(setting, duration, *self.row_period)
         check_room(setting, duration, *self.row_period)
 
-    def forget_ground(self, robot: Robot, work: Phase, clock: Clock) -> None:
+    def forget_ground(
+        self, robot: Robot, work: Phase, clock: Clock, *, stops: bool = False
+    ) -> None:
         """Look for what touches the ground as at the beginning."""
-        for told in (work.closed, work.slide, work.stuck, work.passing):
-            told[: robot.nc] = 0
-            told[work.first_second :] = 0
+        kept = slice(0, 0) if stops else slice(robot.nc, work.first_second)
+        for told, nothing in (
+            *((each, 0) for each in (work.closed, work.slide, work.stuck, work.passing)),
+            (work.accumulation, np.inf),
+        ):
+            before = told[kept].copy()
+            told[:] = nothing
+            told[kept] = before
         work.face[:] = NO_FACE
-        work.accumulation[: robot.nc] = np.inf
-        work.accumulation[work.first_second :] = np.inf
         work.fired[:] = 0
         clock.begun = 0
 

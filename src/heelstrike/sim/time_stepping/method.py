@@ -240,10 +240,15 @@ class TimeStepping(Method):
         )
         return 1, events
 
-    def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
+    def forget_ground(
+        self, robot: Robot, work: Stepping, clock: Clock, *, stops: bool = False
+    ) -> None:
         """What touched other ground says nothing of this one."""
         work.impact.touching[: robot.nc] = NEVER
         work.impact.touching[robot.nc + 2 * robot.nv :] = NEVER
+        if stops:
+            work.impact.touching[:] = NEVER
+            clock.begun = 0  # loops are closed again
         work.impact.corner.near = 0
 
     def check(self, setting: Setting) -> None:

@@ -263,6 +263,21 @@ class Session:
             f"{size:.3g} N on {in_words(robot.link_names[link])} for {RANDOM_PUSH_LASTS:g} s"
         )
 
+    def _pose(self, _: str, command: Mapping[str, Any]) -> None:
+        live = self._needs_live()
+        joint, position = str(command["joint"]), _finite(command["value"])
+        self.playing = False
+        if not self._at_end:
+            self._go_on_from_cursor()
+        if not live.can_go_on:
+            raise RefusedError(f"{live.message}. Begin anew, or move it at an earlier time")
+        live.move(joint, position)
+        self.history.take(_seen(live))
+        assert self._layout is not None
+        now = self.history.part(len(self.history) - 1, len(self.history) - 1)
+        self._board.look(self._layout.frames(now, [0, 0], self._pushes)[0])
+        self.cursor = self._goal = float(now.time[0])
+
     def _choose(self, _: str, command: Mapping[str, Any]) -> None:
         stage = self._needs_stage()
         name, value = str(command["name"]), command["value"]
@@ -318,9 +333,7 @@ class Session:
                 simulation = self._stage.simulation(wanted, self._tell_busy)
                 self._tell_busy("loading the simulator (compiling it, once: about 20 s)")
                 live = LiveSimulation(simulation)
-                run = live.record()
-                if not len(run.time):  # a controller that is not asked but for good
-                    run = live.advance(None) or run
+                run = _seen(live)
             except HeelstrikeError as error:
                 self._note = str(error)
                 return
@@ -528,6 +541,12 @@ class Session:
         return self._at_end and (self.live is None or not self.live.can_go_on)
 
 
+def _seen(live: LiveSimulation) -> Run:
+    """Return how a simulation is now, or a step later where its controller is asked for good."""
+    run = live.record()
+    return run if len(run.time) else live.advance(None) or run
+
+
 def _kind(event: Event) -> str:
     return event.kind.name.lower()
 
@@ -548,6 +567,7 @@ _COMMANDS: dict[str, Any] = {
     "hold": Session._hold,
     "release": Session._release,
     "random push": Session._random_push,
+    "pose": Session._pose,
     "choose": Session._choose,
     "reset": Session._reset,
     "resume": Session._resume,

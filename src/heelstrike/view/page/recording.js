@@ -4,6 +4,7 @@
 "use strict";
 
 var HeelstrikeRecording = (() => {
+  const { fit } = HeelstrikeDrawing;
   const MEMBERS = ["pose", "point", "normal", "force", "friction", "center", "capture", "pressure",
     "support", "push"];
   const MOVING = ["pose", "point", "center", "capture", "push"];
@@ -174,17 +175,6 @@ var HeelstrikeRecording = (() => {
     const size = Math.max(high - low, scene.size);
     return { low: Math.min(low, 0) - 0.14 * size, high: high + 0.2 * size,
       reach: Math.max(1.05 * reach, 1e-3) };
-  }
-
-  /** Give a canvas the pixels of its screen. */
-  function fit(canvas) {
-    const width = canvas.clientWidth, height = canvas.clientHeight;
-    const ratio = window.devicePixelRatio || 1;
-    const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    return { context, width, height };
   }
 
   return { read, before, fit };
