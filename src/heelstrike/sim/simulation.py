@@ -825,6 +825,7 @@ class Simulation:
             raise
         self._memory, self._pushes, self._ground = memory, pushes, ground
         self._why_stopped = ""
+        self._clock.finishing = 0  # of one that its controller has ended
         for numbers in (self._control, self._numbers.control):
             numbers.robot.ending = NO_ENDING
 

@@ -146,6 +146,17 @@ def test_it_is_saved_and_can_be_taken_back(tmp_path: Any) -> None:
     assert (loaded.status, loaded.message) == (run.status, run.message)
 
 
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: type(method).__name__)
+def test_what_its_law_has_ended_goes_on_from_its_end(method: Method) -> None:
+    run = run_of(law(), method=method, control_period=1e-3)
+    simulation = hs.Simulation(
+        walking.bravo7(), law(), state=run.final, method=method, control_period=1e-3
+    )
+    simulation.parameters.time = 1.0
+    assert simulation.advance(0.03) is RunStatus.COMPLETED
+    assert simulation.time == pytest.approx(0.03, abs=1e-12)
+
+
 def test_a_look_at_the_record_does_not_end_it() -> None:
     simulation = hs.Simulation(walking.bravo7(), law(), state=walking.gait().initial_state)
     simulation.advance(0.02)
