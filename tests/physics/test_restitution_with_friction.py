@@ -23,12 +23,12 @@ MASS = np.array([1.0, 1.0, 1.0 / 12.0])
 SCHEMES = (Scheme.IMPACT_RESOLVED, Scheme.MOREAU_JEAN)
 
 
-def strike(sliding: float, method: Any) -> Run:
+def strike(sliding: float, method: Any, above: float = 1.05e-3) -> Run:
     """Let the end of a rod without weight strike the ground at 1 m/s."""
     return hs.simulate(
         rod(gravity=0.0),
         state=hs.State(
-            [0.5 * np.sin(PITCH), 0.5 * np.cos(PITCH) + 1.05e-3, PITCH], [sliding, -1.0, 0.0]
+            [0.5 * np.sin(PITCH), 0.5 * np.cos(PITCH) + above, PITCH], [sliding, -1.0, 0.0]
         ),
         duration=3e-3,
         method=method,
@@ -74,6 +74,16 @@ def test_what_an_impact_makes_is_told_to_the_joule(method: Any) -> None:
             gains.append(gain)
             assert gain == pytest.approx(formula(sliding), rel=2e-2)  # it has turned a little
     assert len(gains) == 1
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_a_gain_is_told_at_the_end_of_its_step(scheme: Scheme) -> None:
+    """Which is the beginning of the next, to the bit: 6 h + h is another number than 7 h."""
+    run = strike(0.3, hs.TimeStepping(step=2e-4, scheme=scheme), above=1.25e-3)
+    assert told(run)
+    times = [event.time for event in run.events]
+    assert times == sorted(times)
+    assert np.isin(times, run.time).all()
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -84,7 +84,6 @@ def note_events(
     do not touch down, and joints that rest at a stop do not reach it. Joints with dry friction come
     to rest, or begin to move.
     """
-    first = record.events
     for contact in range(model.contact_link.shape[0]):
         note_events_of_contact(model, time, end, step, contact, memory, record)
     for joint in range(model.parent.shape[0]):
@@ -100,25 +99,6 @@ def note_events(
         if rests != (memory.reported.resting[dry] == 1):
             log_event(end, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
             memory.reported.resting[dry] = 1 if rests else 0
-    if record.events > first + 1:
-        order_events(first, record)
-
-
-@kernel
-def order_events(first: int, record: Record) -> None:
-    """Put the events from the `first` on in the order of their times; those of one time stay."""
-    time, kind, contact = record.event_time, record.event_kind, record.event_contact
-    impulse = record.event_impulse
-    for event in range(first + 1, record.events):
-        place = event
-        while place > first and time[place - 1] > time[place]:
-            before = place - 1
-            time[before], time[place] = time[place], time[before]
-            kind[before], kind[place] = kind[place], kind[before]
-            contact[before], contact[place] = contact[place], contact[before]
-            for i in range(2):
-                impulse[before, i], impulse[place, i] = impulse[place, i], impulse[before, i]
-            place = before
 
 
 @dissolved_kernel

@@ -966,7 +966,7 @@ def decide(
     )
     note_brakes(model, clock.time, work.step, record, memory.loops)
     if work.impact.gains == 1:
-        note_gain(model, clock.time, work.step, work.impact, memory, record)
+        note_gain(model, end, work.step, work.impact, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 
