@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 import warnings
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -91,6 +92,19 @@ def test_an_error_is_told_with_the_traceback_of_the_controller(name: str) -> Non
     assert f"in {line}\n    raise {error}(" in words, words
     assert words.count("Traceback") == 1, words
     assert "simulation.py" not in words, words
+
+
+def test_a_package_whose_name_begins_likewise_is_another() -> None:
+    file = str(Path(hs.__file__).parent) + "_laws.py"
+    theirs: dict[str, Any] = {"simulate": hs.simulate}
+    text = "def run(*given, **options):\n    return simulate(*given, **options)"
+    exec(compile(text, file, "exec"), theirs)
+    with pytest.warns(hs.ControllerWarning) as told:
+        theirs["run"](
+            walking.bravo7(), Acting(out_of_power, 2), state=walking.gait().initial_state,
+            duration=0.01,
+        )  # fmt: skip
+    assert told[0].filename == file
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)

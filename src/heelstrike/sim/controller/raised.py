@@ -37,7 +37,7 @@ class EndOfRun(Exception):  # noqa: N818 - no error
     """
 
 
-_PACKAGE = str(Path(__file__).parents[2])
+_PACKAGE = Path(__file__).parents[2]
 _CALLER = str(Path(__file__).parents[1] / "simulation.py")
 
 
@@ -75,4 +75,4 @@ def _traceback_of(error: BaseException) -> str:
 
 
 def _is_of_package(filename: str) -> bool:
-    return filename.startswith(_PACKAGE)
+    return _PACKAGE in Path(filename).parents
