@@ -199,14 +199,16 @@ class Simulation:
         setting, method
             What to simulate, and how.
         memory : Memory, optional
-            Memory to use, as `allocate_memory` makes it for this robot and these pushes.
+            Memory to use, as `allocate_memory` makes it for this robot and these pushes. A batch
+            gives it, which has checked everything before any of it begins.
         keep_rows : bool
             Whether rows and events are kept; otherwise they are counted and forgotten.
         """
         self.robot, self.method, self._setting = setting.robot, method, setting
         self._given_period = setting.control_period
         self._ground, self._pushes = setting.ground, setting.pushes
-        method.check(setting)
+        if memory is None:
+            method.check(setting)
         self._memory = allocate_memory(self.robot, self._pushes) if memory is None else memory
         self._memory.q[:] = setting.state.q
         self._memory.v[:] = setting.state.v

@@ -57,6 +57,14 @@ def test_springs_too_stiff_for_a_step_are_told_of_and_what_to_do_helps() -> None
         assert energy_gain(mended, 5e4) <= 1.5
 
 
+def test_a_batch_tells_of_them_once_a_run_at_the_line_that_asks_for_it() -> None:
+    state = hs.State([0.0, 0.7, 0.0, 0.2], [0.5, 0.0, 0.0, 0.0])
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        hs.simulate_batch(sprung(5e4), state=[state] * 3, duration=0.01, stop_when_fallen=False)
+    assert [warning.filename for warning in told] == [__file__] * 3
+
+
 @pytest.mark.parametrize("share", [0.0, 0.7, 1.0])
 def test_where_a_spring_or_damper_becomes_too_stiff(share: float) -> None:
     """A wheel I on a spring k and a damper c swings up where h² k / 4 I + h c / 2 I > 1.
