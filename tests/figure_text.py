@@ -1,4 +1,4 @@
-"""What a reader reads on a figure: no leftovers of formulas, nothing empty, cut off or overprinted."""
+"""What a reader reads on a figure: no leftovers of formulas, nothing cut off or overprinted."""
 
 from __future__ import annotations
 
