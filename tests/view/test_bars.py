@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 from scipy.ndimage import label
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from heelstrike.dynamics import link_poses
 from heelstrike.robot import Robot, builtin_robots, load_robot
-from heelstrike.view.bars import bars
+from heelstrike.robot.shapes.convex import convex_hull, nearest_points
+from heelstrike.view.bars import bars, shortest
 from heelstrike.view.drawing import body, extent
 
 APART = """<robot name="apart">
@@ -82,6 +85,21 @@ def test_shapes_short_of_the_joints_are_connected_to_them(leg: Robot) -> None:
     assert pieces(leg) == 1
     names = [leg.link_names[bar.link] for bar in bars(leg)]
     assert sorted(names) == ["base"] * 2 + ["shank"] * 2 + ["thigh"] * 2
+
+
+@pytest.mark.parametrize("count", [3, 40])
+def test_bars_are_as_short_as_they_can_be(count: int) -> None:
+    """Beside SciPy's least spanning tree of all distances."""
+    draw = np.random.default_rng(count)
+    shapes = [
+        convex_hull(0.05 * draw.normal(size=(9, 2)) + draw.normal(size=2)) for _ in range(count)
+    ]
+    between = np.zeros((count, count))
+    for a, b in combinations(range(count), 2):
+        start, end = nearest_points(shapes[a], shapes[b])
+        between[a, b] = np.hypot(*(end - start)) + 1e-6  # zero would be no way
+    length = sum(float(np.hypot(*(end - start))) for _, _, start, end in shortest(shapes))
+    assert length == pytest.approx(minimum_spanning_tree(between).sum(), abs=count * 1e-6)
 
 
 def test_bars_are_slimmer_than_what_they_connect(leg: Robot) -> None:

@@ -6,6 +6,7 @@ the joints. Each link is drawn connected: its shapes and its joints, by the shor
 
 from __future__ import annotations
 
+from heapq import heapify, heappop, heappush
 from itertools import combinations
 
 import numpy as np
@@ -31,7 +32,7 @@ def bars(robot: Robot) -> tuple[Outline, ...]:
     for link in dict.fromkeys(outline.link for outline in robot.outlines):
         rims = [outline.rim() for outline in robot.outlines if outline.link == link]
         nodes = rims + [place[None] for place in _joints(robot, link, reference)]
-        for a, b, start, end in _shortest(nodes):
+        for a, b, start, end in shortest(nodes):
             sides = np.array([_sides(nodes[i]) for i in (a, b) if len(nodes[i]) > 1])
             if len(sides):
                 radius = max(THICKNESS * sides[:, 0].min(), THINNEST * sides[:, 1].max())
@@ -55,20 +56,32 @@ def _joints(robot: Robot, link: int, reference: Floats) -> list[Floats]:
     return places
 
 
-def _shortest(nodes: list[Floats]) -> list[tuple[int, int, Floats, Floats]]:
-    """Shortest bars that connect convex polygons: a tree, without what touches already."""
-    ways = [
-        (a, b, *nearest_points(nodes[a], nodes[b])) for a, b in combinations(range(len(nodes)), 2)
+def shortest(nodes: list[Floats]) -> list[tuple[int, int, Floats, Floats]]:
+    """Shortest bars that connect convex polygons: a tree, without what touches already.
+
+    Two polygons are no nearer each other than the boxes round them, and only those that may be
+    next are measured.
+    """
+    low, high = (np.array([end(node, axis=0) for node in nodes]) for end in (np.min, np.max))
+    apart = np.maximum(low[:, None] - high, 0.0)
+    least = np.hypot(*np.moveaxis(np.maximum(apart, apart.swapaxes(0, 1)), -1, 0))
+    ways: list[tuple[float, int, int, tuple[Floats, Floats] | None]] = [
+        (float(least[a, b]), a, b, None) for a, b in combinations(range(len(nodes)), 2)
     ]
-    ways.sort(key=lambda way: float(np.hypot(*(way[3] - way[2]))))
+    heapify(ways)
     group = list(range(len(nodes)))
     found = []
-    for a, b, start, end in ways:
+    while ways:
+        length, a, b, ends = heappop(ways)
         if group[a] == group[b]:
             continue
+        if ends is None:
+            ends = nearest_points(nodes[a], nodes[b])
+            heappush(ways, (float(np.hypot(*(ends[1] - ends[0]))), a, b, ends))
+            continue
         group = [group[a] if each == group[b] else each for each in group]
-        if np.any(start != end):
-            found.append((a, b, start, end))
+        if length > 0.0:
+            found.append((a, b, *ends))
     return found
 
 
