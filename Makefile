@@ -4,7 +4,8 @@
 #   make test    all tests; those in a browser if there is a chromium
 #   make bench   speed beside other engines; table, JSON and figures in bench/
 #   make check   formatting, lint, types, layers
-#   make check-all   these and all tests, on every kind of machine that this one can play; long
+#   make peers   install the other engines, beside which `make test` then runs its tests, too
+#   make check-all   all checks and tests, on every kind of machine that this one can play; long
 #   make docs    the documentation site, in site/, and a look at each page of it
 #   make clean   forget everything that was built or installed
 
@@ -23,7 +24,7 @@ SAMPLE := tests/compiler/test_plain_code.py tests/compiler/test_straight_line.py
 	tests/sim/contacts/test_geometry.py tests/experiments/test_paper.py
 
 .DEFAULT_GOAL := help
-.PHONY: help walk test test-plain test-blas test-perturbed test-sample test-numba test-documented bench check check-all docs clean
+.PHONY: help walk peers pinocchio test test-plain test-blas test-perturbed test-sample test-numba test-documented bench check check-all docs clean
 
 help:
 	@sed -n 's/^#   //p' Makefile
@@ -33,6 +34,11 @@ walk: $(VENV)/installed
 
 test: $(VENV)/installed-dev
 	$(PYTEST)
+
+# Engines to compare with: all that have wheels, or the one that installs in half a minute.
+peers: $(VENV)/installed-peers
+
+pinocchio: $(VENV)/installed-pinocchio
 
 # The same tests where numbers are rounded differently: without the instructions that only some
 # processors have, with other kernels of OpenBLAS than it chooses, with other last digits of gaits.
@@ -70,7 +76,7 @@ check: $(VENV)/installed-dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-check-all: check test test-plain test-blas test-perturbed
+check-all: check peers test test-plain test-blas test-perturbed
 
 docs: export HEELSTRIKE_SITE = site
 docs: $(VENV)/installed-docs $(VENV)/installed-dev
@@ -102,6 +108,11 @@ $(VENV)/installed-docs: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing heelstrike and its documentation tools into $(VENV)"
 	$(INSTALL) -e '.[docs]'
 	@touch $(VENV)/installed $@
+
+$(VENV)/installed-peers $(VENV)/installed-pinocchio: $(VENV)/installed-%: $(VENV)/installed-dev
+	@echo "Installing other engines into $(VENV) ($*)"
+	$(INSTALL) -e '.[dev,$*]'
+	@touch $@
 
 # Without constraints.txt, whose NumPy an old Numba refuses.
 $(VENV)-numba/installed-$(OLDEST_NUMBA): pyproject.toml

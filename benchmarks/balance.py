@@ -10,11 +10,13 @@ way that its steps should take it. Seeds below 1000 were used while the controll
 
 `small` tells what is left, step by step, of the error of the capture point after a push of 3 N s;
 `multipliers` by what factor small errors shrink in a step (:func:`heelstrike.floquet_multipliers`);
-`stand` the largest pushes of a robot that stands; `commands` how often it starts, walks at
-three speeds and stops. `--robot` may be a file, of three dimensions with `--projected`.
+`drag` of how many drags of 60 N s it recovers, link by link, in eight directions within 0.1, 0.2
+and 0.3 s, as a hand drags in the live view; `stand` the largest pushes of a robot that stands;
+`commands` how often it starts, walks at three speeds and stops. `--robot` may be a file, of three
+dimensions with `--projected`.
 
-Run: python benchmarks/balance.py [price small multipliers push hard stand commands]
-     [--robot bravo7] [--projected] [--torque 150] [--phases 20] [--rise 5]
+Run: python benchmarks/balance.py [price small multipliers push drag hard stand commands]
+     [--robot bravo7] [--projected] [--torque 150] [--phases 20] [--rise 5] [--links trunk]
      [--seeds 100] [--first 1000] [--method stepping]
 """
 
@@ -36,6 +38,7 @@ from heelstrike.gait.sole import sole, standing_height
 
 HEIGHT, WEIGHT = 0.9538, 75.0 * 9.81  # of bravo7
 STEPS = 100
+DRAG, DRAG_DURATIONS = 60.0, (0.1, 0.2, 0.3)  # N s of bravo7, and s
 HIP, PITCH, WAY = 0.65, 0.6, 0.7
 METHODS: dict[str, dict[str, Any]] = {
     "stepping": {},
@@ -91,10 +94,15 @@ class Walker:
         setup = self.method | {"record_every": 10} | options
         return hs.simulate(robot, law, state=begin, duration=duration, **setup)
 
-    def push(self, impulse: float, phase: float) -> hs.Push:
-        """Push its trunk in the third step."""
+    def push(
+        self, impulse: float, phase: float, *, link: int | str = 2, angle: float = 0.0,
+        duration: float = 0.1,
+    ) -> hs.Push:  # fmt: skip
+        """Push a link in the third step, at an angle (rad) above forwards."""
         start = (2.0 + phase) * self.gait.step_duration
-        return hs.Push(2, force=(10.0 * impulse, 0.0), start=start, duration=0.1)
+        size = impulse / duration
+        force = size * float(np.cos(angle)), size * float(np.sin(angle))
+        return hs.Push(link, force=force, start=start, duration=duration)
 
 
 def effort(run: hs.Run) -> float:
@@ -115,9 +123,8 @@ def price(walker: Walker) -> None:
     )
 
 
-def recovers(walker: Walker, impulse: float, phase: float) -> bool:
+def recovers(walker: Walker, push: hs.Push) -> bool:
     """Whether it recovers from a push, strictly."""
-    push = walker.push(impulse, phase)
     run = walker.walk(push.end + 7.01, pushes=push, record_every=5)
     return bool(recovery(run, after=7.0))
 
@@ -129,11 +136,48 @@ def pushes(walker: Walker, phases: int, rise: float) -> None:
         found = []
         for phase in range(phases):
             count = 0
-            while count < 40 and recovers(walker, sign * rise * (count + 1), phase / phases):
+            while count < 40:
+                push = walker.push(sign * rise * (count + 1), phase / phases)
+                if not recovers(walker, push):
+                    break
                 count += 1
             found.append(rise * count)
         told = " ".join(f"{each:.3g}" for each in found)
         print(f"push {name}: least {min(found):.3g} N s; by phase {told}", flush=True)
+
+
+def drags(walker: Walker, phases: int, links: list[str] | None) -> None:
+    """Tell of how many drags it recovers: of 60 N s in eight directions, of three durations.
+
+    A drag of the live view pulls at a point of a link in world axes, as strongly as the pointer is
+    away from it; a hand that follows the link pulls evenly, as here, at its centre of mass.
+    """
+    impulse, angles = DRAG * walker.unit, np.arange(0, 360, 45)
+    robot = walker.robot
+    moving = [robot.link_names[i] for i in np.flatnonzero(robot.model.mass > 0.0)]
+    for link in moving if links is None else links:
+        for duration in DRAG_DURATIONS:
+            failed = {
+                int(angle): [
+                    phase
+                    for phase in range(phases)
+                    if not recovers(walker, walker.push(
+                        impulse, phase / phases, link=link, angle=np.deg2rad(angle),
+                        duration=duration,
+                    ))
+                ]
+                for angle in angles
+            }  # fmt: skip
+            count = phases * len(angles)
+            good = count - sum(map(len, failed.values()))
+            told = "; ".join(
+                f"{angle}° {' '.join(map(str, each))}" for angle, each in failed.items() if each
+            )
+            print(
+                f"drag {link}, {impulse:.3g} N s in {duration:g} s: {good} of {count}"
+                f"{'; not, by direction and phase: ' + told if told else ''}",
+                flush=True,
+            )
 
 
 def heavier(robot: hs.Robot, factor: float) -> hs.Robot:
@@ -275,7 +319,7 @@ def stand(walker: Walker, rise: float) -> None:
     rise *= walker.unit
     for name, sign in (("forwards", 1.0), ("backwards", -1.0)):
         firm, most = 0.0, 0.0
-        for count in range(1, 100):
+        for count in range(1, 200):
             impulse = rise * count
             push = hs.Push(2, force=(10.0 * sign * impulse, 0.0), start=1.0, duration=0.1)
             run = hs.simulate(
@@ -337,13 +381,14 @@ def commands(walker: Walker, seeds: range) -> None:
 def main() -> None:
     """Measure what is asked for."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    known = ("price", "small", "multipliers", "push", "hard", "stand", "commands")
+    known = ("price", "small", "multipliers", "push", "drag", "hard", "stand", "commands")
     parser.add_argument("what", nargs="*", default=list(known))
     parser.add_argument("--robot", default="bravo7")
     parser.add_argument("--projected", action="store_true", help="a file of three dimensions")
     parser.add_argument("--torque", type=float, help="of motors at most, N m")
     parser.add_argument("--phases", type=int, default=20)
     parser.add_argument("--rise", type=float, default=5.0, help="N s, scaled by the robot")
+    parser.add_argument("--links", nargs="+", help="that are dragged; all by default")
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--first", type=int, default=1000, help="first seed")
     parser.add_argument("--method", choices=METHODS, default="stepping")
@@ -362,6 +407,8 @@ def main() -> None:
         multipliers(walker)
     if "push" in asked.what:
         pushes(walker, asked.phases, asked.rise)
+    if "drag" in asked.what:
+        drags(walker, asked.phases, asked.links)
     if "hard" in asked.what:
         hard(walker, seeds)
     if "stand" in asked.what:

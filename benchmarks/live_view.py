@@ -3,6 +3,9 @@
 Serves bravo7 at 1 ms and real time in a process of its own, watches it over its socket as a page
 does, and prints updates a second, the processor time of the serving process as a share of one core,
 and the time from sending a push to receiving the frame in which its force acts.
+
+With `--first` it tells instead how long after opening the page of ``heelstrike watch bravo7`` in
+chromium there is a picture, and how long until the robot walks.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import json
 import subprocess
 import sys
 import time
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -49,12 +53,42 @@ def frames(connection: ClientConnection, width: int) -> np.ndarray:
             return np.frombuffer(message)[1:].reshape(-1, width)
 
 
+def first_picture(times: int) -> None:
+    """Open the page of a command that has just begun, several times."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    from browsers import browser
+
+    clock = "() => Number(document.getElementById('plane')?.dataset.time ?? -1)"
+    with browser() as chromium:
+        for _ in range(times):
+            command = [sys.executable, "-m", "heelstrike", "watch", "bravo7", "--no-browser"]
+            started = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+            assert started.stderr is not None
+            url = started.stderr.readline().removeprefix("watch at ").strip()
+            page = chromium.new_page()
+            begin = time.perf_counter()
+            page.goto(url)
+            while not page.evaluate(clock) >= 0.0:
+                time.sleep(0.01)
+            seen = time.perf_counter() - begin
+            while not page.evaluate(clock) > 0.0:
+                time.sleep(0.01)
+            print(f"first picture {seen:.2f} s, walks {time.perf_counter() - begin:.2f} s")
+            page.close()
+            started.terminate()
+            started.wait()
+
+
 def main() -> None:
     """Serve, watch, and print what it took."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seconds", type=float, default=20.0, help="how long to watch")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
+    parser.add_argument("--first", action="store_true", help="time of the first picture")
     options = parser.parse_args()
+    if options.first:
+        first_picture(3)
+        return
     if options.serve:
         serve()
         return

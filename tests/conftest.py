@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import tempfile
 
 # Matplotlib reads this when it is imported; processes that tests start inherit it.
 os.environ["MPLBACKEND"] = "Agg"
@@ -37,3 +38,7 @@ def pytest_configure(config: pytest.Config) -> None:
         from perturbed_gaits import perturb_gaits
 
         perturb_gaits(size)
+    if not hasattr(config, "workerinput"):  # processes that are started from here share the folder
+        kept = tempfile.TemporaryDirectory(prefix="gaits-", ignore_cleanup_errors=True)
+        config.add_cleanup(kept.cleanup)
+        os.environ["HEELSTRIKE_KEEP_GAITS"] = "0" if size else kept.name

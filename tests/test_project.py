@@ -10,6 +10,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import traceback
 from pathlib import Path
 
 import pytest
@@ -83,9 +84,33 @@ def test_every_error_is_public() -> None:
     assert raised == {name for name, home in heelstrike._HOME.items() if home == errors.__name__}
 
 
-def test_unknown_name_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="has no attribute 'load_robots'"):
-        heelstrike.load_robots  # noqa: B018
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("TimeSteping", "TimeStepping"),
+        ("load_robots", "load_robot"),
+        ("optimise_gait", "optimize_gait"),
+        ("event_driven", "EventDriven"),
+    ],
+)
+def test_a_misspelt_name_suggests_the_nearest(wrong: str, right: str) -> None:
+    words = f"has no attribute '{wrong}'. Did you mean '{right}'?"
+    with pytest.raises(AttributeError, match=re.escape(words)) as caught:
+        getattr(heelstrike, wrong)
+    shown = "".join(traceback.format_exception(caught.value))
+    assert shown.count("Did you mean") == 1  # Python guesses, too
+
+
+def test_a_name_like_no_other_suggests_nothing() -> None:
+    with pytest.raises(AttributeError, match=r"has no attribute 'xyzzy'$"):
+        heelstrike.xyzzy  # noqa: B018
+    assert not hasattr(heelstrike, "_timestepping")
+
+
+def test_only_public_names_are_listed() -> None:
+    importlib.import_module("heelstrike.sim")  # which becomes an attribute of the package
+    listed = {name for name in dir(heelstrike) if not name.startswith("__")}
+    assert listed == set(heelstrike._HOME)
 
 
 def test_importing_heelstrike_loads_nothing_heavy() -> None:

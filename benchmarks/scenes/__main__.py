@@ -5,11 +5,13 @@
     python benchmarks/scenes show event_driven 38
     python benchmarks/scenes run --out tied.jsonl --family tied --seeds 0:100
     python benchmarks/scenes energy --seeds 4000:4100
+    python benchmarks/scenes costs
 
 `run` goes on where a file of results ends; `show` judges one scene and prints what is wrong. Of
 the family `tied` scenes have closed loops, coupled joints, latches and brakes (scenes/ties).
 `energy`, `twins`, `orders` and `bridges` put one question each to many scenes (scenes/checks):
 a line of JSON a scene, then what they add up to; with --out FILE they go on where it ends, too.
+`costs` measures a step in scenes whose contact problems are awkward, at 1e-5 s and at 1e-3 s.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ sys.path[0] = str(Path(__file__).resolve().parent.parent)
 
 from scenes.campaign import Task, add_arguments, campaign, results_in  # noqa: E402
 from scenes.checks.commands import CHECKS, check  # noqa: E402
+from scenes.costs import costs  # noqa: E402
 from scenes.methods import METHODS  # noqa: E402
 from scenes.running import FAMILIES, prepare, run_scene  # noqa: E402
 from scenes.table import page  # noqa: E402
@@ -52,6 +55,7 @@ def main() -> None:
     for name, (_, words) in CHECKS.items():
         asks = commands.add_parser(name, help=words)
         add_arguments(asks, 100, kept=False)
+    commands.add_parser("costs", help="measure a step where contact problems are awkward")
     options = parser.parse_args()
     if options.command in CHECKS:
         with tempfile.TemporaryDirectory() as folder:
@@ -73,6 +77,9 @@ def main() -> None:
             found = one.get("objections", []) + one.get("twins", {}).get("objections", [])
             words = "; ".join(f"{o['law']} {o['size']:.1e}" for o in found)
             print(f"{one['method']} {one['seed']}: {one['status']}. {words}", flush=True)
+    elif options.command == "costs":
+        for row in costs():
+            print(json.dumps(row), flush=True)
     elif options.command == "page":
         text = page(results_in(options.results), options.written_by)
         if options.out is None:

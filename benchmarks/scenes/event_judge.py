@@ -78,6 +78,10 @@ SAME = 4.0 * float(np.finfo(float).eps)
 EDGE = 1e-12
 """An event this near (s) to where a push begins or ends happens there."""
 
+POLE = 0.1
+"""Time left before a jam, as a part of an interval that leads to it, below which its forces have
+grown so far that rows of the interval do not tell their integral."""
+
 IMPULSIVE = (EventKind.TOUCHDOWN, EventKind.IMPACT, EventKind.PAINLEVE)
 
 
@@ -144,6 +148,8 @@ class EventRows:
             if event.kind is EventKind.PAINLEVE and event.impulse[0] > 0.0
         }
         """Instants in which forces have grown without bound."""
+        self.poles = self.jams | self.close_to(self.jams)
+        """Those and the instants just before them, in which forces have grown nearly as far."""
         self.smooth = ~np.isin(np.arange(len(time)), self.last[list(self.bridges)])
         """Rows of smooth phases: those at the beginning of bridges have no contact forces."""
         self.settled &= self.smooth
@@ -162,6 +168,20 @@ class EventRows:
         after = int(np.searchsorted(self.instant, time))
         near = range(max(after - 1, 0), min(after + 1, len(self.instant)))
         return min(near, key=lambda k: abs(self.instant[k] - time))
+
+    def close_to(self, jams: set[int]) -> set[int]:
+        """Instants of other events almost at a jam, each of which ends an interval as it does.
+
+        Forces grow as 1/t, t being the time left. Where little of that is left at the end of an
+        interval, its rows do not tell their integral, nor do those of what follows up to the jam.
+        """
+        span = np.diff(self.instant, prepend=self.instant[0])
+        found: set[int] = set()
+        for jam in jams:
+            left = self.instant[jam] - self.instant[:jam]
+            poles = np.flatnonzero(left < POLE * span[:jam])
+            found |= set(range(poles[0], jam)) if len(poles) else set()
+        return found
 
     def judge(self, found: Findings) -> None:
         self.rows_in_order(found)
@@ -506,7 +526,7 @@ class EventRows:
             a, b = self.last[k], self.first[k + 1]
             begin, end = self.instant[k], self.instant[k + 1]
             span = end - begin
-            if k + 1 in self.jams:
+            if k + 1 in self.poles:
                 if k not in self.bridges:  # of a bridge that ends in one its own law asks that
                     self.jam(found, k, energy)
                 continue
@@ -616,7 +636,7 @@ class EventRows:
         usable = [int(self.last[i]) for i in range(low, high)]
         # In the row before an event modes may be those after it, so that it counts if need be only.
         two = self.first[high] != self.last[high]
-        if high not in self.jams and (not eventful[high] or (two and len(usable) < 3)):
+        if high not in self.poles and (not eventful[high] or (two and len(usable) < 3)):
             usable.append(int(self.first[high]))
         return np.array(usable)
 

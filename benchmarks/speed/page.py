@@ -31,7 +31,7 @@ def blocks(results: dict[str, Any], folder: Path) -> Iterator[tuple[str, str]]:
     """Yield the blocks of the page by name."""
     about = words(results["machine"], results["peers"])
     yield "machine", f"Measured {results['date'][:10]} on {about}"
-    for part in ("steps", "precision", "threads", "scaling", "footprint", "endurance"):
+    for part in ("steps", "precision", "threads", "scaling", "footprint", "endurance", "laws"):
         if part not in results:
             continue
         made = list(tables({part: results[part]}))

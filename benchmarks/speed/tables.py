@@ -180,6 +180,13 @@ def _endurance(part: dict[str, Any]) -> Iterator[Table]:
     yield Table(title, ["what", "worst"], body)
 
 
+def _laws(part: dict[str, Any]) -> Iterator[Table]:
+    least = part["a user's"]
+    body = [[name, f"{each:.2f}", f"{each / least:.2f}"] for name, each in part.items()]
+    title = "A step of 1 ms of bravo7 walking under computed torque, by who runs the law"
+    yield Table(title, ["law", "µs", "times a user's"], body)
+
+
 _MAKERS = {
     "steps": _steps,
     "precision": _precision,
@@ -187,4 +194,5 @@ _MAKERS = {
     "scaling": _scaling,
     "footprint": _footprint,
     "endurance": _endurance,
+    "laws": _laws,
 }

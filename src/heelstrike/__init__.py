@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from heelstrike.compiler.bundle import array as array
     from heelstrike.compiler.bundle import cell as cell
     from heelstrike.compiler.bundle import number as number
+    from heelstrike.compiler.bundle import part as part
     from heelstrike.contact import ActiveContacts as ActiveContacts
     from heelstrike.contact import ForceDistribution as ForceDistribution
     from heelstrike.contact import Ground as Ground
@@ -116,6 +117,8 @@ if TYPE_CHECKING:
     from heelstrike.robot.human import human as human
     from heelstrike.sim import Batch as Batch
     from heelstrike.sim import Compliant as Compliant
+    from heelstrike.sim import ControllerWarning as ControllerWarning
+    from heelstrike.sim import EndOfRun as EndOfRun
     from heelstrike.sim import EventDriven as EventDriven
     from heelstrike.sim import HuntCrossley as HuntCrossley
     from heelstrike.sim import KelvinVoigt as KelvinVoigt
@@ -124,6 +127,7 @@ if TYPE_CHECKING:
     from heelstrike.sim import RunStatus as RunStatus
     from heelstrike.sim import Scheme as Scheme
     from heelstrike.sim import Simulation as Simulation
+    from heelstrike.sim import SimulationWarning as SimulationWarning
     from heelstrike.sim import Snapshot as Snapshot
     from heelstrike.sim import TimeStepping as TimeStepping
     from heelstrike.sim import load_run as load_run
@@ -146,9 +150,11 @@ _HOME = {
     "ComputedTorque": "heelstrike.control",
     "ContactProblemError": "heelstrike.errors",
     "ControllerError": "heelstrike.errors",
+    "ControllerWarning": "heelstrike.sim",
     "DisturbanceResponse": "heelstrike.analysis.stability.response",
     "Encoder": "heelstrike.control",
     "Encoders": "heelstrike.control",
+    "EndOfRun": "heelstrike.sim",
     "Estimated": "heelstrike.control",
     "EventDriven": "heelstrike.sim",
     "Feedforward": "heelstrike.control",
@@ -184,6 +190,7 @@ _HOME = {
     "Sensed": "heelstrike.control",
     "Simulation": "heelstrike.sim",
     "SimulationError": "heelstrike.errors",
+    "SimulationWarning": "heelstrike.sim",
     "Snapshot": "heelstrike.sim",
     "SpringMass": "heelstrike.experiments.spring_mass",
     "StandingLQR": "heelstrike.control",
@@ -226,6 +233,7 @@ _HOME = {
     "monodromy": "heelstrike.analysis.stability.monodromy",
     "number": "heelstrike.compiler.bundle",
     "optimize_gait": "heelstrike.gait",
+    "part": "heelstrike.compiler.bundle",
     "report": "heelstrike.view.report",
     "saltation_matrix": "heelstrike.contact",
     "simulate": "heelstrike.sim",
@@ -241,11 +249,25 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     home = _HOME.get(name)
     if home is None:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        # With a name and without an object Python adds no guess of its own to the same line.
+        raise AttributeError(
+            f"module {__name__!r} has no attribute {name!r}{_meant(name)}", name=name
+        )
     value = getattr(importlib.import_module(home), name)
     globals()[name] = value  # the next look-up does not come here
     return value
 
 
+def _meant(name: str) -> str:
+    """Guess which public name somebody means who writes another."""
+    if name.startswith("_"):
+        return ""
+    import difflib
+
+    lower = {each.lower().replace("_", ""): each for each in _HOME}
+    near = difflib.get_close_matches(name.lower().replace("_", ""), lower, n=1, cutoff=0.7)
+    return f". Did you mean {lower[near[0]]!r}?" if near else ""
+
+
 def __dir__() -> list[str]:
-    return sorted(set(globals()) | set(_HOME))
+    return sorted([*_HOME, *(name for name in globals() if name.startswith("__"))])

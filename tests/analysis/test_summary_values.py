@@ -80,8 +80,8 @@ def carried() -> hs.Run:
         status=RunStatus.FELL,
         message="the robot fell",
         events=[touchdown(0.3, 2), liftoff(0.34, 2)],
-        certificates=Certificates(1e-5, 2e-12, 3e-12, 4e-12),
-        solver=SolverCount("lemke", 10, 7, 2, 1),
+        certificates=Certificates(1e-5, 2e-12, 3e-12, 4e-12, 0.75),
+        solver=SolverCount("lemke", 10, 7, 2, 1, 6, 3),
         saturations=4,
         timing=Timing(compile_s=0.5, wall_s=0.2),
     )
@@ -92,6 +92,7 @@ def test_every_figure_by_hand() -> None:
         "robot": "bravo7",
         "status": "fell",
         "message": "the robot fell",
+        "first_cause": "slipped at 0.000 s (right foot)",
         "steps": 1,
         "distance_m": 0.2,
         "duration_s": 0.4,
@@ -107,7 +108,15 @@ def test_every_figure_by_hand() -> None:
         "slip_max_m": 0.01 + 0.02 + 0.03,
         "penetration_max_m": 1e-5,
         "complementarity_max": 2e-12,
-        "solver": {"name": "lemke", "solves": 10, "shortcuts": 7, "fallbacks": 2, "failures": 1},
+        "solver": {
+            "name": "lemke",
+            "solves": 10,
+            "shortcuts": 7,
+            "fallbacks": 2,
+            "failures": 1,
+            "combinations": 6,
+            "relaxed": 3,
+        },
         "torque_cost_N2m2s": 0.1 * (4.0 + 4.0 + 4.0 + 1.0),
         "cost_of_transport": 0.1 * 3.0 * (2.0 + 2.0 + 2.0 + 1.0) / (MASS * G * 0.2),
         "cost_of_transport_positive": 0.1 * 3.0 * (2.0 + 2.0) / (MASS * G * 0.2),
@@ -116,6 +125,7 @@ def test_every_figure_by_hand() -> None:
         "compile_s": 0.5,
         "wall_s": 0.2,
         "real_time_factor": 2.0,
+        "energy_gain_J": 0.75,
     }
     found = summarize(carried(), gait=standing_still()).to_dict()
     assert found.keys() == expected.keys()
@@ -139,6 +149,7 @@ def figures() -> Summary:
         robot="bravo7",
         status="completed",
         message="completed at t = 7 s",
+        first_cause="",
         steps=10,
         distance_m=3.0123456,
         duration_s=7.0,
@@ -219,6 +230,18 @@ def test_what_is_not_there_is_a_dash() -> None:
 def test_shortcuts_are_not_said_to_be_solved_by_the_solver() -> None:
     assert str(SolverCount("lemke", 9, 9, 0, 0)) == "9: 9 by the modes of the step before"
     assert str(SolverCount("lemke", 0, 0, 0, 0)) == "none"
+
+
+def test_what_is_seldom_is_told_where_it_is() -> None:
+    counts = SolverCount("lemke", 9, 5, 3, 2, 4, 6)
+    assert str(counts) == (
+        "9: 5 by the modes of the step before, 2 by lemke with 3 fallbacks, 2 unsolved, 4 by "
+        "combinations of modes, or not even so, 6 steps left in a wedge"
+    )
+    made = dataclasses.replace(figures(), energy_gain_J=1.25)
+    line = "energy made by impacts 1.25 J (Newton's restitution with friction)"
+    assert line in lines(str(made))
+    assert line.split(" 1.25")[0] not in str(figures())
 
 
 def test_a_windows_console_can_print_it() -> None:

@@ -82,6 +82,7 @@ def test_the_whole_quick_form(quick: tuple[Path, Any]) -> None:
     assert found["endurance"]["failures"] == 0
     assert found["endurance"]["unfinished"] == 0
     assert found["endurance"]["complementarity"] <= 1e-9
+    assert found["laws"]["a user's"] < found["laws"]["a user's, checked=True"]
     assert set(found["footprint"]["allocations_a_step"].values()) == {0.0}
     memory = found["footprint"]["memory"]
     if memory["before_MiB"] is not None:  # a system without /proc does not say

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -43,3 +44,9 @@ def walk(
         return CliRunner().invoke(app, ["walk", "--gait", gait, *arguments])
 
     return run
+
+
+@pytest.fixture(autouse=True)
+def same_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Laws of files that a test writes are found by no later one."""
+    monkeypatch.setattr(sys, "path", sys.path.copy())

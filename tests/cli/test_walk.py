@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,8 @@ import pytest
 from typer.testing import CliRunner
 
 import heelstrike as hs
-from heelstrike.cli import walk as walk_module
 from heelstrike.cli.main import app
-from heelstrike.cli.options import method_called
 from heelstrike.experiments.results import OF_MOTORS
-from heelstrike.sim import Scheme
 from heelstrike.view.figures import FIGURES
 
 STEPS = 3  # of the walk in conftest.py
@@ -157,6 +155,7 @@ def test_a_fall_on_point_feet_is_explained(
     assert "error: the robot fell" in said
     assert "stands on point feet" in said
     assert "the first step" in said
+    assert "--controller VirtualConstraints" in said
     # The first step succeeds.
     result = CliRunner().invoke(app, ["walk", "rabbit", *options, "--steps", "1"])
     assert result.exit_code == 0, result.stderr
@@ -235,17 +234,21 @@ def test_interrupted_by_ctrl_c(
         (["--step-duration", "nan"], "step_duration"),
         (["--steps", "0"], "--steps"),
         (["--steps", "many"], "--steps"),
-        (["--scheme", "runge-kutta"], "gap-linearised"),
-        (["--method", "magic"], "time-stepping"),
+        (["--method", "runge-kutta"], "gap-linearised"),
+        (["--csv", "walk.nc"], "the name of a run ends in .csv"),
+        (["--csv", "nowhere/walk.csv"], "there is no folder"),
         (["--stpe", "0.001"], "--step"),
         (["--gait", "no/such/gait.json"], "error: no/such/gait.json: there is no such file"),
-        (["--method", "event-driven", "--scheme", "moreau-jean"], "event-driven has no schemes"),
-        (["--method", "compliant", "--scheme", "gap-linearised"], "compliant has no schemes"),
         (["--gait", "."], "directory"),
         (["--ground", "slop:3"], "Did you mean slope:DEGREES"),
         (["--push", "head:60:1:0.1"], "link 'head', which robot 'bravo7' does not have"),
         (["--pose", "left_kne=1"], "Did you mean 'left_knee'?"),
         (["--forward", "up"], "is not one of 'x', 'y'"),
+        (["--controller", "Footsteps"], "no controller 'Footsteps'. Did you mean"),
+        (["--controller", "nosuch.py:make"], "there is no file nosuch.py"),
+        (["rabbit", "--controller", "WholeBody"], "(needs flat feet). It can have ComputedTorque,"),
+        (["--controller", "StandingLQR", "--step-length", "0.2"], "by no gait"),
+        (["compass_gait", "--controller", "JointPD"], "(no motors). No law by name can"),
         (["compass_gait"], "walks down a slope only"),
         (["compass_gait", "--ground", "slope:-3", "--step-length", "0.2"], "has no motors"),
     ],
@@ -254,7 +257,7 @@ def test_interrupted_by_ctrl_c(
 def test_wrong_input(options: list[str], said: str, tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["walk", "--out", str(tmp_path / "out"), *options])
     assert result.exit_code == 2
-    assert said in " ".join(result.stderr.split())
+    assert said in " ".join(result.stderr.replace("│", " ").split())
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     assert not (tmp_path / "out" / "run.nc").exists()
@@ -343,6 +346,42 @@ def test_a_push_and_a_slope_reach_the_walk(walk: Callable[..., Any], tmp_path: P
     assert abs(run.gap[0, run.robot.feet[0].contacts[0]]) < 1e-12
 
 
+def test_the_law_that_keeps_its_balance_is_named_and_does(
+    walk: Callable[..., Any], tmp_path: Path
+) -> None:
+    """Where computed torque falls of a push the advice is followed, and the robot walks on."""
+    push = ["--push", "trunk:400:0.3:0.1", "--steps", "3"]
+    result = walk(*push)
+    assert result.exit_code == 1
+    (advice,) = re.findall(r"--controller \w+", result.stderr)
+    result = walk(*push, *advice.split())
+    assert result.exit_code == 0, result.stderr
+    assert "--controller" not in result.stderr
+    assert "alarm" in hs.load_run(tmp_path / "out" / "run.nc").log
+    assert "--controller" not in walk("--steps", "1").stderr
+
+
+def test_a_law_of_ones_own_walks_and_its_code_is_named(
+    walk: Callable[..., Any], tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import heelstrike as hs\n"
+        "def make(robot, gait):\n    return hs.ComputedTorque(robot, gait)\n"
+    )
+    result = walk("--steps", "1", "--controller", f"{file}:make")
+    assert result.exit_code == 0, result.stderr
+    assert f"the code of {file} has been run" in result.stderr.replace("\n", "")
+
+
+def test_a_law_that_stands_takes_no_steps_and_is_well(tmp_path: Path) -> None:
+    out = str(tmp_path / "out")
+    options = ["--steps", "1", "--controller", "StandingLQR", "--animation", "none", "--out", out]
+    result = CliRunner().invoke(app, ["walk", *options])
+    assert result.exit_code == 0, result.stderr
+    assert not (tmp_path / "out" / "gait.json").exists()
+
+
 def test_a_passive_walker_starts_on_its_cycle(tmp_path: Path) -> None:
     (tmp_path / "gait.json").write_text("of yesterday", encoding="utf-8")
     options = ["--ground", "slope:-3", "--steps", "4", "--animation", "none"]
@@ -360,13 +399,6 @@ def test_a_passive_walker_starts_on_its_cycle(tmp_path: Path) -> None:
     assert result.exit_code == 1
     assert "of 4 steps" in result.stderr
     assert "--method event-driven lets them swing through" in result.stderr
-
-
-def test_schemes_are_those_of_the_library() -> None:
-    assert [scheme.name for scheme in walk_module.Scheme] == [scheme.name for scheme in Scheme]
-    for scheme in walk_module.Scheme:
-        assert method_called(scheme, 1e-4) == hs.TimeStepping(step=1e-4, scheme=Scheme[scheme.name])
-        assert Scheme[scheme.name].label == scheme.value
 
 
 def test_page_of_a_walk(walk: Callable[..., Any], tmp_path: Path) -> None:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
 import pytest
+import walking
 from typer.testing import CliRunner
 
 from heelstrike.cli.main import app
-from heelstrike.cli.watch import METHODS
+from heelstrike.cli.options import METHODS
 from heelstrike.experiments.watching import WalkStage
 from heelstrike.view.live import viewer as module
 
@@ -59,7 +61,27 @@ def test_what_is_asked_for_is_what_viewers_find_set(made: dict[str, Any]) -> Non
 
 def test_time_stepping_is_called_as_everywhere(made: dict[str, Any]) -> None:
     asked("compass_gait", "--method", "time-stepping")
-    assert made["stage"].fitted({})["method"] == "impact-resolved"
+    assert made["stage"].fitted({})["method"] == "time-stepping"
+
+
+def test_robots_gaits_and_laws_of_ones_own_are_in_the_lists(
+    made: dict[str, Any], tmp_path: Path
+) -> None:
+    files = [tmp_path / name for name in ("robot.xml", "a.json", "b.json", "mine.py")]
+    robot, first, second, law = map(str, files)
+    walking.bravo7().save(robot)
+    for gait in (first, second):
+        walking.gait().save(gait)
+    files[3].write_text("def make(robot, gait):\n    raise AssertionError\n")
+    laws = ("--controller", f"{law}:make", "--controller", "joint-pd")
+    result = asked(robot, "rabbit", "--gait", first, "--gait", second, *laws)
+    assert isinstance(result.exception, MadeError), result.output
+    assert f"the code of {law} has been run" in result.output.replace("\n", "")
+    stage = made["stage"]
+    lists = {control.name: control.options for control in stage.controls(stage.fitted({}))}
+    assert lists["robot"][:3] == (robot, "rabbit", "bravo7")
+    assert lists["gait"][:2] == ("a.json", "b.json")
+    assert lists["controller"][:2] == (f"{law}:make", "JointPD")
 
 
 def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]) -> None:
@@ -74,8 +96,10 @@ def test_rough_ground_can_be_set_and_stairs_are_as_they_are(made: dict[str, Any]
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--method", "euler"], f"'euler' is none of {', '.join(METHODS)}"),
+        (["--method", "euler"], f"'euler' is not one of '{METHODS[0]}', '{METHODS[1]}'"),
         (["bravo8"], "bravo8"),
+        (["rabbit", "--controller", "FootstepFeedback"], "needs flat feet"),
+        (["--controller", "mine.py"], "say which law of it is meant"),
         (["--gait", "nosuch.json"], "nosuch.json"),
         (["--ground", "slop:3"], "Did you mean slope:DEGREES"),
         (["--port", "70000"], "less than or equal to 65535"),

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from heelstrike.contact import SolveStatus, solve_contact, solve_lcp
 from heelstrike.contact.certificate import certify, velocity_error
+from heelstrike.contact.sets import CONE, LINE
 from heelstrike.contact.solvers.certified_solve import contact_workspace
 from heelstrike.contact.workspace import ContactAnswer, ContactProblem
 
@@ -46,6 +47,7 @@ def verdict(
     slope: float = 0.0,
     floor: float = 0.0,
     skewed: bool = False,
+    sets: object = None,
 ) -> Verdict:
     G, b, x = (np.array(values, dtype=float) for values in (delassus, free, impulse))
     mu = np.array(friction, dtype=float)
@@ -54,6 +56,7 @@ def verdict(
     work.settings.floor = floor
     work.settings.skewed = skewed
     problem = ContactProblem.allocate(nc=mu.size, count=mu.size, delassus=G, free=b, friction=mu)
+    problem.set[:] = CONE if sets is None else sets
     answer = ContactAnswer.allocate(nc=mu.size, impulse=x)
     worst = certify(problem, work.settings, work.yardstick, answer)
     error = velocity_error(worst, mu, work.yardstick)
@@ -84,6 +87,20 @@ class TestWrongAnswers:
     def test_the_ground_pulls(self) -> None:
         wrong = verdict(BLOCK, [1.0, 0.0], [0.5], [-2.0, 0.0])
         assert wrong.cone == pytest.approx(1.0)
+
+    @pytest.mark.parametrize(
+        ("free", "impulse", "speed"),
+        [(3.0, -2.0, 2.0), (3.0, -7.0, -0.5), (-3.0, 2.0, -2.0), (-3.0, 7.0, 0.5), (3.0, 0.0, 3.0)],
+    )
+    def test_a_loop_that_parts_or_closes_whether_pulled_or_pushed(
+        self, free: float, impulse: float, speed: float
+    ) -> None:
+        """w = 0.5 p + b has to vanish whatever the sign of p; velocities count in 3 m/s."""
+        said = verdict(BLOCK, [free, 0.0], [0.0], [impulse, 0.0], sets=[LINE])
+        np.testing.assert_allclose(said.velocity[0], speed)
+        missed = max(said.complementarity, said.non_penetration)
+        assert missed == pytest.approx(min(abs(speed), 3.0) / 3.0, rel=1e-12)
+        assert said.cone == 0.0
 
     @pytest.mark.parametrize("side", [1.0, -1.0])
     def test_more_friction_than_the_cone_holds(self, side: float) -> None:
@@ -281,6 +298,18 @@ def test_rescaled_rows_are_the_same_problem(seed: int, stretch: int) -> None:
     )
     for name in ("complementarity", "cone", "non_penetration"):
         assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-9, abs=1e-13)
+
+
+def test_friction_moves_by_its_lever() -> None:
+    """A push too weak by a tenth, G = diag(1/2, 2), friction 0.8: by hand.
+
+    The residual is r = 0.1. The normal velocity moves by r, both impulses by r, and the friction by
+    mu g_t / g_n = 0.8 · 2 times that as the normal impulse moves: 4.6 r in all, in units of
+    beta g = 1 m/s along the normal and 2 m/s along the tangent.
+    """
+    said = verdict(np.diag([0.5, 2.0]), [-1.0, 0.0], [0.8], [1.8, 0.0])
+    assert said.worst == pytest.approx(0.1, rel=1e-9)
+    np.testing.assert_allclose(said.velocity_error, [[0.46, 0.92]], rtol=1e-9)
 
 
 @given(seed=st.integers(0, 2**32 - 1), noise=st.sampled_from([1e-10, 1e-6, 1e-2]))

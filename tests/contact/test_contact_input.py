@@ -38,8 +38,8 @@ FREE = np.array([-1.0, 0.0, -1.0, 0.0])
         (EYE, FREE, 0.5, {"solver": "simplex"}, "unknown contact solver 'simplex'.*gauss_seidel"),
         (EYE, FREE, 0.5, {"solver": "warm_start"}, "unknown contact solver"),
         (EYE, FREE, 0.5, {"tolerance": 0.0}, "tolerance must be between 0 and 1"),
-        ("robot", FREE, 0.5, {}, "must be arrays of real numbers"),
-        ([[1.0, 2.0], [3.0]], FREE, 0.5, {}, "must be arrays of real numbers"),
+        ("robot", FREE, 0.5, {}, "delassus must be numbers"),
+        ([[1.0, 2.0], [3.0]], FREE, 0.5, {}, "delassus must be numbers"),
     ],
 )
 def test_malformed(

@@ -119,6 +119,7 @@ def test_counters() -> None:
     assert tally.solves == 3
     assert tally.failures == 1
     assert tally.fallbacks == tally.last_fallbacks == 3
+    assert tally.combinations == 1
 
 
 def test_no_solver_left_means_failure_not_zero_force_in_silence() -> None:
@@ -151,6 +152,27 @@ def test_modes_that_nearly_fit_need_no_solver() -> None:
     assert amended.mode[:4].tolist() == [OPEN, OPEN, SLIP_BACKWARD, SLIP_BACKWARD]
     assert 1 <= amended.work.tally.iterations <= 4
     np.testing.assert_allclose(amended.impulse, asked.impulse, rtol=1e-14, atol=1e-14)
+
+
+def test_what_rounding_allows_no_better_is_accepted() -> None:
+    """A disc spins in a crack a millionth of a radian wide: impulses are 1e6 times the data.
+
+    Rounded, they leave residuals of 1e-11 and more. No solver has better ones to offer.
+    """
+    between = 0
+    for seed in range(12):
+        draw = np.random.default_rng([17, seed])
+        c, s = np.cos(1e-6), np.sin(1e-6) * draw.uniform(0.5, 2.0)
+        jacobian = np.array([[c, s, 0.0], [s, -c, 1.0], [-c, s, 0.0], [s, c, 1.0]])
+        jacobian[:, 2] *= draw.uniform(1.0, 3.0)
+        free = jacobian @ [0.0, -draw.uniform(0.5, 2.0), draw.uniform(1.0, 2.0)]
+        caller = Caller()
+        caller.mode[:2] = SLIP_FORWARD
+        assert caller.solve(jacobian @ jacobian.T, free, [1e-8, 1e-8]) == SOLVED
+        between += 1e-11 < caller.residual.max() <= 1e-9
+        tally = caller.work.tally
+        assert (tally.solver, tally.shortcuts, tally.iterations) == (WARM_START, 1, 0)
+    assert between >= 3
 
 
 def test_same_bits_every_time() -> None:

@@ -112,7 +112,7 @@ def test_trivial_problems() -> None:
     [
         (np.eye(2), [1.0], r"M has shape \(2, 2\) and q has shape \(1,\)"),
         (np.eye(2), [1.0, np.nan], r"q\[1\] is nan"),
-        ([["a"]], [1.0], "must be arrays of real numbers"),
+        ([["a"]], [1.0], "M must be numbers"),
     ],
 )
 def test_malformed(M: object, q: object, message: str) -> None:

@@ -81,7 +81,7 @@ def test_numbers_of_laws_on_a_gait(name: str, number: str) -> None:
 
 def test_numbers_by_name_are_a_mapping_of_numbers() -> None:
     robot, gait = walking.bravo7(), walking.gait()
-    with pytest.raises(hs.ControllerError, match=r"numbers must be a Mapping, got \['kp'\]"):
+    with pytest.raises(hs.ControllerError, match=r"numbers must be a mapping, got \['kp'\]"):
         hs.WholeBody(robot, gait, numbers=["kp"])  # type: ignore[arg-type]
     with pytest.raises(hs.ControllerError, match="kp must be a number, got 'stiff'"):
         hs.WholeBody(robot, gait, numbers={"kp": "stiff"})  # type: ignore[dict-item]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 import heelstrike as hs
+from heelstrike.cli.values import ground_called
 from heelstrike.experiments.passive import METHOD, passive_walk
 from heelstrike.experiments.walk import steps_taken, walk, why_unstable
 
@@ -61,6 +64,28 @@ def test_the_wheel_rolls_as_its_closed_form_says() -> None:
 def test_where_there_is_no_walk(robot: str, ground: hs.Ground, said: str) -> None:
     with pytest.raises(hs.LimitCycleError, match=said):
         passive_walk(hs.load_robot(robot), ground)
+
+
+@pytest.mark.parametrize("name", ["compass_gait", "kneed_walker", "rimless_wheel"])
+@pytest.mark.parametrize(
+    "ground", [hs.Ground(), slope(-1.0), hs.Ground(slope=-0.2, friction=0.01)], ids=str
+)
+def test_advice_for_passive_walkers_is_good(name: str, ground: hs.Ground) -> None:
+    """On the ground that a refusal names the walker has a stable walk, in both its spellings."""
+    robot = hs.load_robot(name)
+    try:
+        passive_walk(robot, ground)
+    except hs.LimitCycleError as error:
+        found = re.search(r"Ground\(slope=(-[\d.]+)\), or --ground (slope:-[\d.]+)", str(error))
+        assert found
+        for advised in (hs.Ground(slope=float(found[1])), ground_called(found[2])):
+            cycle = passive_walk(robot, advised)
+            assert cycle.stable
+            assert (
+                steps_taken(walk(robot, cycle, steps=3, ground=advised, method=METHOD), cycle) == 3
+            )
+    else:
+        assert name == "compass_gait"  # which walks on the mildest slopes
 
 
 def test_a_robot_whose_walk_is_not_known() -> None:

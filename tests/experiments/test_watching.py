@@ -10,11 +10,10 @@ import pytest
 import walking
 
 import heelstrike as hs
-from heelstrike.cli.options import method_called
-from heelstrike.cli.watch import METHODS
+from heelstrike.cli.options import METHODS, method_called
+from heelstrike.experiments.laws import law_called
 from heelstrike.experiments.watching import (
     DESIGNED,
-    ENCODERS,
     NOTHING,
     First,
     WalkStage,
@@ -50,6 +49,10 @@ def test_every_robot_has_values_that_it_accepts(name: str) -> None:
         assert not control.accepts(None)
     names = {control.name for control in controls}
     moved = {"controller", "speed"} if walks._robot(name).nu else set()
+    if moved:  # each law that is offered has controls that go with it
+        (laws,) = (control.options for control in controls if control.name == "controller")
+        for law in laws:
+            assert walks.fitted({"controller": law})["controller"] == law
     assert names == {"robot", "gait", "friction", "slope", "roughness", "method", "step"} | moved
 
 
@@ -69,7 +72,7 @@ def test_a_walk_of_some_choices(saved: Path) -> None:
     walks = stage(gait=saved, friction=0.7, slope=1.0, seed=3)
     simulation = begun(walks)
     assert simulation.robot.name == "bravo7"
-    assert isinstance(simulation.controller, hs.ComputedTorque)
+    assert isinstance(simulation.controller, hs.FootstepFeedback)
     assert simulation.ground.slope == pytest.approx(np.deg2rad(1.0))
     assert simulation.ground.friction == 0.7
     assert simulation.method == hs.TimeStepping(step=1e-3)
@@ -78,7 +81,7 @@ def test_a_walk_of_some_choices(saved: Path) -> None:
     simulation = begun(walks, method="event-driven", step="2 ms", controller=NOTHING)
     assert simulation.method == hs.EventDriven()
     assert simulation.controller is None
-    simulation = begun(walks, step="0.5 ms", controller=ENCODERS)
+    simulation = begun(walks, step="0.5 ms", controller="ComputedTorqueByEncoders")
     assert simulation.method == hs.TimeStepping(step=5e-4)
     assert simulation.controller.parameters.encoder_period > 0.0
     assert simulation.advance(0.1) is hs.sim.RunStatus.COMPLETED
@@ -126,3 +129,48 @@ def test_a_saved_gait_is_offered_for_its_robot_only(saved: Path) -> None:
     assert walks.fitted({"robot": "geyer7"})["gait"] == DESIGNED
     with pytest.raises(hs.GaitError):
         stage("geyer7", gait=saved)
+
+
+def test_the_law_at_first_steps_where_balance_needs_it_or_is_the_one_asked_for(saved: Path) -> None:
+    assert stage().fitted({})["controller"] == "FootstepFeedback"
+    assert stage("rabbit").fitted({})["controller"] == "ComputedTorque"
+    asked = stage(gait=saved, laws=[law_called("JointPD"), law_called("WholeBody")])
+    controls = {control.name: control for control in asked.controls(asked.fitted({}))}
+    assert controls["controller"].options[:2] == ("JointPD", "WholeBody")
+    assert isinstance(begun(asked).controller, hs.JointPD)
+    # Of another robot, which cannot have them, the usual one.
+    assert asked.fitted({"robot": "rabbit"})["controller"] == "ComputedTorque"
+    with pytest.raises(hs.ControllerError, match="WholeBody cannot drive robot 'rabbit'"):
+        stage("rabbit", laws=[law_called("WholeBody")])
+
+
+def test_a_law_that_stands_needs_no_gait() -> None:
+    walks = stage()
+    values = walks.fitted({"controller": "StandingLQR"})
+    assert not {"gait", "speed"} & values.keys()
+    simulation = walks.simulation(values, lambda _: None)
+    assert isinstance(simulation.controller, hs.StandingLQR)
+
+
+def test_own_robots_and_gaits_are_in_the_lists(saved: Path, tmp_path: Path) -> None:
+    file, other = tmp_path / "robot.xml", tmp_path / "other.json"
+    walking.bravo7().save(file)
+    walking.gait().save(other)
+    walks = WalkStage([file, "rabbit"], method_called, METHODS, First(gait=[saved, other]))
+    controls = {control.name: control for control in walks.controls(walks.fitted({}))}
+    assert controls["robot"].options[:2] == (str(file), "rabbit")
+    assert controls["gait"].options == ("mine.json", "other.json", DESIGNED)
+    assert "mine.json" not in walks.fitted({"robot": "rabbit"})["gait"]
+    assert begun(walks, gait="other.json").robot.nu == 6
+
+
+def test_the_outline_is_where_the_walk_begins(saved: Path) -> None:
+    """With a gait that is known; otherwise the robot stands, on a slope too."""
+    walks = stage(gait=saved)
+    robot, state, _ = walks.outline(walks.fitted({}))
+    np.testing.assert_array_equal(state.q, walking.gait().initial_state.q)
+    walks = stage(slope=2.0)
+    robot, state, ground = walks.outline(walks.fitted({}))
+    assert abs(hs.contact_kinematics(robot, state.q, state.v, ground).gap).max() < 1e-6
+    walks = stage("rimless_wheel")  # what cannot stand is shown all the same
+    assert walks.outline(walks.fitted({}))[0].name == "rimless_wheel"

@@ -19,6 +19,7 @@ import walking as walks
 from figure_text import check_text
 
 import heelstrike as hs
+from heelstrike.experiments.laws import flat_feet, point_feet, two_feet
 from heelstrike.experiments.zoo import (
     CONTROLLERS,
     DISTURBANCES,
@@ -33,7 +34,6 @@ from heelstrike.experiments.zoo import (
     campaign,
     zoo,
 )
-from heelstrike.experiments.zoo.controllers import flat_feet, point_feet, two_feet
 from heelstrike.experiments.zoo.disturbances import chances
 from heelstrike.experiments.zoo.figure import draw_zoo
 from heelstrike.experiments.zoo.results import load_results
@@ -320,7 +320,7 @@ def test_wrong_questions_are_refused(tmp_path: Path) -> None:
     with pytest.raises(hs.SimulationError, match="workers must be at least 1, got 0"):
         small(workers=0)
     with pytest.raises(
-        hs.SimulationError, match=r"no controller 'wholebdy'\. Did you mean 'WholeBody'"
+        hs.ControllerError, match=r"no controller 'wholebdy'\. Did you mean 'WholeBody'"
     ):
         campaign.chosen_controllers("wholebdy")
     with pytest.raises(hs.SimulationError, match=r"no disturbance 'slope'\. Did you mean"):

@@ -35,7 +35,10 @@ def urdf_of(name: str, tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.parametrize("moments", PLANAR)
 @pytest.mark.parametrize("name", [name for name in builtin_robots() if name != "rimless_wheel"])
 def test_planar_urdf(name: str, moments: str, tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Mass matrix and bias force at random states; wheels have no inertia about their hub."""
+    """Mass matrix and bias force at random states; wheels have no inertia about their hub.
+
+    The inertia of a motor stands in the file's transmission, which Pinocchio does not read.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RobotWarning)
         text = urdf_of(name, tmp_path_factory)
@@ -56,6 +59,7 @@ def test_planar_urdf(name: str, moments: str, tmp_path_factory: pytest.TempPathF
             )
             speed[joint.idx_v] = v[k]
         order = [joint.idx_v for joint in place]
+        model.armature[order] = robot.model.armature
         mass = pin.crba(model, data, at)
         mass = np.triu(mass) + np.triu(mass, 1).T
         bias = pin.nonLinearEffects(model, data, at, speed)

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes.event_judge import CLOSED, EventRows, judge_events
+from scenes.event_judge import CLOSED, IN_CORNER, EventRows, judge_events
 from scenes.findings import Findings
+from scenes.record import Rows
 from scenes.running import BETWEEN_ROWS
 from scenes.table import _kind
 from synthetic_runs import make_run
@@ -110,6 +111,17 @@ def test_jam_that_makes_energy() -> None:
         found = judge_events(dataclasses.replace(run, events=(jam,)))
         assert found.figures["jams"] == 1
         assert ("jam makes energy" in broken(found)) is made
+
+
+def test_an_event_almost_at_a_jam_ends_its_interval_as_the_jam_does() -> None:
+    """Of 1 ms all but 1e-9 s: forces of 1/t have grown a million times. A fifth left is no pole."""
+    rows = EventRows(Rows(bouncing(), corners=IN_CORNER, instants=True), None)
+    rows.instant = np.array([0.0, 1e-3, 2e-3 - 2e-9, 2e-3 - 1e-9, 2e-3, 3e-3])
+    assert rows.close_to({4}) == {2, 3}  # the last interval is as short as what is left
+    rows.instant = np.array([0.0, 1e-3, 2e-3 - 1e-9, 2e-3, 3e-3])
+    assert rows.close_to({3}) == {2}
+    rows.instant = np.array([0.0, 1e-3, 1.8e-3, 2e-3, 3e-3])
+    assert rows.close_to({3}) == set()
 
 
 def test_friction_of_an_impact() -> None:

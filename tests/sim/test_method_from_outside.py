@@ -86,7 +86,7 @@ def decide(
     for j in range(memory.v.shape[0]):
         memory.next_v[j] = memory.v[j] + work.step * rate[j]
     note_extremes(model, memory)
-    note_events(model, clock.time, work.step, memory, record)
+    note_events(model, clock.time, clock.time + work.step, work.step, memory, record)
     return DONE
 
 

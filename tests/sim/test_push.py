@@ -164,7 +164,7 @@ def test_a_push_needs_a_link(link: Any, words: str) -> None:
 
 @pytest.mark.parametrize("link", [None, 1.9, True])
 def test_a_link_has_a_name_or_an_index(link: Any) -> None:
-    with pytest.raises(hs.SimulationError, match="name or index"):
+    with pytest.raises(hs.SimulationError, match="link must be a text or a whole number"):
         hs.Push(link, force=(1.0, 0.0), start=0.0, duration=0.1)
 
 

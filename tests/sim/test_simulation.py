@@ -188,8 +188,8 @@ def test_what_is_not_a_robot_state_or_method_is_refused_in_words() -> None:
     robot = hs.load_robot("compass_gait")
     state = robot.reference_state()
     wrong: list[tuple[Any, dict[str, Any], str]] = [
-        ("bravo7", {"state": state}, r"robot must be a Robot, got 'bravo7'; load_robot"),
-        (robot, {"state": (state.q, state.v)}, r"got tuple; write State\(q, v\)"),
+        ("bravo7", {"state": state}, r"robot must be a Robot, got 'bravo7' .*load_robot"),
+        (robot, {"state": (state.q, state.v)}, r"\(tuple\); hs.State\(q, v\)"),
         (robot, {"state": state, "method": hs.TimeStepping}, r"write TimeStepping\(\)"),
     ]
     for given, options, words in wrong:

@@ -179,6 +179,8 @@ def test_a_snapshot_goes_on_in_another_process(
     # The same module, for a controller in Python is known by it and by its class.
     copy = tmp_path.joinpath(*__name__.split(".")).with_suffix(".py")
     copy.parent.mkdir(parents=True, exist_ok=True)
+    for folder in copy.relative_to(tmp_path).parents[:-1]:  # a package comes before one elsewhere
+        (tmp_path / folder / "__init__.py").touch()
     copy.write_text(Path(__file__).read_text(encoding="utf-8"))
     places = [str(tmp_path), str(Path(__file__).parents[1])]
     script = FRESH.replace("sys.path.insert(0, sys.argv[1])", f"sys.path[:0] = {places!r}")
@@ -250,6 +252,36 @@ def test_ground_is_not_laid_into_a_foot() -> None:
     standing.ground = hs.Ground(friction=0.1)
     standing.advance(0.1)
     assert standing.record.ground.friction == 0.1
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_it_goes_on_from_a_state_that_is_set_as_if_it_had_begun_there(method: str) -> None:
+    """Whatever touched before: feet on the ground, knees at their stops."""
+    robot = walking.bravo7()
+    one = simulation(method, "none", stop_when_fallen=False)
+    one.advance(0.3)
+    bent = robot.state({"left_knee": 1.0, "right_hip": -0.4, "root_z": 1.0}, {"root_z": -0.2})
+    bent = robot.placed(bent, one.ground)
+    one.state = bent
+    np.testing.assert_array_equal(one.state.q, bent.q)
+    assert one.time == pytest.approx(0.3)
+    one.advance(0.34)
+    other = simulation(method, "none", state=bent, stop_when_fallen=False)
+    other.advance(0.04)
+    # Methods of adaptive steps begin with steps of other lengths; stiff ground needs most of them.
+    np.testing.assert_allclose(one.state.q, other.state.q, atol=1e-5)
+    np.testing.assert_allclose(one.state.v, other.state.v, atol=1e-3)
+    assert one.record.time[-1] == pytest.approx(0.34)
+
+
+def test_a_state_that_cannot_be_is_not_set() -> None:
+    one, robot = simulation("time stepping"), walking.bravo7()
+    before = one.state.q
+    with pytest.raises(hs.SimulationError, match=r"would be 0.1 m in the ground; robot.placed"):
+        one.state = robot.state({"root_z": robot.reference_state().q[1] - 0.1})
+    with pytest.raises(hs.SimulationError, match="must have 9 entries"):
+        one.state = hs.State(np.zeros(8), np.zeros(9))
+    np.testing.assert_array_equal(one.state.q, before)
 
 
 def test_a_snapshot_brings_its_ground_and_its_pushes() -> None:

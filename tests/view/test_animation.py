@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -132,13 +133,28 @@ def test_bad_requests(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_without_ffmpeg_the_way_out_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("lack", ["package", "program", "moved", "no program"])
+def test_without_ffmpeg_the_ways_out_are_named(
+    lack: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def missing() -> str:
         raise RuntimeError("No ffmpeg exe could be found")
 
-    monkeypatch.setattr("imageio_ffmpeg.get_ffmpeg_exe", missing)
-    with pytest.raises(ViewError, match=r"\.gif needs none"):
-        animate(walking.walk(steps=1), tmp_path / "walk.mp4")
-    assert not list(tmp_path.iterdir())
+    out, empty = tmp_path / "out", tmp_path / "empty"
+    out.mkdir()
+    empty.write_bytes(b"")
+    empty.chmod(0o755)
+    if lack == "package":
+        monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    elif lack == "program":
+        monkeypatch.setattr("imageio_ffmpeg.get_ffmpeg_exe", missing)
+    else:
+        place = tmp_path / "nowhere" if lack == "moved" else empty
+        monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(place))
+    run = walking.walk(steps=1)
+    ways_out = "pip install .*imageio-ffmpeg.*IMAGEIO_FFMPEG_EXE.*gif.*save_html"
+    with pytest.raises(ViewError, match=ways_out):
+        animate(run, out / "walk.mp4", size=(64, 64))
+    assert not list(out.iterdir())
+    animate(run, out / "walk.gif", size=(64, 64))  # the advice is good
+    run.save_html(out / "walk.html")

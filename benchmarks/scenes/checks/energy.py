@@ -133,7 +133,7 @@ def balance(work: Work) -> Balance:
     gained = unsaid = jam_made = 0.0
     for k, at in enumerate(rows.instant.tolist()):
         a, b = rows.first[k], rows.last[k]
-        if k > 0 and k in rows.jams:
+        if k > 0 and k in rows.poles:
             jam_made = max(jam_made, _made_by_jam(work, k, energy))
         elif k > 0:
             left = energy[a] - energy[rows.last[k - 1]] - done[k - 1]

@@ -7,6 +7,11 @@ from heelstrike.analysis.actuation import (
     distance_travelled,
     torque_cost,
 )
+from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
+from heelstrike.analysis.diagnosis.falls import Fall, first_cause
+from heelstrike.analysis.diagnosis.limits import Limit, limits
+from heelstrike.analysis.diagnosis.measures import Measure, MotorLoad, measures, motor_loads
+from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom
 from heelstrike.analysis.energy import EnergyBalance, energy_balance
 from heelstrike.analysis.friction import FrictionUse, friction_use
 from heelstrike.analysis.limit_cycle import LimitCycle, find_limit_cycle
@@ -42,11 +47,18 @@ from heelstrike.analysis.zero_moment_point import (
 from heelstrike.robot.sole import Sole, soles
 
 __all__ = [
+    "Cause",
+    "Change",
     "CostOfTransport",
     "EnergyBalance",
+    "Fall",
     "FrictionUse",
+    "Lever",
+    "Limit",
     "LimitCycle",
+    "Measure",
     "Motion",
+    "MotorLoad",
     "Recovery",
     "ReferenceMotion",
     "Saltation",
@@ -54,18 +66,25 @@ __all__ = [
     "Stance",
     "Summary",
     "SupportPhase",
+    "Symptom",
     "TrackingError",
+    "Tried",
     "ZeroDynamics",
     "ZeroMomentPoint",
     "actuator_power",
+    "changes",
     "cost_of_transport",
     "distance_travelled",
     "double_support_fraction",
     "energy_balance",
     "find_limit_cycle",
+    "first_cause",
     "foot_wrenches",
     "friction_use",
+    "limits",
     "max_slip",
+    "measures",
+    "motor_loads",
     "penetration",
     "phase_time",
     "recovery",

@@ -56,6 +56,37 @@ def actuator_power(run: Run) -> Floats:
     return np.asarray(mean_over_intervals(run, run.torque) * 0.5 * (speed[:-1] + speed[1:]))
 
 
+def torque_bounds(run: Run) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """Least and largest torque (nt, nu) that the motors can give in each row.
+
+    They are the limits of the robot, and the speed-torque line where a motor has one.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    lower, upper : (nt, nu) float
+        N m, N of a slide; infinite without a limit.
+    by_speed : (nt, nu) bool
+        Whether it is the speed that limits the torque of the sign that the motor gave.
+    """
+    model = run.robot.model
+    joints = model.actuator_joint
+    lower = np.broadcast_to(model.torque_lower, run.torque.shape)
+    upper = np.broadcast_to(model.torque_upper, run.torque.shape)
+    stall = model.stall_torque[joints]
+    with np.errstate(invalid="ignore"):
+        drag = np.where(
+            np.isfinite(stall), stall / model.no_load_speed[joints] * run.velocity[:, joints], 0.0
+        )
+    slowest, fastest = np.maximum(lower, -stall - drag), np.minimum(upper, stall - drag)
+    by_speed = np.where(run.torque < 0.0, slowest > lower, fastest < upper)
+    return slowest, fastest, by_speed
+
+
 @dataclass(frozen=True)
 class CostOfTransport:
     """Energy spent a unit of weight and distance, without dimension.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.poincare_map import Carried, Chart, PoincareMap, Section, derivative
 from heelstrike.analysis.stability.loop import ClosedLoop
 from heelstrike.analysis.stability.repeating import Repeating, repeating_walk
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.robot.robot import Robot
@@ -100,6 +101,7 @@ class LimitCycle:
 
 
 # More arguments than eight: what walks, and how its steps are told apart, are a user's to say.
+@takes(SimulationError)
 def find_limit_cycle(
     robot: Robot,
     state: State | Snapshot,

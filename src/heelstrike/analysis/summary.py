@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 import json
 import math
 import string
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from heelstrike.analysis.actuation import cost_of_transport, torque_cost
+from heelstrike.analysis.diagnosis.falls import first_cause
 from heelstrike.analysis.friction import friction_use
 from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.slip import max_slip
@@ -55,6 +57,8 @@ class Summary:
         Name of the robot.
     status, message : str
         How the run ended.
+    first_cause : str
+        Why it did not go well, what came first in time first; nothing if it did.
     steps : int
         Walking steps taken: touchdowns of alternating feet.
     distance_m : float
@@ -78,6 +82,8 @@ class Summary:
         Largest distance that a contact point slid while pressed, over the whole run.
     penetration_max_m, complementarity_max : float
         Worst values over all steps, from the certificates; the latter is relative.
+    energy_gain_J : float
+        Kinetic energy that restitution with friction made in impacts.
     solver : SolverCount
         How the contact problems were solved.
     torque_cost_N2m2s : float
@@ -97,6 +103,7 @@ class Summary:
     robot: str
     status: str
     message: str
+    first_cause: str
     steps: int
     distance_m: float
     duration_s: float
@@ -120,6 +127,7 @@ class Summary:
     compile_s: float
     wall_s: float
     real_time_factor: float
+    energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
 
     @property
     def speed(self) -> float:
@@ -194,6 +202,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         If the gait does not fit the robot of the run.
     """
     motion = run_motion(run)
+    fall = first_cause(run, gait)
     duration = float(run.time[-1] - run.time[0]) if len(run.time) else 0.0
     tracking = tracking_error(run, gait) if gait is not None and len(run.time) else None
     zmp = zero_moment_point(run, motion=motion)
@@ -203,6 +212,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         robot=run.robot.name,
         status=run.status.value,
         message=run.message,
+        first_cause="" if fall is None else str(fall),
         steps=len(walking_steps(run)),
         distance_m=transport.distance,
         duration_s=duration,
@@ -219,6 +229,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         slip_max_m=max_slip(run),
         penetration_max_m=run.certificates.penetration,
         complementarity_max=run.certificates.complementarity,
+        energy_gain_J=run.certificates.energy_gain,
         solver=run.solver,
         torque_cost_N2m2s=torque_cost(run),
         cost_of_transport=transport.absolute,
@@ -237,6 +248,8 @@ def plain(value: Any) -> Any:
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
+    if isinstance(value, enum.Enum):
+        return value.value
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -252,6 +265,7 @@ class _Words(string.Formatter):
 # What a person reads, in letters that the consoles of Windows have.
 LINES = {
     "status": "{s.status}",
+    "first cause": "{s.first_cause}",
     "steps": "{s.steps}",
     "distance": "{s.distance_m:.4} m in {s.duration_s:.4} s ({s.speed:.3} m/s)",
     "gait": "{s.gait.step_length_m:.3} m in {s.gait.step_duration_s:.3} s a step, "
@@ -263,6 +277,7 @@ LINES = {
     "slip": "{s.slip_max_m:.2} m",
     "penetration": "{s.penetration_max_m:.2} m",
     "contact problems": "{s.solver}; complementarity {s.complementarity_max:.2}",
+    "energy made by impacts": "{s.energy_gain_J:.3} J (Newton's restitution with friction)",
     "cost of transport": "{s.cost_of_transport:.3} "
     "({s.cost_of_transport_positive:.3} positive work)",
     "torques at their limit": "{s.saturations}",
@@ -270,6 +285,7 @@ LINES = {
     "compilation {s.compile_s:.3} s",
 }
 OF_A_GAIT = ("gait", "joint tracking error")
+OF_A_GAIN = "energy made by impacts"
 
 
 def lines(s: Summary) -> list[tuple[str, str]]:
@@ -278,5 +294,7 @@ def lines(s: Summary) -> list[tuple[str, str]]:
     return [
         (label, write(line, s=s))
         for label, line in LINES.items()
-        if s.gait is not None or label not in OF_A_GAIT
+        if (s.gait is not None or label not in OF_A_GAIT)
+        and (s.energy_gain_J > 0.0 or label != OF_A_GAIN)
+        and (s.first_cause or label != "first cause")
     ]

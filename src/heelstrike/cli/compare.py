@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,9 +10,12 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
+    SEVERAL,
     AsJson,
+    ControlledBy,
     Debug,
     Friction,
+    Method,
     OnGround,
     Pushed,
     RobotName,
@@ -22,22 +24,19 @@ from heelstrike.cli.options import (
     method_called,
     reads_robots,
 )
-from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.planning import law_asked, planned_walk
 from heelstrike.cli.terminal import FAILED, output, spoken, stage, tell, tell_interruption, wrote
 from heelstrike.cli.values import ground_called, pushes_called
 
-
-class Way(StrEnum):
-    """Ways through time that can be compared."""
-
-    EVENT_DRIVEN = "event-driven"
-    TIME_STEPPING = "time-stepping"
-    PAPER_EXPLICIT = "paper-explicit"
-    PAPER_SYMPLECTIC = "paper-symplectic"
-    LINEARLY_IMPLICIT = "linearly-implicit"
-    MOREAU_JEAN = "moreau-jean"
-    HUNT_CROSSLEY = "hunt-crossley"
-    KELVIN_VOIGT = "kelvin-voigt"
+USUAL = (
+    Method.EVENT_DRIVEN,
+    Method.TIME_STEPPING,
+    Method.LINEARLY_IMPLICIT,
+    Method.MOREAU_JEAN,
+    Method.COMPLIANT,
+    Method.KELVIN_VOIGT,
+)
+"""What is compared where nobody names methods."""
 
 
 # As many arguments as the command has options: a person's, none of which is handed on one by one.
@@ -46,12 +45,13 @@ class Way(StrEnum):
 def compare(
     robot: RobotName = "bravo7",
     method: Annotated[
-        list[Way] | None,
+        list[Method] | None,
         typer.Option(
-            help="Methods; repeat the option. The first is the reference.",
-            show_default="all but the paper's",
+            help=f"{SEVERAL} The first is the reference.",
+            show_default=f"{', '.join(USUAL)}",
         ),
     ] = None,
+    controller: ControlledBy = None,
     gait: SavedGait = None,
     steps: Steps = 3,
     step: Annotated[
@@ -82,9 +82,10 @@ def compare(
     machine = hs.load_robot(robot, **how)
     for each in pushes:
         each.place(machine)
-    ways = method or [way for way in Way if not way.startswith("paper")]
+    law = law_asked(controller, machine)
+    ways = method or USUAL
     methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-    start = beginning(machine, planned_walk(machine, gait, surface), surface)
+    start = beginning(machine, planned_walk(machine, gait, surface, law), surface, law)
     doing = f"walking {steps} steps by {len(methods)} methods"
     with stage(doing, when_slow="(compiling each of them, once: about a minute)"):
         comparison = hs.compare(

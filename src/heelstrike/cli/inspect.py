@@ -18,7 +18,7 @@ from heelstrike.cli.options import (
     RobotName,
     reads_robots,
 )
-from heelstrike.cli.terminal import output, spoken, tell
+from heelstrike.cli.terminal import in_options, output, spoken, tell
 from heelstrike.cli.values import ground_called, pushes_called
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def look_at(
         typer.echo(json.dumps(facts(inspection), indent=2))
     else:
         drawing = "" if robot is None else terminal_drawing(robot)
-        for text in (drawing if _has_letters_for(drawing) else "", inspection.text()):
+        for text in (drawing if _has_letters_for(drawing) else "", in_options(inspection.text())):
             if text:
                 output().print(Text(text), soft_wrap=True)
     if picture is not None and robot is not None:

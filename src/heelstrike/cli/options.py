@@ -11,17 +11,37 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from heelstrike.cli.values import pose_called
+from heelstrike.cli.values import pose_called, xacro_arguments
 
 if TYPE_CHECKING:
-    from heelstrike.sim.method import Method
+    from heelstrike.sim.method import Method as TimeMethod
 
 
-def _built_in(incomplete: str) -> list[str]:
+def built_in(incomplete: str) -> list[str]:
     """Complete the name of a built-in robot; where there is none, shells complete a file's."""
     from heelstrike.robot.library import builtin_robots
 
     return [name for name in builtin_robots() if name.startswith(incomplete)]
+
+
+class Method(StrEnum):
+    """Ways through time, as every command calls them, the usual one first."""
+
+    TIME_STEPPING = "time-stepping"
+    EVENT_DRIVEN = "event-driven"
+    COMPLIANT = "compliant"
+    KELVIN_VOIGT = "kelvin-voigt"
+    GAP_LINEARISED = "gap-linearised"
+    MOREAU_JEAN = "moreau-jean"
+    LINEARLY_IMPLICIT = "linearly-implicit"
+    PAPER_EXPLICIT = "paper-explicit"
+    PAPER_SYMPLECTIC = "paper-symplectic"
+
+
+METHODS = tuple(each.value for each in Method)
+METHOD = "Way through time: one of three, a law of compliant ground, or a scheme of time stepping."
+SEVERAL = "Way through time; repeat the option to see several side by side."
+USUAL_METHOD = f"{Method.TIME_STEPPING}; {Method.EVENT_DRIVEN} without motors"
 
 
 class Way(StrEnum):
@@ -35,9 +55,7 @@ class Way(StrEnum):
 
 RobotName = Annotated[
     str,
-    typer.Argument(
-        help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=_built_in
-    ),
+    typer.Argument(help="A built-in robot, or an MJCF, URDF or SDF file.", autocompletion=built_in),
 ]
 Floating = Annotated[
     bool, typer.Option("--floating", help="Let a trunk float in the plane that the file holds.")
@@ -61,6 +79,23 @@ Packages = Annotated[
         help="Folder of ROS packages or Gazebo models, for files that the robot names; repeat the "
         "option for more.",
         show_default="around the file",
+    ),
+]
+Xacro = Annotated[
+    bool,
+    typer.Option(
+        "--xacro",
+        help="Expand the macros of the robot's file first, which runs what it says: for files of "
+        "people whom you trust.",
+    ),
+]
+XacroArguments = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--xacro-arg",
+        metavar="NAME:=VALUE",
+        help="Value of an argument of a xacro file; with it --xacro need not be said. Repeat the "
+        "option for more.",
     ),
 ]
 Pose = Annotated[
@@ -90,6 +125,16 @@ Pushed = Annotated[
 ]
 SavedGait = Annotated[
     Path | None, typer.Option("--gait", help="Walk this saved gait instead of designing one.")
+]
+ControlledBy = Annotated[
+    str | None,
+    typer.Option(
+        "--controller",
+        metavar="LAW|MODULE:NAME|FILE.py:NAME",
+        help="Law that moves the joints, by its name; or one of yours, a class or function of "
+        "(robot, gait), whose code is then run.",
+        show_default="ComputedTorque",
+    ),
 ]
 Steps = Annotated[int, typer.Option(min=1, help="Steps to walk.")]
 Friction = Annotated[float, typer.Option(help="Friction coefficient of the ground.")]
@@ -127,6 +172,8 @@ def _reading(
     pose: Pose = None,
     mirror: Averaged = False,
     package_path: Packages = None,
+    xacro: Xacro = False,
+    xacro_arg: XacroArguments = None,
 ) -> dict[str, Any]:
     return {
         "floating": floating,
@@ -135,24 +182,26 @@ def _reading(
         "pose": pose_called(pose),
         "mirror": "average" if mirror else None,
         "package_path": package_path or (),
+        "xacro": xacro_arguments(xacro_arg) or xacro,
     }
 
 
-def method_called(name: str, step: float, *, passive: bool = False) -> Method:
-    """Return the method of a name, which may be that of a scheme or a law, with a step (s).
+def method_called(name: str, step: float, *, passive: bool = False) -> TimeMethod:
+    """Return the :class:`Method` of a name, with a step (s).
 
     The legs of a passive walker, of one length, may pass through the ground as they swing, where
     a method can let them.
     """
     from heelstrike import sim
 
-    match name:
-        case "event-driven":
-            return sim.EventDriven(swing_feet_pass=passive)
-        case "time-stepping":
+    match Method(name):
+        case Method.TIME_STEPPING:
             return sim.TimeStepping(step=step)
-        case "compliant" | "hunt-crossley":
+        case Method.EVENT_DRIVEN:
+            return sim.EventDriven(swing_feet_pass=passive)
+        case Method.COMPLIANT:
             return sim.Compliant(step=step)
-        case "kelvin-voigt":
+        case Method.KELVIN_VOIGT:
             return sim.Compliant(law=sim.KelvinVoigt(), step=step)
-    return sim.TimeStepping(step=step, scheme=sim.Scheme[name.upper().replace("-", "_")])
+        case scheme:
+            return sim.TimeStepping(step=step, scheme=sim.Scheme[scheme.name])

@@ -9,26 +9,73 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from heelstrike.cli.terminal import stage
+from heelstrike.cli.terminal import stage, tell
 
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle
     from heelstrike.contact.ground import Ground
+    from heelstrike.experiments.laws import Entry
     from heelstrike.gait import Gait
     from heelstrike.robot import Robot
+    from heelstrike.sim import Run
+
+
+def law_asked(words: str | None, robot: Robot | None = None) -> Entry | None:
+    """Return the law of an option, and tell whose code was run for it.
+
+    Refused is one that cannot drive the robot; None is what nobody asked for.
+    """
+    from heelstrike.experiments.laws import check_law, law_called
+
+    if words is None:
+        return None
+    law = law_called(words)
+    if law.source:
+        tell(f"controller {law.name}: the code of {law.source} has been run")
+    if robot is not None:
+        check_law(law, robot)
+    return law
+
+
+def hint_of_balance(*runs: Run) -> None:
+    """Name a law that looks after the balance, where computed torque was pushed or fell."""
+    from heelstrike.experiments.laws import law_that_balances
+    from heelstrike.sim import RunStatus
+
+    if any(run.pushes or run.status is RunStatus.FELL for run in runs):
+        law = law_that_balances(runs[0].robot)
+        if law is not None:
+            tell(
+                "ComputedTorque follows the gait and does not look after the robot's balance; "
+                f"--controller {law.name} does."
+            )
 
 
 def planned_walk(
-    robot: Robot, path: Path | None, ground: Ground, **size: float | None
-) -> Gait | LimitCycle:
+    robot: Robot,
+    path: Path | None,
+    ground: Ground,
+    law: Entry | None = None,
+    **size: float | None,
+) -> Gait | LimitCycle | None:
     """Load a gait, or design one; what is None of the size of its steps suits the robot.
 
-    Of a robot without motors it is the limit cycle on the ground.
+    Of a robot without motors it is the limit cycle on the ground; for a law that makes it stand
+    there is none.
     """
+    from heelstrike.experiments.laws import gait_for
     from heelstrike.experiments.walk import design, typical_step
     from heelstrike.gait import load_gait
 
     given = {name: value for name, value in size.items() if value is not None}
+    if law is not None and law.stands:
+        if path is not None or given:
+            raise typer.BadParameter(
+                f"{law.name} makes the robot stand, by no gait: leave --gait and the sizes of "
+                "steps out",
+                param_hint="--controller",
+            )
+        return None
     if robot.nu == 0 and robot.nc:
         return _passive(robot, path, ground, given)
     if path is not None:
@@ -39,6 +86,9 @@ def planned_walk(
                 param_hint="--gait",
             )
         return load_gait(path, robot)
+    if law is not None and law.bent_knees and not given:
+        with stage("designing a gait with bent knees"):
+            return gait_for(robot)
     chosen = replace(typical_step(robot), **given)
     friction = float(ground.model().friction.min())
     with stage(f"designing a gait of {chosen.length:g} m in {chosen.duration:g} s") as designing:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,11 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from heelstrike.cli import INTERRUPTED
-from heelstrike.cli.compare import Way
 from heelstrike.cli.options import (
+    SEVERAL,
+    USUAL_METHOD,
     AsJson,
+    ControlledBy,
     Debug,
     Friction,
+    Method,
     OnGround,
     Pushed,
     SavedGait,
@@ -22,7 +26,7 @@ from heelstrike.cli.options import (
     method_called,
     reads_robots,
 )
-from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.planning import law_asked, planned_walk
 from heelstrike.cli.terminal import (
     FAILED,
     output,
@@ -36,11 +40,14 @@ from heelstrike.cli.terminal import (
 from heelstrike.cli.values import ground_called, pushes_called
 
 if TYPE_CHECKING:
+    from heelstrike.analysis.diagnosis.changes import Tried
     from heelstrike.gait import Gait
     from heelstrike.sim import Run
 
-OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "floating", "projected",
-             "forward", "pose", "mirror", "package_path")  # fmt: skip
+OF_A_WALK = ("steps", "method", "step", "ground", "friction", "push", "controller", "tries",
+             "floating",
+             "projected", "forward", "pose", "mirror", "package_path", "xacro",
+             "xacro_arg")  # fmt: skip
 """Options that say how a robot walks, and nothing to a run that is read."""
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"
@@ -59,14 +66,12 @@ def report(
         ),
     ],
     out: Annotated[Path, typer.Option(dir_okay=False, help="Page to write.")] = Path("report.html"),
+    controller: ControlledBy = None,
     gait: SavedGait = None,
     steps: Steps = 10,
     method: Annotated[
-        list[Way] | None,
-        typer.Option(
-            help="Way through time; repeat the option to see several side by side.",
-            show_default="time-stepping; event-driven without motors",
-        ),
+        list[Method] | None,
+        typer.Option(help=SEVERAL, show_default=USUAL_METHOD),
     ] = None,
     step: Annotated[
         float, typer.Option(help="Time step in s of the methods that have one.")
@@ -74,16 +79,20 @@ def report(
     ground: OnGround = "flat",
     friction: Friction = 0.75,
     push: Pushed = None,
+    tries: Annotated[
+        bool, typer.Option(help="Walk again with pushes, slopes and what the report would change.")
+    ] = True,
     how: Any = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
-    """Judge runs on one page: the verdict first, how close to each limit, film, figures, origins.
+    """Judge runs on one page: why it fell, margins, what it withstands, what to change, film.
 
     The gait of a run that is read is the one of --gait, or of the gait.json beside it. The exit
     status is 0 if all runs lasted to their end, 1 if not.
     """
     from heelstrike.experiments.walk import walk
+    from heelstrike.experiments.what_if import NO_CONTROLLER, PAPER, Case, tried_beside
     from heelstrike.gait import Gait
     from heelstrike.robot import load_robot
     from heelstrike.view.page.page import check_page
@@ -98,6 +107,7 @@ def report(
     if files:
         _refuse_options_of_a_walk(context)
         runs, followed = _read(files, gait)
+        tried: dict[str, tuple[Tried, ...]] = dict.fromkeys(runs, (NO_CONTROLLER,))
     elif len(what) > 1:
         raise typer.BadParameter("one robot is walked at a time; repeat --method for several ways")
     else:
@@ -105,9 +115,10 @@ def report(
         machine = load_robot(what[0], **how)
         for each in pushes:
             each.place(machine)
-        ways = method or [Way.TIME_STEPPING if machine.nu else Way.EVENT_DRIVEN]
+        law = law_asked(controller, machine)
+        ways = method or [Method.TIME_STEPPING if machine.nu else Method.EVENT_DRIVEN]
         methods = {way.value: method_called(way, step, passive=not machine.nu) for way in ways}
-        planned = planned_walk(machine, gait, surface)
+        planned = planned_walk(machine, gait, surface, law)
         followed = planned if isinstance(planned, Gait) else None
         runs = {}
         for name, through in methods.items():
@@ -116,17 +127,31 @@ def report(
                     machine,
                     planned,
                     steps=steps,
+                    law=law,
                     method=through,
                     ground=surface,
                     pushes=pushes,
                     progress=walking.reached,
                 )
+        tried = {}
+        for name, run in runs.items() if tries else ():
+            case = None
+            if followed is not None:
+                case = Case(
+                    robot=machine, gait=followed, ground=surface, pushes=pushes,
+                    method=methods[name], steps=steps, law=law or PAPER,
+                )  # fmt: skip
+            with stage("trying pushes, slopes and changes", when_slow=FIRST_TIME):
+                tried[name] = tried_beside(case, run)
     _stop_if_interrupted(runs)
     with stage("writing the report"):
         only = next(iter(runs.values()))
         shown = runs if len(runs) > 1 else only
-        wrote(report(shown, out, gait=followed, command=this_command()))
-    _tell(runs, followed, out, as_json=as_json)
+        named = (
+            tried if len(runs) > 1 else dict(zip((only.robot.name,), tried.values(), strict=False))
+        )
+        wrote(report(shown, out, gait=followed, command=this_command(), tried=named))
+    _tell(runs, followed, out, tried, as_json=as_json)
 
 
 def _refuse_options_of_a_walk(context: typer.Context) -> None:
@@ -167,11 +192,18 @@ def _stop_if_interrupted(runs: dict[str, Run]) -> None:
             raise typer.Exit(INTERRUPTED)
 
 
-def _tell(runs: dict[str, Run], gait: Gait | None, out: Path, *, as_json: bool) -> None:
+def _tell(
+    runs: dict[str, Run],
+    gait: Gait | None,
+    out: Path,
+    tried: Mapping[str, Sequence[Tried]],
+    *,
+    as_json: bool,
+) -> None:
     from heelstrike.analysis.summary import plain
     from heelstrike.view.page import judge
 
-    verdicts = {name: judge(run, gait) for name, run in runs.items()}
+    verdicts = {name: judge(run, gait, tried=tried.get(name, ())) for name, run in runs.items()}
     if as_json:
         told = {name: plain(asdict(verdict)) for name, verdict in verdicts.items()}
         typer.echo(json.dumps(told, indent=2, ensure_ascii=False))
@@ -180,5 +212,5 @@ def _tell(runs: dict[str, Run], gait: Gait | None, out: Path, *, as_json: bool) 
             label = f"{name}: " if len(verdicts) > 1 else ""
             output().print(f"{label}{verdict.headline}", markup=False, soft_wrap=True)
     tell(f"{out}: the report, for any browser, which prints it to PDF")
-    if not all(run.completed for run in runs.values()):
+    if not all(run.completed and verdicts[name].fall is None for name, run in runs.items()):
         raise typer.Exit(FAILED)

@@ -62,6 +62,23 @@ def tell(message: str, label: tuple[str, str] = ("", "")) -> None:
     messages().print(Text.assemble(label, message), soft_wrap=True)
 
 
+_OPTIONS = {
+    "floating=True": "--floating",
+    "projected=True": "--projected",
+    "xacro=True": "--xacro",
+    'mirror="average"': "--mirror",
+    'forward="y"': "--forward y",
+    "package_path=…": "--package-path",
+}
+
+
+def in_options(message: str) -> str:
+    """Return a message with the options of this command in the place of Python's keywords."""
+    for keyword, option in _OPTIONS.items():
+        message = message.replace(keyword, option)
+    return message
+
+
 def complain(message: str) -> None:
     """Print an error."""
     tell(message, ("error: ", "bold red"))
@@ -81,7 +98,7 @@ def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _R
             if options.get("debug"):
                 return function(*args, **options)
             warnings.showwarning = lambda message, *_, **__: tell(
-                str(message), ("warning: ", "yellow")
+                in_options(str(message)), ("warning: ", "yellow")
             )
             try:
                 return function(*args, **options)
@@ -96,7 +113,7 @@ def spoken(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _R
                     tell_interruption()
                     raise typer.Exit(INTERRUPTED) from None
                 if isinstance(error, HeelstrikeError):
-                    complain(str(error))
+                    complain(in_options(str(error)))
                 elif isinstance(error, OSError):
                     complain(_file_trouble(error))
                 else:

@@ -141,6 +141,25 @@ def pose_called(several: Sequence[str] | None) -> dict[str, float]:
     return pose
 
 
+def xacro_arguments(several: Sequence[str] | None) -> dict[str, str]:
+    """Make arguments of a xacro file of ``name:=value``, as xacro itself writes them.
+
+    Raises
+    ------
+    RobotError
+        If one is written otherwise, or is there twice.
+    """
+    arguments: dict[str, str] = {}
+    for words in several or ():
+        name, assigned, value = words.partition(":=")
+        if not (name.strip() and assigned):
+            raise RobotError(f"--xacro-arg {words}: write NAME:=VALUE, as legs:=2.")
+        if name.strip() in arguments:
+            raise RobotError(f"--xacro-arg: {name.strip()!r} is there twice.")
+        arguments[name.strip()] = value
+    return arguments
+
+
 def _number(word: str, where: str, error: type[HeelstrikeError]) -> float:
     try:
         number = float(word)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,9 +11,13 @@ import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
+    METHOD,
+    USUAL_METHOD,
     AsJson,
+    ControlledBy,
     Debug,
     Friction,
+    Method,
     OnGround,
     Pushed,
     RobotName,
@@ -21,7 +26,7 @@ from heelstrike.cli.options import (
     method_called,
     reads_robots,
 )
-from heelstrike.cli.planning import planned_walk
+from heelstrike.cli.planning import hint_of_balance, law_asked, planned_walk
 from heelstrike.cli.terminal import (
     FAILED,
     complain,
@@ -34,6 +39,7 @@ from heelstrike.cli.terminal import (
     wrote,
 )
 from heelstrike.cli.values import ground_called, pushes_called
+from heelstrike.errors import HeelstrikeError
 
 if TYPE_CHECKING:
     from heelstrike.analysis.limit_cycle import LimitCycle
@@ -45,25 +51,6 @@ if TYPE_CHECKING:
 
 FIRST_TIME = "(compiling the simulator, once: about 20 s)"
 SUITS = "suits the robot's size"
-
-
-class Method(StrEnum):
-    """Ways through time; each stands for a class of :mod:`heelstrike.sim`."""
-
-    TIME_STEPPING = "time-stepping"
-    EVENT_DRIVEN = "event-driven"
-    COMPLIANT = "compliant"
-
-
-class Scheme(StrEnum):
-    """Discretisations of time stepping; each stands for one of :class:`heelstrike.sim.Scheme`."""
-
-    GAP_LINEARISED = "gap-linearised"
-    PAPER_EXPLICIT = "paper-explicit"
-    PAPER_SYMPLECTIC = "paper-symplectic"
-    MOREAU_JEAN = "moreau-jean"
-    LINEARLY_IMPLICIT = "linearly-implicit"
-    IMPACT_RESOLVED = "impact-resolved"
 
 
 class Animation(StrEnum):
@@ -89,19 +76,11 @@ def walk(
         float | None, typer.Option(help="Height of the swing foot's path in m.", show_default=SUITS)
     ] = None,
     gait: SavedGait = None,
+    controller: ControlledBy = None,
     steps: Steps = 20,
     method: Annotated[
         Method | None,
-        typer.Option(
-            help="Way through time.",
-            show_default=f"{Method.TIME_STEPPING}; {Method.EVENT_DRIVEN} without motors",
-        ),
-    ] = None,
-    scheme: Annotated[
-        Scheme | None,
-        typer.Option(
-            help="Discretisation of time stepping.", show_default=Scheme.IMPACT_RESOLVED.value
-        ),
+        typer.Option(help=METHOD, show_default=USUAL_METHOD),
     ] = None,
     step: Annotated[
         float, typer.Option(help="Time step h in s; of the record, for the other methods.")
@@ -121,6 +100,10 @@ def walk(
             dir_okay=False, help="Also write the walk as one page with animation and curves."
         ),
     ] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option("--csv", dir_okay=False, help="Also write the walk as a table of text."),
+    ] = None,
     as_json: AsJson = False,
     debug: Debug = False,  # noqa: ARG001 - for `spoken`
 ) -> None:
@@ -136,6 +119,7 @@ def walk(
         from heelstrike.experiments.walk import walk
         from heelstrike.gait import Gait
         from heelstrike.robot import load_robot
+        from heelstrike.sim.files.run_file import TABLE, check_run_file
         from heelstrike.view.page.page import check_page, save_html
 
         # All that is cheap to refuse is refused before anything that takes long.
@@ -143,12 +127,15 @@ def walk(
         machine = load_robot(robot, **how)
         for each in pushes:
             each.place(machine)
-        through = _through_time(method, scheme, step, passive=not machine.nu)
+        law = law_asked(controller, machine)
+        through = _through_time(method, step, passive=not machine.nu)
         results = Results(out)
         if html is not None:
             check_page(html)
+        if table is not None:
+            check_run_file(table, TABLE)
     planned = planned_walk(
-        machine, gait, surface, length=step_length, duration=step_duration, clearance=clearance
+        machine, gait, surface, law, length=step_length, duration=step_duration, clearance=clearance
     )
     followed = planned if isinstance(planned, Gait) else None
     wrote(*results.save_gait(followed))
@@ -157,6 +144,7 @@ def walk(
             machine,
             planned,
             steps=steps,
+            law=law,
             method=through,
             ground=surface,
             pushes=pushes,
@@ -166,27 +154,18 @@ def walk(
     if html is not None and len(run.time):
         wrote(save_html(run, html, gait=followed, command=this_command()))
         tell(f"{html}: the walk as one page, for any browser")
-    _tell_outcome(run, planned, steps, saved, as_json=as_json)
+    if table is not None:
+        wrote(run.save(table))
+        tell(f"{table}: the walk as a table")
+    _tell_outcome(run, planned, steps, saved, usual=law is None, as_json=as_json)
 
 
-def _through_time(
-    method: Method | None, scheme: Scheme | None, step: float, *, passive: bool
-) -> TimeMethod:
-    if method is None:
-        free = scheme is None and passive
-        method = Method.EVENT_DRIVEN if free else Method.TIME_STEPPING
-    if method is Method.TIME_STEPPING:
-        return method_called(scheme or method, step)
-    if scheme is not None:
-        raise typer.BadParameter(
-            f"{method} has no schemes, which are those of time-stepping; leave one of the two out",
-            param_hint="--scheme",
-        )
-    if method is Method.EVENT_DRIVEN:
-        from heelstrike.sim import EventDriven
+def _through_time(method: Method | None, step: float, *, passive: bool) -> TimeMethod:
+    from heelstrike.sim import EventDriven
 
-        return EventDriven(output_period=step, swing_feet_pass=passive)
-    return method_called(method, step)
+    method = method or (Method.EVENT_DRIVEN if passive else Method.TIME_STEPPING)
+    through = method_called(method, step, passive=passive)
+    return replace(through, output_period=step) if isinstance(through, EventDriven) else through
 
 
 def _save(results: Results, run: Run, gait: Gait | None, animation: Animation) -> tuple[Saved, ...]:
@@ -206,12 +185,20 @@ def _save(results: Results, run: Run, gait: Gait | None, animation: Animation) -
             wrote(*results.written)
     for each in saved:
         if each.error is not None:
-            complain(f"{each.path} could not be made: {type(each.error).__name__}: {each.error}")
+            ours = isinstance(each.error, HeelstrikeError)
+            reason = str(each.error) if ours else f"{type(each.error).__name__}: {each.error}"
+            complain(f"{each.path} could not be made: {reason}")
     return saved
 
 
 def _tell_outcome(
-    run: Run, planned: Gait | LimitCycle, steps: int, saved: tuple[Saved, ...], *, as_json: bool
+    run: Run,
+    planned: Gait | LimitCycle | None,
+    steps: int,
+    saved: tuple[Saved, ...],
+    *,
+    usual: bool,
+    as_json: bool,
 ) -> None:
     """Show the figures of a walk and say how it went, by the exit status, too."""
     from heelstrike.experiments.walk import steps_taken, why_unstable
@@ -232,15 +219,17 @@ def _tell_outcome(
         tell_interruption(f"walking, at t = {run.time[-1]:.3g} s" if len(run.time) else "walking")
         raise typer.Exit(INTERRUPTED)
     taken = steps_taken(run, planned)
-    walked = run.completed and taken >= steps
+    walked = run.completed and (planned is None or taken >= steps)
     if not run.completed:
         complain(run.message)
     elif not walked:
         complain(f"the robot took {taken} of {steps} steps in {run.time[-1]:.3g} s")
     exact = isinstance(run.method, EventDriven)
-    if not walked and (reason := why_unstable(planned)):
+    if not walked and planned is not None and (reason := why_unstable(planned)):
         tell(reason + ("" if exact else " --method event-driven keeps to it for longer."))
     elif not (walked or gait or exact):
         tell("Legs of one length scuff the ground; --method event-driven lets them swing through.")
+    if usual:
+        hint_of_balance(run)
     if not walked or any(each.error for each in saved):
         raise typer.Exit(FAILED)

@@ -3,50 +3,62 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from heelstrike.cli import INTERRUPTED
 from heelstrike.cli.options import (
+    METHOD,
+    METHODS,
+    USUAL_METHOD,
     Debug,
     Friction,
+    Method,
     OnGround,
-    RobotName,
-    SavedGait,
+    built_in,
     method_called,
     reads_robots,
 )
+from heelstrike.cli.planning import law_asked
 from heelstrike.cli.terminal import spoken, stage, tell
 from heelstrike.cli.values import ground_called
-from heelstrike.cli.walk import Method, Scheme
 from heelstrike.interruption import acknowledge
 
 if TYPE_CHECKING:
     from heelstrike.contact.ground import Ground
-
-METHODS = (
-    Scheme.IMPACT_RESOLVED.value,
-    Method.EVENT_DRIVEN.value,
-    Method.COMPLIANT.value,
-    *(scheme.value for scheme in Scheme if scheme is not Scheme.IMPACT_RESOLVED),
-)
-"""Names that :func:`~heelstrike.cli.options.method_called` knows, the usual one first."""
 
 
 # As many arguments as the command has options: a person's.
 @spoken
 @reads_robots
 def watch(
-    robot: RobotName = "bravo7",
-    gait: SavedGait = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            metavar="|".join(METHODS),
-            help="Way through time, or discretisation of time stepping.",
-            show_default=f"{METHODS[0]}; {Method.EVENT_DRIVEN} without motors",
+    robots: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="ROBOT",
+            help="Built-in robots, and MJCF, URDF or SDF files; the first walks at first.",
+            show_default="bravo7",
+            autocompletion=built_in,
         ),
+    ] = None,
+    gait: Annotated[
+        list[Path] | None,
+        typer.Option(help="Saved gait of one of the robots, to walk by; repeat it for more."),
+    ] = None,
+    controller: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="LAW|MODULE:NAME|FILE.py:NAME",
+            help="Law that moves the joints, by its name; or one of yours, a class or function of "
+            "(robot, gait), whose code is then run. Repeat the option to choose among several.",
+            show_default="FootstepFeedback where the robot can have it; ComputedTorque",
+        ),
+    ] = None,
+    method: Annotated[
+        Method | None,
+        typer.Option(help=METHOD, show_default=USUAL_METHOD),
     ] = None,
     step: Annotated[float, typer.Option(help="Time step h in s.")] = 1e-3,
     ground: OnGround = "flat",
@@ -64,14 +76,9 @@ def watch(
     """Walk a robot live, in the browser: watch it, halt it, take it back, push it.
 
     Needs `pip install 'heelstrike[watch]'`. The page is served on 127.0.0.1 only, to whoever has
-    the address that is printed. Ctrl-C ends it.
+    the address that is printed. Robots, gaits and laws that are named here are in its lists, beside
+    those that are built in. Ctrl-C ends it.
     """
-    if method == Method.TIME_STEPPING.value:  # as the other commands call it
-        method = METHODS[0]
-    if method is not None and method not in METHODS:
-        raise typer.BadParameter(
-            f"{method!r} is none of {', '.join(METHODS)}", param_hint="--method"
-        )
     with stage("loading"):
         from heelstrike.view.live.server import check_installed
 
@@ -83,10 +90,16 @@ def watch(
         surface = ground_called(ground, friction=friction)
         for name in METHODS if method is None else (method,):
             method_called(name, step)
+        named = robots or ["bravo7"]
         first = First(
-            method=method, step=step, gait=gait, friction=friction, **_shape(ground, surface)
+            method=None if method is None else method.value,
+            step=step,
+            gait=gait,
+            friction=friction,
+            laws=[law for words in controller or () if (law := law_asked(words))],
+            **_shape(ground, surface),
         )
-        walks = WalkStage(robot, method_called, METHODS, first, **how)
+        walks = WalkStage(named, method_called, METHODS, first, **how)
         viewer = view(stage=walks, rate=speed, port=port)
     tell(f"watch at {viewer.url}")
     try:

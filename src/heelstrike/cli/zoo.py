@@ -10,13 +10,14 @@ from typing import Annotated, Any
 import typer
 
 from heelstrike.cli.options import (
+    METHOD,
     AsJson,
     Debug,
+    Method,
     method_called,
     reads_robots,
 )
 from heelstrike.cli.terminal import many, output, spoken, stage, tell, this_command, wrote
-from heelstrike.cli.walk import Method
 
 ROBOTS = "bravo7,geyer7,spring_flamingo,rabbit,human7,walker2d"
 
@@ -46,7 +47,7 @@ def zoo(
         ),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A coarse table, for a try.")] = False,
-    method: Annotated[Method, typer.Option(help="Way through time.")] = Method.TIME_STEPPING,
+    method: Annotated[Method, typer.Option(help=METHOD)] = Method.TIME_STEPPING,
     step: Annotated[
         float, typer.Option(help="Time step in s of the methods that have one.")
     ] = 1e-3,

@@ -137,7 +137,30 @@ def number(of: type) -> Any:
 
 
 def part(kind: type[Bundle], *, address: bool = False, flat: bool = False) -> Any:
-    """Declare a bundle within a bundle; a flat one is stored as if its members were this one's."""
+    """Declare a bundle within a bundle.
+
+    Parameters
+    ----------
+    kind : type
+        Class of the bundle within.
+    address : bool
+        Whether it is another's, which is not to be kept with this one.
+    flat : bool
+        Whether what is in it is stored, and recorded of a log, under the names of its own members,
+        as if they were this one's.
+
+    Returns
+    -------
+    Member
+        What the class of the bundle makes a member of.
+
+    Raises
+    ------
+    TypeError
+        If it is no class of bundles.
+    """
+    if not (isinstance(kind, type) and issubclass(kind, Bundle)):
+        raise TypeError(f"a part is declared by its class of heelstrike.Bundle, got {kind!r}")
     return Member("part", kind, address=address, flat=flat)
 
 

@@ -161,7 +161,10 @@ def loop_for(signature: Any, function: Function) -> Function:
     return loop
 
 
-def uncompiled(function: Function, replace: Mapping[Any, Any] | None = None) -> Function:
+def uncompiled(
+    function: Function, replace: Mapping[Any, Any] | None = None, *,
+    ours: Callable[[Any], Any] | None = None,
+) -> Function:  # fmt: skip
     """Return the plain Python twin of a kernel, and of every kernel it calls.
 
     Parameters
@@ -170,11 +173,16 @@ def uncompiled(function: Function, replace: Mapping[Any, Any] | None = None) -> 
         A function decorated with :func:`kernel`, or a plain one that calls kernels.
     replace : mapping of function to function, optional
         What the twins call instead, for example ``{math.sin: casadi.sin}``.
+    ours : callable, optional
+        ``ours(kernel)`` returns what the twins call in the place of a kernel of this package.
     """
-    return _twin(function, {id(old): new for old, new in (replace or {}).items()}, {})
+    return _twin(function, {id(old): new for old, new in (replace or {}).items()}, ours, {})
 
 
-def _twin(function: Any, replace: dict[int, Any], twins: dict[int, Any]) -> Any:
+def _twin(
+    function: Any, replace: dict[int, Any], ours: Callable[[Any], Any] | None,
+    twins: dict[int, Any],
+) -> Any:  # fmt: skip
     source = function.py_func if _is_compiled(function) else function
     if id(source) in twins:
         return twins[id(source)]
@@ -188,7 +196,9 @@ def _twin(function: Any, replace: dict[int, Any], twins: dict[int, Any]) -> Any:
     def other(value: Any) -> Any:
         if id(value) in replace:
             return replace[id(value)]
-        return _twin(value, replace, twins) if _is_compiled(value) else value
+        if ours is not None and isinstance(value, Kernel) and is_ours(value.py_func):
+            return ours(value)
+        return _twin(value, replace, ours, twins) if _is_compiled(value) else value
 
     for name in source.__code__.co_names:
         if name in scope:

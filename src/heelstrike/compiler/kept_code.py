@@ -9,8 +9,6 @@ A disk that is full or cannot be written costs time only.
 from __future__ import annotations
 
 import hashlib
-import os
-import sys
 import time
 import uuid
 import warnings
@@ -19,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from numba import config
+
+from heelstrike.cache_folder import cache_folder
 
 KEY = DIGEST = hashlib.sha256().digest_size
 """Bytes of a key, and of the digest of what is in a file."""
@@ -52,17 +52,7 @@ def directories(source: Path | None) -> list[Path]:
     if settings.CACHE_DIR:
         return [Path(settings.CACHE_DIR) / own]
     beside = [source.resolve().parent / "__pycache__"] if source else []
-    return [*beside, _user_directory() / "heelstrike" / own]
-
-
-def _user_directory() -> Path:
-    if sys.platform == "win32":
-        named, usual = "LOCALAPPDATA", "~/AppData/Local"
-    elif sys.platform == "darwin":
-        named, usual = "", "~/Library/Caches"
-    else:
-        named, usual = "XDG_CACHE_HOME", "~/.cache"
-    return Path(os.environ.get(named) or os.path.expanduser(usual))  # noqa: PTH111, needs no home
+    return [*beside, cache_folder() / own]
 
 
 def read(places: Sequence[Path], name: str, key: bytes) -> bytes | None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
@@ -80,6 +81,7 @@ class Ground:
     _model: GroundModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         if not abs(self.slope) < 0.5 * np.pi:
             raise SimulationError(f"the slope must lie within ±π/2 rad, got {self.slope}")
         if self.profile is None:
@@ -102,6 +104,7 @@ class Ground:
         object.__setattr__(self, "_model", model)
 
     @classmethod
+    @takes(SimulationError)
     def stairs(
         cls,
         *,
@@ -148,6 +151,7 @@ class Ground:
         return cls(friction=friction, restitution=restitution, profile=np.array(corners))
 
     @classmethod
+    @takes(SimulationError)
     def rough(
         cls,
         *,
@@ -188,6 +192,10 @@ class Ground:
         """
         if not (amplitude >= 0.0 and spacing > 0.0 and length > 0.0):
             raise SimulationError("rough ground needs amplitude ≥ 0, spacing > 0 and length > 0")
+        if seed < 0 or not np.isfinite(start):
+            raise SimulationError(
+                f"rough ground needs a seed from 0 on and a finite start, got {seed} and {start:g}"
+            )
         x = np.arange(start, start + length, spacing)
         z = np.random.default_rng(seed).uniform(-amplitude, amplitude, len(x))
         z[0] = z[-1] = 0.0
@@ -234,6 +242,7 @@ class Ground:
         """Return the arrays that the kernels use."""
         return self._model
 
+    @takes(SimulationError)
     def height(self, x: ArrayLike) -> Floats:
         """Height of the ground at x, in metres; on a vertical step, that of its right side.
 

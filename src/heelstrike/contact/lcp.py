@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import check_accuracy, check_finite, run_solvers, solver_order
@@ -33,6 +34,7 @@ class LcpSolution:
     certificate: Certificate
 
 
+@takes(ContactProblemError)
 def solve_lcp(
     M: ArrayLike,
     q: ArrayLike,

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.contact.certificate import Certificate, certify, velocity_error
@@ -36,9 +37,10 @@ def solve_contact_kernel(
 ) -> int:
     """Solve one contact problem inside compiled code; return a ``SolveStatus`` value.
 
-    The modes of the answer are tried first. Unless their certificate is clean, the solvers in
-    ``order`` are called in turn until one is certified and clean; an answer that is certified
-    but not clean stands if those after it do no better, and does not count as a fallback.
+    The modes of the answer are tried first. Unless their answer is certified and contradicts none
+    of them, the solvers in ``order`` are called in turn until one is certified; if patient, until
+    one is clean, and an answer that is certified but not clean stands if those after it do no
+    better, and does not count as a fallback.
 
     Parameters
     ----------
@@ -114,6 +116,7 @@ def solver_order(solver: str | Solver, *, fallback: bool = True) -> Integers:
     return np.array([choice.code for choice in (first, *others)], np.int64)
 
 
+@takes(ContactProblemError)
 def solve_contact(
     delassus: ArrayLike,
     free: ArrayLike,
@@ -221,6 +224,7 @@ def run_solvers(
     work.settings.tolerance = tolerance
     work.settings.floor = np.ldexp(floor, offset_shift - matrix_shift // 2)
     work.settings.amendments = 0  # nobody has guessed the modes
+    work.settings.patient = 1
     work.settings.skewed = 0 if semidefinite else 1
     problem = ContactProblem.allocate(
         nc=count, count=count, delassus=matrix, free=offset, friction=friction,

@@ -76,6 +76,9 @@ class Settings(Bundle):
     amendments : int
         How often the modes of the answer are amended before a solver is asked; zero where they are
         no guess.
+    patient : int
+        Not zero if an answer that is certified, and not clean, is compared with those of all
+        solvers, as where contacts jam, and one that is a little sharper is quite another.
     skewed : int
         Not zero if the matrix may be asymmetric, as in a general complementarity problem.
     """
@@ -83,6 +86,7 @@ class Settings(Bundle):
     tolerance: float = cell(float)
     floor: float = cell(float)
     amendments: int = cell(int)
+    patient: int = cell(int)
     skewed: int = cell(int)
 
 
@@ -93,8 +97,10 @@ class Tally(Bundle):
     ----------
     iterations, solver, last_fallbacks : int
         Iterations of all solvers; code of the one that succeeded; how many failed before it.
-    solves, shortcuts, fallbacks, failures : int
-        ``shortcuts`` are the solves answered by the modes that were guessed.
+    solves, shortcuts, fallbacks, failures, combinations, relaxed : int
+        ``shortcuts`` are the solves answered by the modes that were guessed; ``combinations`` those
+        that went on to the last resort; ``relaxed`` those that ask for less than a problem without
+        a solution did, which the caller counts.
     """
 
     iterations: int = cell(int)
@@ -104,6 +110,8 @@ class Tally(Bundle):
     shortcuts: int = cell(int)
     fallbacks: int = cell(int)
     failures: int = cell(int)
+    combinations: int = cell(int)
+    relaxed: int = cell(int)
 
 
 class Yardstick(Bundle):

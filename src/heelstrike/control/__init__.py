@@ -7,6 +7,7 @@ from heelstrike.control.estimation import Estimated
 from heelstrike.control.gait_lqr.flat_law import FlatGaitLQR
 from heelstrike.control.gait_lqr.law import GaitLQR
 from heelstrike.control.joint_pd import Feedforward, JointPD
+from heelstrike.control.noise import RandomNumbers
 from heelstrike.control.preview import PreviewControl, preview_control
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import Program
@@ -16,8 +17,9 @@ from heelstrike.control.sensing import Encoders, FootSensors, InertialUnit, Sens
 from heelstrike.control.standing_lqr import StandingLQR
 from heelstrike.control.stepping_constraints import SteppingConstraints
 from heelstrike.control.virtual_constraints import VirtualConstraints
+from heelstrike.dynamics.dense import LinearEquations
 from heelstrike.sim.controller.law import ControllerFunction, Law, controller
-from heelstrike.sim.controller.robot import ControlledRobot, ControlState
+from heelstrike.sim.controller.robot import ControlledRobot, ControlState, controlled_robot
 
 __all__ = [
     "Actuated",
@@ -36,15 +38,18 @@ __all__ = [
     "InertialUnit",
     "JointPD",
     "Law",
+    "LinearEquations",
     "PreviewControl",
     "Program",
     "QuadraticSolution",
+    "RandomNumbers",
     "Sensed",
     "StandingLQR",
     "SteppingConstraints",
     "VirtualConstraints",
     "WholeBody",
     "ZeroMomentPointRegulation",
+    "controlled_robot",
     "controller",
     "preview_control",
     "solve_or_relax",

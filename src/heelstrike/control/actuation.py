@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
@@ -161,6 +162,7 @@ class Actuated(Around):
     [0.0, 0.0, 2.0, 2.0, 2.0]
     """
 
+    @takes(ControllerError)
     def __init__(
         self, controller: Controller, *, delay: float = 0.0, bandwidth: float | None = None,
         efficiency: float = 1.0, period: float | None = None,

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import refusal, shown
 from heelstrike.errors import ControllerError, GaitError
 from heelstrike.gait.gait import Gait
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import REAL, per_actuator
 
 Floats = NDArray[np.float64]
-
-INSTEAD = {
-    "Robot": "hs.load_robot(...) makes one",
-    "Gait": "hs.optimize_gait(robot, ...) or hs.load_gait(file, robot=robot) makes one",
-    "PhasedGait": "hs.PhasedGait.from_gait(robot, gait) makes one",
-    "StepFamily": "hs.StepFamily.around(phased_gait) makes one",
-    "Encoder": "hs.Encoder() makes one",
-}
-"""How to come by what is wanted."""
 
 
 def must_be(kind: type, name: str, value: object) -> None:
@@ -35,11 +26,7 @@ def must_be(kind: type, name: str, value: object) -> None:
         That says what is wanted, what was given, and what makes one.
     """
     if not isinstance(value, kind):
-        advice = f"; {INSTEAD[kind.__name__]}" if kind.__name__ in INSTEAD else ""
-        article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise ControllerError(
-            f"{name} must be {article} {kind.__name__}, got {_shown(value)}{advice}"
-        )
+        raise ControllerError(refusal(name, value, (kind.__name__,)))
 
 
 def check_gait(robot: Robot, gait: Gait) -> None:
@@ -79,7 +66,7 @@ def number_of(name: str, value: object) -> float:
         value.item() if isinstance(value, (np.ndarray, np.generic)) and value.size == 1 else value
     )
     if isinstance(found, bool) or not isinstance(found, Real):
-        raise ControllerError(f"{name} must be a number, got {_shown(value)}")
+        raise ControllerError(f"{name} must be a number, got {shown(value)}")
     return float(found)
 
 
@@ -110,7 +97,7 @@ def numbers_of(name: str, value: ArrayLike) -> Floats:
     except ValueError:  # rows of different lengths
         found = np.asarray(None)
     if found.dtype.kind not in REAL:
-        raise ControllerError(f"{name} must be numbers, got {_shown(value)}")
+        raise ControllerError(f"{name} must be numbers, got {shown(value)}")
     return found.astype(np.float64)
 
 
@@ -146,10 +133,3 @@ def weights_of(name: str, value: ArrayLike, size: int, *, positive: bool = False
     if positive and np.any(weights == 0.0):
         raise ControllerError(f"{name} must be positive, got {value!r}")
     return np.broadcast_to(weights, (size,)).copy()
-
-
-def _shown(value: Any) -> str:
-    """Write what was given, with its kind, in a line."""
-    text = repr(value)
-    short = text if len(text) <= 60 else f"{text[:57]}..."
-    return f"{short} ({type(value).__name__})"

@@ -257,7 +257,7 @@ class Composed(ControllerFunction):
 
     def __init__(self, shell: Shell, function: ControllerFunction, text: Any, scope: Any) -> None:
         self._made_of = shell, function
-        super().__init__(text, function.compiles, scope)
+        super().__init__(text, function.compiles, scope, function.endings)
         self.is_ours = function.is_ours
         self.partner = function.partner
 

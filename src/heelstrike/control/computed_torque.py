@@ -13,6 +13,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.arguments import check_gait, gains_of, must_be
@@ -163,6 +164,7 @@ class Encoder:
     resolution: float = 2.0 * np.pi / 2**22
 
     def __post_init__(self) -> None:
+        check_fields(self, ControllerError)
         if not 0.0 < self.period < np.inf:
             raise ControllerError(f"the encoder period must be positive, got {self.period}")
         if not 0.0 <= self.resolution < np.inf:

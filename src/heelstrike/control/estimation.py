@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
@@ -351,6 +352,7 @@ class Estimated(Around):
     forces read 1 or 0, choose a threshold below ``1 / robot.weight``.
     """
 
+    @takes(ControllerError)
     def __init__(
         self, controller: Controller, *, bandwidth: float = 8.0,
         threshold: float = 0.05, period: float | None = None,

@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import ControllerError
 from heelstrike.robot.model import Integers
@@ -32,9 +33,14 @@ def seeded(seed: int) -> list[int]:
     return [1 + one % (FIRST - 1), 1 + two % (SECOND - 1)]
 
 
+UNSEEDED = tuple(seeded(0))
+
+
 @kernel
 def uniform(seeds: Integers) -> float:
     """Draw a number between 0 and 1, neither of the two; `seeds` (2,) changes."""
+    if seeds[0] == 0:  # which no generator comes to
+        seeds[0], seeds[1] = UNSEEDED
     seeds[0] = 40014 * seeds[0] % FIRST
     seeds[1] = 40692 * seeds[1] % SECOND
     mixed = (seeds[0] - seeds[1]) % (FIRST - 1)
@@ -46,3 +52,55 @@ def normal(seeds: Integers) -> float:
     """Draw a number of the standard normal distribution (Box and Muller)."""
     radius = math.sqrt(-2.0 * math.log(uniform(seeds)))
     return radius * math.cos(2.0 * math.pi * uniform(seeds))
+
+
+class RandomNumbers(Bundle):
+    """A generator of random numbers, for the memory of a law.
+
+    Kept with the memory: a simulation that is restored draws what it would have drawn. All zeros,
+    as a memory begins, are the seed 0; others come from :meth:`seeded`.
+
+    Attributes
+    ----------
+    seeds : (2,) int
+        Its state.
+
+    Examples
+    --------
+    >>> from heelstrike.control import RandomNumbers
+    >>> RandomNumbers.seeded(1).uniform() == RandomNumbers.seeded(1).uniform()
+    True
+    """
+
+    seeds: Integers = array(2, of=int)
+
+    @classmethod
+    def seeded(cls, seed: int) -> RandomNumbers:
+        """Return a generator that begins with a seed.
+
+        Parameters
+        ----------
+        seed : int
+            A whole number from 0 on.
+
+        Returns
+        -------
+        RandomNumbers
+            The generator.
+
+        Raises
+        ------
+        ControllerError
+            If the seed is none.
+        """
+        return cls(seeds=np.array(seeded(seed)))
+
+    @kernel
+    def uniform(self) -> float:
+        """Draw a number between 0 and 1, neither of the two."""
+        return uniform(self.seeds)
+
+    @kernel
+    def normal(self) -> float:
+        """Draw a number of the standard normal distribution."""
+        return normal(self.seeds)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, cell, number
 from heelstrike.compiler.compilation import kernel
 from heelstrike.control.around import PERIOD, Around, Shell, Shown, inside
@@ -112,6 +113,7 @@ class FootSensors:
 
 def _check(sensor: object) -> None:
     """Refuse numbers that no sensor has."""
+    check_fields(sensor, ControllerError)
     for each in fields(sensor):  # type: ignore[arg-type]
         value, positive = getattr(sensor, each.name), each.name in ("rate", "cutoff")
         if value is None or isinstance(value, bool):
@@ -403,6 +405,7 @@ class Sensed(Around):
     True
     """
 
+    @takes(ControllerError)
     def __init__(
         self, controller: Controller, *, encoders: Encoders | None = None,
         imu: InertialUnit | None = None, feet: FootSensors | None = None,

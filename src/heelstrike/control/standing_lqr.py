@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import LinAlgError, null_space, solve_continuous_are, solve_discrete_are
 from scipy.signal import cont2discrete
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.contact import ContactInverseDynamics, contact_inverse_dynamics, contact_kinematics
 from heelstrike.control.arguments import must_be, numbers_of, positive, weights_of
@@ -221,6 +222,7 @@ class StandingLQR(Law):
     (True, True)
     """
 
+    @takes(ControllerError)
     def __init__(
         self,
         robot: Robot,

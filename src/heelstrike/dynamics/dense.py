@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Integers
 
@@ -158,6 +159,41 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
             total -= system[k, j] * unknown[column[j]]
         unknown[column[k]] = total / system[k, k]
     return rank
+
+
+class LinearEquations(Bundle):
+    """Equations A x = b in a few unknowns, for the memory of a law.
+
+    Attributes
+    ----------
+    system : (unknowns, unknowns + 1) float
+        A, and b in the last column. Solving uses them up.
+    x : (unknowns,) float
+        The answer.
+    order : (unknowns,) int
+        Scratch.
+
+    Examples
+    --------
+    >>> from heelstrike.control import LinearEquations
+    >>> equations = LinearEquations.allocate(unknowns=2)
+    >>> equations.system[:] = [[2.0, 1.0, 3.0], [1.0, 3.0, 4.0]]
+    >>> equations.solve(), equations.x
+    (2, array([1., 1.]))
+    """
+
+    system: Floats = array("unknowns", "unknowns + 1")
+    x: Floats = array("unknowns")
+    order: Integers = array("unknowns", of=int)
+
+    @kernel
+    def solve(self) -> int:
+        """Write the answer into `x`, by complete pivoting; return the rank of A.
+
+        If it is less than the number of unknowns, those that are left free are zero, and the
+        equations may contradict each other.
+        """
+        return solve_to_rank(self.x.shape[0], self.system, self.order, self.x)
 
 
 @kernel

@@ -21,12 +21,13 @@ from heelstrike.analysis import (
 )
 from heelstrike.analysis.intervals import IMPULSIVE, impulses_in_events
 from heelstrike.analysis.summary import plain
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.interruption import acknowledge
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, simulate
-from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.closed_sets import OnError, RunStatus
 from heelstrike.sim.method import Method
 
 if TYPE_CHECKING:
@@ -172,6 +173,7 @@ ALONE = {
 """Members of a difference and their headings: how runs lie apart, and what each is by itself."""
 
 
+@takes(SimulationError)
 def compare(
     robot: Robot,
     controller: Controller | None = None,
@@ -183,12 +185,13 @@ def compare(
     reference: str | None = None,
     control_period: float | None = None,
     pushes: Sequence[Push] = (),
+    on_error: OnError | str = OnError.WARN,
 ) -> Comparison:
     """Simulate the same thing by several methods and tell how far their answers differ.
 
     Parameters
     ----------
-    robot, controller, state, duration, ground, control_period, pushes
+    robot, controller, state, duration, ground, control_period, pushes, on_error
         As in :func:`heelstrike.simulate`.
     methods : sequence of Method, or mapping of names to them
         Ways through time; a sequence is named after their classes and options.
@@ -232,6 +235,7 @@ def compare(
                 ground=ground,
                 control_period=control_period,
                 pushes=pushes,
+                on_error=on_error,
             )
         except SimulationError as error:
             if name == first:

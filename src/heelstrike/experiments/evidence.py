@@ -10,11 +10,12 @@ import numpy as np
 
 from heelstrike.contact.ground import Ground
 from heelstrike.control import ComputedTorque, Encoder
+from heelstrike.experiments.laws import Entry, walking
 from heelstrike.experiments.refinement import Convergence, RefinedWalk, converge, refine
 from heelstrike.experiments.walk import design, walk
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State, load_robot
-from heelstrike.sim import Controller, Run, TimeStepping, simulate
+from heelstrike.sim import Run, TimeStepping, simulate
 from heelstrike.sim.whole_run import whole
 
 FRICTION = 0.75
@@ -83,12 +84,14 @@ def gather(progress: Callable[[str, float], None]) -> Evidence:
     ground = Ground(friction=FRICTION)
     method = TimeStepping(step=TIME_STEP)
     sampled = TimeStepping(step=ENCODER.period)
-    estimating = ComputedTorque(robot, gait, encoder=ENCODER)
+    estimating = walking(
+        "by encoders", lambda robot, gait: ComputedTorque(robot, gait, encoder=ENCODER)
+    )
 
-    def stroll(doing: str, method: TimeStepping, controller: Controller | None = None) -> Run:
+    def stroll(doing: str, method: TimeStepping, law: Entry | None = None) -> Run:
         return whole(
             walk(
-                robot, gait, steps=STEPS, controller=controller, method=method, ground=ground,
+                robot, gait, steps=STEPS, law=law, method=method, ground=ground,
                 progress=partial(progress, doing),
             )
         )  # fmt: skip

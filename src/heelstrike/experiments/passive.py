@@ -34,6 +34,9 @@ KNEED = (
 """The same of the kneed walker, from 2 to 6.5 degrees, to 5e-3. On milder slopes no walk was found;
 beyond 6.1 degrees the one that repeats is not stable."""
 
+USUAL_SLOPES = {"compass_gait": -3.0, "kneed_walker": -3.0, "rimless_wheel": -8.0}
+"""Slopes (degrees) on which walkers of the library have a walk that repeats and is stable."""
+
 HALF_SPOKE = np.pi / 8.0
 """Half the angle between two spokes of the rimless wheel, in rad."""
 
@@ -70,15 +73,23 @@ def passive_walk(robot: Robot, ground: Ground) -> LimitCycle:
     if ground.profile is not None or not descent > 0.0:
         raise LimitCycleError(
             f"robot {robot.name!r} has no motors and walks down a slope only: give it ground that "
-            "descends, Ground(slope=-0.05), or --ground slope:-3 on the command line."
+            f"descends along +x, {_ground_for(robot)}."
         )
+    friction = float(ground.model().friction.min())
     try:
         return find_limit_cycle(robot, start(robot, descent), ground=ground, method=METHOD)
     except LimitCycleError as error:
         raise LimitCycleError(
             f"no walk of {robot.name!r} was found that repeats on a slope of "
-            f"-{np.rad2deg(descent):.4g} degrees; another slope may do: {error}"
+            f"-{np.rad2deg(descent):.4g} degrees with friction {friction:g}: "
+            f"{str(error).rstrip('.')}. There is one on {_ground_for(robot)}, with friction 0.75."
         ) from error
+
+
+def _ground_for(robot: Robot) -> str:
+    """Ground on which a walker of the library walks, for Python and for the command line."""
+    degrees = USUAL_SLOPES[robot.name]
+    return f"Ground(slope={np.deg2rad(degrees):.3g}), or --ground slope:{degrees:g}"
 
 
 def _compass_gait(robot: Robot, descent: float) -> State:

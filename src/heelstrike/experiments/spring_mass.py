@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from heelstrike.arguments import check_fields
 from heelstrike.errors import LimitCycleError, SimulationError
 
 Floats = NDArray[np.float64]
@@ -92,6 +93,7 @@ class SpringMass:
     gravity: float = 9.81
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         for name, value in vars(self).items():
             if not (np.isfinite(value) and value > 0.0):
                 raise SimulationError(

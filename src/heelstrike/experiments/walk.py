@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,11 @@ from heelstrike.errors import GaitError, SimulationError
 from heelstrike.gait import Gait, optimize_gait
 from heelstrike.robot import Robot, State
 from heelstrike.sim import Controller, Push, Run, simulate
+from heelstrike.sim.controller.law import Law
 from heelstrike.sim.method import Method
+
+if TYPE_CHECKING:  # which are made of what is here
+    from heelstrike.experiments.laws import Entry
 
 HEIGHT = 1.044
 """Height of bravo7's centre of mass above its soles, in m."""
@@ -144,22 +149,47 @@ class Beginning:
 
     state: State
     step_duration: float
-    controller: Controller | None
+    controller: Controller | Law | None
 
 
-def beginning(robot: Robot, walked: Gait | LimitCycle, ground: Ground | None = None) -> Beginning:
-    """Put a robot on a ground as its gait begins, under computed torque, or on its limit cycle.
+def beginning(
+    robot: Robot,
+    walked: Gait | LimitCycle | None,
+    ground: Ground | None = None,
+    law: Entry | None = None,
+) -> Beginning:
+    """Put a robot on a ground as its gait begins, or on its limit cycle.
 
     Where the ground slopes at the start, the whole robot is turned with it about the middle of its
     stance foot, so that its feet lie on the ground as they do on the level; see also
-    :meth:`heelstrike.Robot.placed`.
+    :meth:`heelstrike.Robot.placed`. A robot that stands does so as it can there.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    walked : Gait, LimitCycle or None
+        Its gait, or its walk without motors; None of a law that makes it stand.
+    ground : Ground, optional
+        The ground; level by default.
+    law : Entry, optional
+        What moves the joints; computed torque by default.
     """
     if isinstance(walked, LimitCycle):
         return Beginning(walked.state, walked.period, None)
-    state = walked.initial_state
+    if law is None:
+        assert walked is not None
+        state, duration = walked.initial_state, walked.step_duration
+        controller: Controller | Law | None = ComputedTorque(robot, walked)
+    else:
+        trial = law.trial(robot, walked)
+        state, duration, controller = trial.state, trial.step_duration, trial.controller
     if ground is not None and np.any(ground.model().vertices[:, 1]):
-        state = robot.placed(_turned(robot, state, _slope_at(ground, 0.0)), ground)
-    return Beginning(state, walked.step_duration, ComputedTorque(robot, walked))
+        if law is not None and law.stands:
+            state = robot.standing(ground)
+        else:
+            state = robot.placed(_turned(robot, state, _slope_at(ground, 0.0)), ground)
+    return Beginning(state, duration, controller)
 
 
 def _slope_at(ground: Ground, x: float) -> float:
@@ -183,10 +213,10 @@ def _turned(robot: Robot, state: State, slope: float) -> State:
 
 def walk(
     robot: Robot,
-    walked: Gait | LimitCycle,
+    walked: Gait | LimitCycle | None,
     *,
     steps: int = 20,
-    controller: Controller | None = None,
+    law: Entry | None = None,
     method: Method | None = None,
     ground: Ground | None = None,
     pushes: Sequence[Push] = (),
@@ -198,11 +228,11 @@ def walk(
     ----------
     robot : Robot
         The robot.
-    walked : Gait or LimitCycle
-        Its gait, or its walk without motors.
+    walked : Gait, LimitCycle or None
+        Its gait, or its walk without motors; None of a law that makes it stand.
     steps : int
         Steps to walk. The run goes on for a tenth of a step after the time they should take.
-    controller : Controller, optional
+    law : Entry, optional
         What moves the joints; by default computed torque with its usual gains, nothing on a limit
         cycle.
     method : Method, optional
@@ -221,7 +251,7 @@ def walk(
     """
     if steps < 1:
         raise SimulationError(f"a walk has at least one step, got {steps}")
-    start = beginning(robot, walked, ground)
+    start = beginning(robot, walked, ground, law)
     duration = (steps + LAST_STEP) * start.step_duration
 
     def report(time: float) -> None:
@@ -230,7 +260,7 @@ def walk(
 
     return simulate(
         robot,
-        start.controller if controller is None else controller,
+        start.controller,
         state=start.state,
         duration=duration,
         method=method,
@@ -240,7 +270,7 @@ def walk(
     )
 
 
-def steps_taken(run: Run, walked: Gait | LimitCycle) -> int:
+def steps_taken(run: Run, walked: Gait | LimitCycle | None) -> int:
     """Count the steps of a walk; on a limit cycle by the distance.
 
     A wheel lands on one spoke after the other, and all of them are one foot; and a walker that

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol, Unpack
@@ -12,19 +12,26 @@ import numpy as np
 
 from heelstrike.analysis.limit_cycle import LimitCycle
 from heelstrike.contact.ground import Ground
-from heelstrike.control import ComputedTorque, Encoder
-from heelstrike.errors import GaitError
-from heelstrike.experiments.passive import passive_walk
+from heelstrike.errors import GaitError, HeelstrikeError
+from heelstrike.experiments.laws import (
+    Entry,
+    check_law,
+    gait_for,
+    law_called,
+    law_that_steps,
+    laws_of,
+)
+from heelstrike.experiments.passive import USUAL_SLOPES, passive_walk
 from heelstrike.experiments.walk import beginning, design, typical_step
 from heelstrike.gait import Gait, load_gait
-from heelstrike.robot import Robot, builtin_robots, load_robot
+from heelstrike.robot import Robot, State, builtin_robots, load_robot
 from heelstrike.robot.files.options import LoadOptions
-from heelstrike.sim import Controller, Simulation
+from heelstrike.sim import Simulation
 from heelstrike.sim.method import Method
 from heelstrike.view.live.stage import Control, Stage, friction_control
 
 DESIGNED, CYCLE = "designed for the speed", "limit cycle"
-EXACT, ENCODERS, NOTHING = "computed torque", "computed torque by encoders", "no torque"
+NOTHING = "no torque"
 MILLISECONDS = " ms"
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Steps that are offered, in ms."""
@@ -57,8 +64,11 @@ class First:
         Name of the method; the usual one by default.
     step : float
         In s.
-    gait : str or path, optional
-        A saved gait of the robot, offered beside the designed one.
+    gait : path, or sequence of these, optional
+        Saved gaits of the robots, offered beside the designed ones; the first is walked.
+    laws : sequence of Entry
+        Laws offered beside those that have a name; the first moves the joints. By default that is
+        the law that steps where balance needs it, where a robot can have it, or computed torque.
     friction : float
         For which gaits are designed, too.
     slope : float, optional
@@ -73,7 +83,8 @@ class First:
 
     method: str | None = None
     step: float = 1e-3
-    gait: str | os.PathLike[str] | None = None
+    gait: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | None = None
+    laws: Sequence[Entry] = ()
     friction: float = 0.75
     slope: float | None = None
     roughness: float = 0.0
@@ -86,8 +97,8 @@ class WalkStage(Stage):
 
     Parameters
     ----------
-    robot : str or path
-        Name or file of the robot at first; the built-in ones are offered, too.
+    robot : path, or sequence of these
+        Names or files of robots, the first at first; the built-in ones are offered, too.
     methods : callable
         Makes the method of a name and a step (s), for robots with motors or without.
     method_names : sequence of str
@@ -95,19 +106,33 @@ class WalkStage(Stage):
     first : First, optional
         What is chosen at first.
     **how
-        How the robot's file is read, as for :func:`heelstrike.load_robot`.
+        How the robots' files are read, as for :func:`heelstrike.load_robot`.
+
+    Raises
+    ------
+    HeelstrikeError
+        If a robot or gait cannot be loaded, or a gait belongs to none of the robots, or a law can
+        drive none of them.
     """
 
     def __init__(
         self,
-        robot: str | os.PathLike[str],
+        robot: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
         methods: Methods,
         method_names: tuple[str, ...],
         first: First | None = None,
         **how: Unpack[LoadOptions],
     ) -> None:
-        self._name, self._first = str(robot), First() if first is None else first
-        self._robots = {self._name: load_robot(robot, **how)}
+        self._first = First() if first is None else first
+        self._robots = {
+            str(each): load_robot(each, **({} if str(each) in builtin_robots() else how))
+            for each in _several(robot)
+        }
+        self._asked = tuple(self._robots)
+        self._name = self._asked[0]
+        for law in self._first.laws:
+            if all(law.needs(each) for each in self._robots.values()):
+                check_law(law, self._robots[self._name])
         self._methods, self._method_names = methods, method_names
         self._gaits: dict[tuple[Any, ...], Gait | LimitCycle] = {}
         robot_at_first = self._robots[self._name]
@@ -116,30 +141,34 @@ class WalkStage(Stage):
                 f"{robot_at_first.name} has no motors, and without them no walk repeats on rough "
                 "ground: choose a flat or sloping one"
             )
-        gait = self._first.gait
-        self._saved = "" if gait is None else Path(gait).name
-        if gait is not None:
-            self._gaits[self._name, self._saved] = load_gait(gait, robot_at_first)
+        self._saved: dict[str, list[str]] = {}  # names of gaits, by robots
+        for path in _several(self._first.gait):
+            self._open(path)
 
     def controls(self, values: Mapping[str, Any]) -> tuple[Control, ...]:
         """Robot, gait, controller, speed, ground, method and step."""
         name = values.get("robot", self._name)
         robot = self._robot(name)
-        names = tuple(dict.fromkeys((self._name, *builtin_robots())))
+        names = tuple(dict.fromkeys((*self._asked, *builtin_robots())))
         passive = robot.nu == 0
         found = [Control("robot", "robot", name, names, resets=_OF_ROBOT)]
         if passive:
             found.append(Control("gait", "gait", CYCLE, (CYCLE,)))
         else:
-            gaits = (self._saved, DESIGNED) if (name, self._saved) in self._gaits else (DESIGNED,)
-            found.append(Control("gait", "gait", gaits[0], gaits))
-            drives = (EXACT, ENCODERS, NOTHING)
-            found.append(Control("controller", "controller", EXACT, drives))
-            if values.get("gait", gaits[0]) == DESIGNED:
+            gaits = (*self._saved.get(name, ()), DESIGNED)
+            gait = values.get("gait", gaits[0])
+            laws = self._laws(robot)
+            usual_law = self._usual_law(robot, self._gaits.get((name, gait)))
+            law = laws.get(values.get("controller", usual_law))
+            if law is None or not law.stands:
+                found.append(Control("gait", "gait", gaits[0], gaits))
+            found.append(Control("controller", "controller", usual_law, (*laws, NOTHING)))
+            own = law is not None and (law.stands or law.bent_knees)
+            if gait == DESIGNED and not own:
                 found.append(_speed_control(robot))
         found.append(friction_control(self._first.friction))
         if self._first.ground is None:
-            found += self._shape_controls(passive)
+            found += self._shape_controls(robot)
         usual = "event-driven" if passive else self._method_names[0]
         asked = self._first.method if name == self._name else None
         found.append(Control("method", "method", asked or usual, self._method_names))
@@ -149,17 +178,28 @@ class WalkStage(Stage):
         """Put the robot on its ground as its gait begins."""
         robot = self._robot(values["robot"])
         ground = self.ground(values)
-        walked = self._walked(robot, values, ground, progress)
-        start = beginning(robot, walked, ground)
+        law = self._laws(robot).get(values.get("controller", NOTHING))
+        walked = self._walked(robot, law, values, ground, progress)
+        start = beginning(robot, walked, ground, law)
         step = 1e-3 * float(values["step"].removesuffix(MILLISECONDS))
-        controller = start.controller if robot.nu == 0 else self._controller(robot, walked, values)
         return Simulation(
             robot,
-            controller,
+            None if law is None else start.controller,
             state=start.state,
             method=self._methods(values["method"], step, passive=robot.nu == 0),
             ground=ground,
         )
+
+    def outline(self, values: Mapping[str, Any]) -> tuple[Robot, State, Ground]:
+        """Put the robot where its walk will begin; it stands as long as no gait is known."""
+        robot, ground = self._robot(values["robot"]), self.ground(values)
+        saved = self._gaits.get((values["robot"], values.get("gait")))
+        try:
+            if isinstance(saved, Gait):
+                return robot, beginning(robot, saved, ground).state, ground
+            return robot, robot.standing(ground), ground
+        except HeelstrikeError:  # of what cannot stand the picture is no less
+            return robot, robot.reference_state(), ground
 
     def ground(self, values: Mapping[str, Any], simulation: Simulation | None = None) -> Ground:  # noqa: ARG002
         """Make the ground of a slope, a roughness and a friction."""
@@ -184,10 +224,39 @@ class WalkStage(Stage):
             self._robots[name] = load_robot(name)
         return self._robots[name]
 
-    def _shape_controls(self, passive: bool) -> list[Control]:
-        slope = self._first.slope
+    def _open(self, path: str | os.PathLike[str]) -> None:
+        """Load a gait, of whichever robot that was named it is."""
+        refused: list[GaitError] = []
+        for name, robot in self._robots.items():
+            try:
+                gait = load_gait(path, robot)
+            except GaitError as error:
+                refused.append(error)
+                continue
+            saved = self._saved.setdefault(name, [])
+            called = Path(path).name if Path(path).name not in saved else str(path)
+            saved.append(called)
+            self._gaits[name, called] = gait
+        if len(refused) == len(self._robots):
+            raise refused[0]
+
+    def _laws(self, robot: Robot) -> dict[str, Entry]:
+        """Laws that are offered for a robot, those first that were asked for."""
+        asked = [law for law in self._first.laws if not law.needs(robot)]
+        return {law.name: law for law in (*asked, *laws_of(robot))}
+
+    def _usual_law(self, robot: Robot, gait: Gait | LimitCycle | None) -> str:
+        """Name of the law that moves the joints of a robot at first."""
+        on_points = isinstance(gait, Gait) and bool(gait.point_feet)
+        steps = None if on_points else law_that_steps(robot)
+        usual = steps or law_called("ComputedTorque")
+        asked = [law for law in self._first.laws if not law.needs(robot)]
+        return (asked[0] if asked else usual).name
+
+    def _shape_controls(self, robot: Robot) -> list[Control]:
+        slope, passive = self._first.slope, robot.nu == 0
         if slope is None:
-            slope = DESCENT if passive else 0.0
+            slope = USUAL_SLOPES.get(robot.name, DESCENT) if passive else 0.0
         steepest = max(STEEPEST, abs(slope))
         shapes = [
             Control("slope", "slope", slope, low=-steepest, high=steepest, step=0.5, unit="°")
@@ -208,17 +277,26 @@ class WalkStage(Stage):
     def _walked(
         self,
         robot: Robot,
+        law: Entry | None,
         values: Mapping[str, Any],
         ground: Ground,
         progress: Callable[[str], None],
-    ) -> Gait | LimitCycle:
-        """Return the gait of some choices, designed once."""
+    ) -> Gait | LimitCycle | None:
+        """Return the gait of some choices, designed once; None of a robot that stands."""
+        if law is not None and law.stands:
+            return None
         if values["gait"] == CYCLE:
             progress("looking for a walk that repeats")
             return passive_walk(robot, ground)
         name = values["robot"]
         if values["gait"] != DESIGNED:
             return self._gaits[name, values["gait"]]
+        if law is not None and law.bent_knees:
+            key: tuple[Any, ...] = (name, DESIGNED, law.bent_knees)
+            if key not in self._gaits:
+                progress("designing a gait with bent knees")
+                self._gaits[key] = gait_for(robot)
+            return self._gaits[key]
         speed = values["speed"]
         key = (name, DESIGNED, speed)
         if key not in self._gaits:
@@ -234,18 +312,17 @@ class WalkStage(Stage):
             )
         return self._gaits[key]
 
-    def _controller(
-        self, robot: Robot, walked: Gait | LimitCycle, values: Mapping[str, Any]
-    ) -> Controller | None:
-        assert isinstance(walked, Gait)
-        if values["controller"] == NOTHING:
-            return None
-        encoder = Encoder() if values["controller"] == ENCODERS else None
-        return ComputedTorque(robot, walked, encoder=encoder)
-
 
 _OF_ROBOT = ("gait", "controller", "speed", "slope", "roughness", "method")
 """Controls whose first value depends on the robot."""
+
+
+def _several(
+    given: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] | None,
+) -> Sequence[str | os.PathLike[str]]:
+    if given is None:
+        return ()
+    return (given,) if isinstance(given, str | os.PathLike) else given
 
 
 def _speed_control(robot: Robot) -> Control:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, WriteError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Footing, Gait, Phase, fingerprint
@@ -77,6 +78,7 @@ def _of_phase(phase: Phase) -> dict[str, Any]:
     return entries
 
 
+@takes(GaitError)
 def load_gait(path: str | PathLike[str], robot: Robot | None = None) -> Gait:
     """Read a gait that :meth:`Gait.save` wrote.
 

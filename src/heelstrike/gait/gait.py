@@ -12,6 +12,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import takes
 from heelstrike.errors import GaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
@@ -400,6 +401,7 @@ class Gait:
         result: Floats = np.where(odd, self.mirrored(value, order=order), value)
         return result
 
+    @takes(GaitError)
     def save(self, path: str | PathLike[str]) -> None:
         """Write the gait to a readable JSON file; :func:`load_gait` reads it back unchanged.
 

@@ -6,13 +6,16 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 
-from heelstrike.errors import InfeasibleGaitError
+from heelstrike.arguments import takes
+from heelstrike.errors import GaitError, InfeasibleGaitError
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.gait import Gait
+from heelstrike.gait.kept_gait import KeptGait
 from heelstrike.gait.request import JointRanges, Request
 from heelstrike.robot.robot import Robot
 
 
+@takes(GaitError)
 def optimize_gait(
     robot: Robot,
     *,
@@ -51,6 +54,9 @@ def optimize_gait(
     follow piecewise polynomials of degree 5, which satisfy the equation of motion that no motor
     enters at the Gauss points of every interval (direct collocation). Controllers that follow such
     a gait in time need not be stable.
+
+    A gait that this machine has designed before is read from the user's cache folder, with the same
+    numbers; ``HEELSTRIKE_KEEP_GAITS=0`` in the environment designs it again.
 
     Parameters
     ----------
@@ -118,6 +124,11 @@ def optimize_gait(
     asked = dict(locals())  # all arguments, by name
     del asked["progress"]
     request = Request(**asked)
+    kept = KeptGait(request)
+    if (gait := kept.load()) is not None:
+        if progress is not None:
+            progress(1.0)
+        return gait
     # CasADi is loaded only now: importing heelstrike, or loading a saved gait, does without it.
     from heelstrike.gait.design import designed
     from heelstrike.gait.transcription import Transcription
@@ -135,5 +146,5 @@ def optimize_gait(
     *others, last = request.profiles
     for profile in others:
         with suppress(InfeasibleGaitError):  # the last profile asks least of the swing foot
-            return designed(transcription, profile, report)
-    return designed(transcription, last, report)
+            return kept.save(designed(transcription, profile, report))
+    return kept.save(designed(transcription, last, report))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,6 +21,9 @@ LARGEST_NUMBER = 1e10
 
 UNLIKELY = "numbers that are unlikely"
 DIFFERENT = "left and right differ"
+SINGULAR = 1e-12
+"""Smallest eigenvalue of a mass matrix, of diagonal 1, up to which it is singular: rounding."""
+SHARE = 0.1  # of a motion without mass, from which a joint is named
 SHOWN = 6  # how many findings a message lists before it counts the rest
 
 
@@ -57,7 +61,7 @@ def assembled(
     Raises
     ------
     RobotError
-        If a number is NaN or absurdly large, a joint moves no mass, or a motor never turns.
+        If a number is NaN or absurdly large, joints move no mass, or a motor never turns.
 
     Warns
     -----
@@ -69,7 +73,7 @@ def assembled(
     if average:
         model = averaged(model, joint_names, link_names, source)
     origin = link_origins(model)
-    _refuse_joints_without_inertia(model, origin, joint_names, source)
+    _refuse_joints_without_inertia(model, joint_names, source)
     _refuse_motors_without_speed(model, joint_names, source)
     unlikely = [one.message for one in unlikely_numbers(model, origin, joint_names, link_names)]
     if unlikely:
@@ -167,27 +171,65 @@ def _refuse_impossible_numbers(model: Model, source: str) -> None:
             )
 
 
-def _refuse_joints_without_inertia(
-    model: Model, origin: Floats, joint_names: tuple[str, ...], source: str
-) -> None:
-    """Refuse a joint whose acceleration no mass resists: its equation of motion says 0 = 0."""
-    resistance = model.armature.copy()
-    for link in range(len(model.parent)):
-        center = origin[link] + model.center_of_mass[link]
-        joint = link
-        while joint >= 0:
-            if model.axis[joint, 0]:
-                arm = center - origin[joint]
-                resistance[joint] += model.inertia[link] + model.mass[link] * (arm @ arm)
-            else:
-                resistance[joint] += model.mass[link]
-            joint = int(model.parent[joint])
+def _refuse_joints_without_inertia(model: Model, joint_names: tuple[str, ...], source: str) -> None:
+    """Refuse joints whose acceleration no mass resists: their equations of motion say 0 = 0.
+
+    Such are joints that move no mass, and joints in a row that move it in the same way, as two
+    hinges at one place with a massless link between them: the mass matrix is singular.
+    """
+    resistance = _mass_matrix(model, np.zeros(model.nj)).diagonal()
     idle = np.flatnonzero(~(resistance > 0.0))
     if len(idle):
         raise RobotError(
             f"{source}: joint {joint_names[idle[0]]!r} moves no mass and has no armature, so that "
-            "nothing resists it. Give the link that it moves a mass and a moment of inertia."
+            "nothing resists it. Give the link that it moves a mass and a moment of inertia, or "
+            "make it a fixed joint."
         )
+    floats = list(model.parent[:3]) == [-1, 0, 1]
+    if np.all(model.inertia[2 * floats :] > 0.0):
+        return
+    matrix = _mass_matrix(model, 1.0 + np.sqrt(np.arange(model.nj)))  # in line by no chance
+    scale = np.sqrt(np.maximum(matrix.diagonal(), resistance))
+    least, motions = np.linalg.eigh(matrix / np.outer(scale, scale))
+    if least[0] <= SINGULAR:
+        free = np.flatnonzero(np.abs(motions[:, 0]) > SHARE)
+        raise RobotError(
+            f"{source}: joints {' and '.join(repr(joint_names[joint]) for joint in free)} can move "
+            "together without moving any mass, so that nothing resists that. Give the link between "
+            "them a mass and a moment of inertia, or one of them an armature, or make one a fixed "
+            "joint."
+        )
+
+
+def _mass_matrix(model: Model, position: Floats) -> Floats:
+    """Mass matrix (nv, nv) with the hinges at angles from the reference, the slides at it."""
+    count = model.nj
+    turn, place = np.zeros(count), np.zeros((count, 2))
+    moved = np.zeros((count, count), dtype=bool)  # by which joints each link is moved
+    motion = np.zeros((count, 3, count))  # of the links' centres of mass: rotation, x, z
+    slide = np.zeros((count, 2))
+    for link, parent in enumerate(model.parent):
+        above = turn[parent] if parent >= 0 else 0.0
+        base = place[parent] if parent >= 0 else np.zeros(2)
+        moved[link] = moved[parent] if parent >= 0 else False
+        moved[link, link] = True
+        place[link] = base + _turned(model.offset[link], above)
+        slide[link] = _turned(model.axis[link, 1:], above)
+        turn[link] = above + model.axis[link, 0] * position[link]
+        arm = place[link] + _turned(model.center_of_mass[link], turn[link]) - place
+        sense = model.axis[:, 0]
+        every = np.array([sense, sense * arm[:, 1] + slide[:, 0], slide[:, 1] - sense * arm[:, 0]])
+        motion[link] = np.where(moved[link], every, 0.0)
+    weight = np.sqrt(np.stack([model.inertia, model.mass, model.mass], axis=1))
+    weighted = (weight[:, :, None] * motion).reshape(3 * count, count)
+    matrix: Floats = weighted.T @ weighted + np.diag(model.armature)
+    return matrix
+
+
+def _turned(vector: Floats, angle: float) -> Floats:
+    """Turn (x, z) about +y."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([c * vector[0] + s * vector[1], c * vector[1] - s * vector[0]])
 
 
 def _refuse_motors_without_speed(model: Model, joint_names: tuple[str, ...], source: str) -> None:

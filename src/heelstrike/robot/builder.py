@@ -9,6 +9,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import assembled
 from heelstrike.robot.contact_points import ContactPoint, in_order, of_model
@@ -65,6 +66,7 @@ class RobotBuilder:
     Robot('biped': 7 coordinates, 4 actuators, 4 contact points, 26 kg)
     """
 
+    @takes(RobotError)
     def __init__(self, name: str, *, gravity: float = 9.81) -> None:
         self.name = name
         self._gravity = _number("gravity", gravity)

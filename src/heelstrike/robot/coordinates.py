@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heelstrike.arguments import refusal
 from heelstrike.errors import RobotError
 from heelstrike.robot.model import Floats
 from heelstrike.robot.state import State
@@ -52,8 +53,10 @@ def checked(robot: Robot, state: State) -> State:
     Raises
     ------
     RobotError
-        If it has not nq positions and nv velocities, all finite.
+        If it is none, or has not nq positions and nv velocities, all finite.
     """
+    if not isinstance(state, State):
+        raise RobotError(refusal("state", state, ["State"]))
     for what, vector, size in (("q", state.q, robot.nq), ("v", state.v, robot.nv)):
         if vector.shape != (size,) or not np.all(np.isfinite(vector)):
             raise RobotError(

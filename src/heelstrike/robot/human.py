@@ -6,6 +6,7 @@ import enum
 import math
 from typing import NamedTuple
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.robot.builder import RobotBuilder
 from heelstrike.robot.robot import Robot
@@ -51,6 +52,7 @@ _TORQUE = 4.0  # N m a kilogram of body mass
 _LIMITS = {"hip": (-90.0, 90.0), "knee": (-10.0, 130.0), "ankle": (-60.0, 60.0)}  # degrees
 
 
+@takes(RobotError)
 def human(
     mass: float = 75.0, height: float = 1.8, *, table: BodyTable | str = BodyTable.WINTER
 ) -> Robot:

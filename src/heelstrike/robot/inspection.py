@@ -12,6 +12,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.robot.assembly import DIFFERENT, UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
@@ -81,6 +82,7 @@ class Inspection:
         return self.text()
 
 
+@takes(RobotError)
 def inspect_robot(robot: Robot | str | os.PathLike[str], **how: Unpack[LoadOptions]) -> Inspection:
     """Look at a robot for what has fooled others.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
 from heelstrike.robot.model import Model
@@ -219,6 +220,7 @@ class Robot:
         """
         return index_of(self, "actuator", self.actuator_names, actuator)
 
+    @takes(RobotError)
     def state(
         self,
         position: Mapping[str | int, float] | None = None,
@@ -322,6 +324,7 @@ class Robot:
             )
         return self.mirror.state(state)
 
+    @takes(RobotError)
     def perturbed(
         self,
         state: State,
@@ -403,6 +406,7 @@ class Robot:
 
         return placed(self, state, ground)
 
+    @takes(RobotError)
     def standing(self, ground: Ground) -> State:
         """Return a state at rest in which the robot stands on the ground, its soles on it.
 
@@ -475,6 +479,7 @@ class Robot:
 
         return closed(self, state, keep)
 
+    @takes(RobotError)
     def save_state(self, state: State, path: str | os.PathLike[str]) -> Path:
         """Write a state to a JSON file, with the names of the joints; return its path.
 
@@ -499,6 +504,7 @@ class Robot:
 
         return save_state(self, state, path)
 
+    @takes(RobotError)
     def load_state(self, path: str | os.PathLike[str]) -> State:
         """Read a state from a file of :meth:`save_state`, bit by bit the one that was saved.
 
@@ -523,6 +529,7 @@ class Robot:
 
         return load_state(self, path)
 
+    @takes(RobotError)
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the robot to a file: MJCF (``.xml``) holds all of it, URDF and SDF most.
 

@@ -72,3 +72,17 @@ def soles(robot: Robot) -> tuple[Sole, ...]:
         One a foot.
     """
     return tuple(sole(robot, foot) for foot in robot.feet)
+
+
+def has_length(robot: Robot, sole: Sole) -> bool:
+    """Whether a foot can stand on a sole: it is neither a point nor a wheel."""
+    around = are_around(robot.model.contact_position[list(sole.foot.contacts)])
+    return sole.toe > sole.heel and not around
+
+
+def are_around(points: Floats) -> bool:
+    """Whether points lie on all sides of the joint, as those of a wheel: no half-plane is free."""
+    if len(points) < 3:
+        return False
+    angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
+    return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)

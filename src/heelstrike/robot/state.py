@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.arguments import are_numbers, refusal
+from heelstrike.errors import RobotError
+
 
 @dataclass(frozen=True)
 class State:
@@ -24,5 +27,8 @@ class State:
     v: NDArray[np.float64]
 
     def __post_init__(self) -> None:
+        for name in ("q", "v"):
+            if not are_numbers(value := getattr(self, name)):
+                raise RobotError(refusal(name, value, ["ArrayLike"]))
         object.__setattr__(self, "q", np.array(self.q, dtype=np.float64))
         object.__setattr__(self, "v", np.array(self.v, dtype=np.float64))

@@ -10,12 +10,12 @@ class RobotWarning(UserWarning):
     """A robot was loaded, but not everything its file says is simulated, or it looks wrong."""
 
 
-def warn(message: str) -> None:
-    """Issue a `RobotWarning` that points at the caller's line, outside this package."""
+def warn(message: str, category: type[Warning] = RobotWarning) -> None:
+    """Issue a warning that points at the caller's line, outside this package."""
     level = 2
     frame = inspect.currentframe()
     frame = frame.f_back if frame else None
     while frame and str(frame.f_globals.get("__name__", "")).startswith("heelstrike."):
         frame = frame.f_back
         level += 1
-    warnings.warn(message, RobotWarning, stacklevel=level)
+    warnings.warn(message, category, stacklevel=level)

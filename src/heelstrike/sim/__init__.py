@@ -8,7 +8,7 @@ from heelstrike.compiler.compilation import kernel as kernel
 from heelstrike.dynamics.kernels import passive_force as passive_force
 from heelstrike.sim.batch import Batch, simulate_batch
 from heelstrike.sim.clock import Clock as Clock
-from heelstrike.sim.closed_sets import EventKind, RunStatus, Scheme
+from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus, Scheme
 from heelstrike.sim.compliant import Compliant
 from heelstrike.sim.compliant.contact_law import (
     BristleFriction,
@@ -24,6 +24,7 @@ from heelstrike.sim.contacts.geometry import evaluate_equations as evaluate_equa
 from heelstrike.sim.contacts.geometry import locate_contacts as locate_contacts
 from heelstrike.sim.contacts.geometry import solve_mass_matrix as solve_mass_matrix
 from heelstrike.sim.controller.interface import Contacts, Controller
+from heelstrike.sim.controller.raised import ControllerWarning, EndOfRun
 from heelstrike.sim.event_driven import EventDriven
 from heelstrike.sim.files.run_file import load_run
 from heelstrike.sim.frame import DIVERGED as DIVERGED
@@ -44,7 +45,7 @@ from heelstrike.sim.run import Certificates, Event, Logged, Run, SolverCount, Ti
 from heelstrike.sim.setting import Setting as Setting
 from heelstrike.sim.simulation import Simulation, simulate
 from heelstrike.sim.snapshot import Snapshot, load_snapshot
-from heelstrike.sim.time_stepping import TimeStepping
+from heelstrike.sim.time_stepping import SimulationWarning, TimeStepping
 
 __all__ = [
     "Batch",
@@ -53,6 +54,8 @@ __all__ = [
     "Compliant",
     "Contacts",
     "Controller",
+    "ControllerWarning",
+    "EndOfRun",
     "Event",
     "EventDriven",
     "EventKind",
@@ -61,12 +64,14 @@ __all__ = [
     "Kernels",
     "Logged",
     "Method",
+    "OnError",
     "Push",
     "RegularisedFriction",
     "Run",
     "RunStatus",
     "Scheme",
     "Simulation",
+    "SimulationWarning",
     "Snapshot",
     "SolverCount",
     "TimeStepping",

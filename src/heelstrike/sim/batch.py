@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, RobotError, SimulationError
@@ -24,17 +25,18 @@ from heelstrike.interruption import acknowledge
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
 from heelstrike.sim.contacts.latches import is_one, several
 from heelstrike.sim.controller.interface import Controller
 from heelstrike.sim.controller.law import Law, law_of
+from heelstrike.sim.controller.raised import tell
 from heelstrike.sim.frame import compiled_loop
 from heelstrike.sim.memory import allocate_memory
 from heelstrike.sim.method import Method
 from heelstrike.sim.push import Push, pushes_on
 from heelstrike.sim.record.size import check_runs
 from heelstrike.sim.run import COUNTS, WORST, Run, Timing
-from heelstrike.sim.setting import Setting, checked_setting
+from heelstrike.sim.setting import Setting, checked_on_error, checked_setting
 from heelstrike.sim.simulation import (
     Ending,
     check_duration,
@@ -50,6 +52,9 @@ Joints = str | int | Iterable[str | int]
 
 NO_ROWS = 2**62
 """Steps between two rows of runs that are not recorded: more than any run has."""
+
+SHOWN = 10
+"""Runs that a warning of errors names at most, beside the first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +80,9 @@ class Batch:
         Deepest penetration of a contact point, in m.
     complementarity, cone, non_penetration : (n,) float
         Largest relative residuals of the contact problems.
-    solves, shortcuts, fallbacks, failures : (n,) int
+    energy_gain : (n,) float
+        Kinetic energy that restitution made (J).
+    solves, shortcuts, fallbacks, failures, combinations, relaxed : (n,) int
         Contact problems of each run, and how they were solved; see
         :class:`~heelstrike.sim.run.SolverCount`.
     threads : int
@@ -96,10 +103,13 @@ class Batch:
     complementarity: Floats
     cone: Floats
     non_penetration: Floats
+    energy_gain: Floats
     solves: Integers
     shortcuts: Integers
     fallbacks: Integers
     failures: Integers
+    combinations: Integers
+    relaxed: Integers
     threads: int
     timing: Timing
     _runs: tuple[Run | None, ...] | None = field(default=None, repr=False)
@@ -153,6 +163,7 @@ class Batch:
         return f"{len(self)} runs: {', '.join(counts)}"
 
 
+@takes(SimulationError)
 def simulate_batch(
     robot: Robot | Sequence[Robot],
     controller: Controller | Sequence[Controller] | None = None,
@@ -168,6 +179,7 @@ def simulate_batch(
     stop_when_fallen: bool | None = None,
     latched: Joints | Sequence[Joints | None] | None = None,
     braked: Joints | Sequence[Joints] = (),
+    on_error: OnError | str = OnError.WARN,
     threads: int | None = None,
     progress: Callable[[int, int], None] | bool | None = None,
 ) -> Batch:
@@ -213,6 +225,10 @@ def simulate_batch(
         :class:`~heelstrike.Simulation`.
     braked : joints, or sequence of n of them
         Joints that their brakes hold as a run begins, where they are; likewise.
+    on_error : OnError or str
+        What becomes of an error in a controller when all runs have ended: ``"warn"`` tells of the
+        first in a :class:`~heelstrike.ControllerWarning` with its traceback, and which runs ended
+        so; ``"raise"`` raises it, and the batch is lost; ``"stop"`` does neither.
     threads : int, optional
         Threads to work with; by default one a processor.
     progress : callable or bool, optional
@@ -231,6 +247,8 @@ def simulate_batch(
     ------
     SimulationError, ControllerError
         If the arguments are not usable; raised before anything is simulated.
+    Exception
+        With ``on_error="raise"``, what a controller raised.
 
     Examples
     --------
@@ -243,6 +261,7 @@ def simulate_batch(
     begin = perf_counter()
     if record_every is not None and record_every < 1:
         raise SimulationError(f"record_every must be at least 1 or None, got {record_every}")
+    on_error = checked_on_error(on_error)
     workers = (os.cpu_count() or 1) if threads is None else threads
     if workers < 1:
         raise SimulationError(f"threads must be at least 1, got {threads}")
@@ -263,6 +282,7 @@ def simulate_batch(
         "control_period": control_period,
         "record_every": NO_ROWS if record_every is None else record_every,
         "stop_when_fallen": stop_when_fallen,
+        "on_error": OnError.STOP,  # of one run; what the batch does comes at its end
     }
     laws = {id(each): _law(each) for each in _listed(controller)}
     tasks = []
@@ -279,6 +299,7 @@ def simulate_batch(
     threads = min(workers, len(tasks))
     with _shown(progress, len(tasks)) as show:
         crew.work(threads, show)
+    crew.tell_errors(on_error)
     return crew.batch(threads, Timing(compile_s, perf_counter() - begin - compile_s))
 
 
@@ -550,6 +571,18 @@ class _Crew:
             with self._lock:
                 self._done += 1
 
+    def tell_errors(self, on_error: OnError) -> None:
+        """Do with errors in controllers as `on_error` says."""
+        failed = [i for i, end in enumerate(self._endings) if _is_error(end)]
+        if failed:
+            first = self._endings[failed[0]]
+            assert first.error is not None
+            message = f"run {failed[0]}: {first.message}"
+            if others := ", ".join(map(str, failed[1 : 1 + SHOWN])):
+                more = ", ..." if len(failed) > 1 + SHOWN else ""
+                message += f". Errors ended {len(failed) - 1} more: {others}{more}"
+            tell(message, first.error, on_error)
+
     def batch(self, threads: int, timing: Timing) -> Batch:
         """Return what came out."""
         endings = self._endings
@@ -578,8 +611,12 @@ class _Crew:
         )
 
 
+def _is_error(ending: Ending) -> bool:
+    return ending.status is RunStatus.CONTROLLER_FAILED and ending.error is not None
+
+
 def _not_begun(state: State) -> Ending:
     counts = dict.fromkeys(COUNTS, 0) | dict.fromkeys(WORST, 0.0)
     events = np.zeros(len(EventKind), dtype=np.int64)
     message = "interrupted before it began"
-    return Ending(RunStatus.INTERRUPTED, message, state, 0.0, events, counts, None)
+    return Ending(RunStatus.INTERRUPTED, message, None, state, 0.0, events, counts, None)

@@ -10,6 +10,8 @@ class RunStatus(enum.Enum):
 
     ``COMPLETED``, ``FELL``
         The time is up; the centre of mass sank below half its first height.
+    ``STOPPED``
+        The controller ended it, for a reason of its own: see :class:`~heelstrike.EndOfRun`.
     ``DIVERGED``
         The state stopped being finite.
     ``SOLVER_FAILED``
@@ -20,10 +22,25 @@ class RunStatus(enum.Enum):
 
     COMPLETED = "completed"
     FELL = "fell"
+    STOPPED = "stopped"
     DIVERGED = "diverged"
     INTERRUPTED = "interrupted"
     SOLVER_FAILED = "solver_failed"
     CONTROLLER_FAILED = "controller_failed"
+
+
+class OnError(enum.StrEnum):
+    """What becomes of an error in a controller; the run ends in any case, with its data.
+
+    ``WARN``, ``STOP``
+        A warning tells of it, with its traceback; nothing but status and message does.
+    ``RAISE``
+        It is raised.
+    """
+
+    WARN = "warn"
+    STOP = "stop"
+    RAISE = "raise"
 
 
 class EventKind(enum.IntEnum):
@@ -42,7 +59,9 @@ class EventKind(enum.IntEnum):
         No contact force, or several, agreed with the laws of motion and friction. With an impulse:
         the velocity jumped without a collision. Without: one of the solutions was chosen.
     ``ENERGY_GAIN``
-        Newton's restitution with friction made energy in an impact (Kane's paradox).
+        Newton's restitution with friction made energy in an impact (Kane's paradox), by the point
+        with the largest impulse; ``run.certificates.energy_gain`` is how much. Under
+        ``TimeStepping(bounded_restitution=True)`` it would have, and was scaled back.
     ``JOINT_STOP``
         A joint reached the end of its range, with the impulse that took, or was pressed against it
         by an impact elsewhere (or, held by a latch, pulled off it: the impulse is negative then);
@@ -54,7 +73,9 @@ class EventKind(enum.IntEnum):
         Contact events piled up without time moving on, or no forces agreed with the laws: a short
         time is bridged by impulses at its beginning, which are told of by events of their own. The
         event's `impulse` is the length of the bridge (s) and how far its end may be wrong (the
-        largest error of a coordinate or velocity), its `contact` zero.
+        largest error of a coordinate or velocity), its `contact` zero. On compliant ground: torques
+        of a controller that switches to and fro were held, for that long in all until the next
+        sample, and velocities may be wrong by so much.
     ``WEDGED``
         It is in the ground, by so little as rounding and turning explain, and neither it nor a
         joint can be pushed out without the other being pressed in: from here on they are left where

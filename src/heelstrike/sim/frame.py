@@ -54,6 +54,8 @@ class Outcome(enum.IntEnum):
     FORK = 8
     """From here on the end of the simulation shapes its steps."""
     RAISED = 9
+    STOPPED = 10
+    """The controller has ended the run."""
 
 
 DONE = int(Outcome.DONE)
@@ -65,6 +67,7 @@ DIVERGED = int(Outcome.DIVERGED)
 SOLVER_FAILED = int(Outcome.SOLVER_FAILED)
 BAD_CONTROLLER = int(Outcome.BAD_CONTROLLER)
 FORK = int(Outcome.FORK)
+STOPPED = int(Outcome.STOPPED)
 
 
 class Scene(NamedTuple):
@@ -167,6 +170,8 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     clock.calls += 1
                 if not limit_torque(model, control, memory):
                     return BAD_CONTROLLER
+                if control.robot.ending >= 0:
+                    clock.finishing = 1
                 code = decide(scene, control, memory, work, record, clock)
                 if code in (DONE, SOLVER_FAILED):
                     report(scene, control, memory, work, record, clock)
@@ -175,6 +180,8 @@ def frame(kernels: Kernels) -> Callable[..., int]:
                     return code
                 if center_height(model, ground, memory.equations.tree) < clock.fallen_height:
                     return FELL
+                if control.robot.ending >= 0:
+                    return STOPPED
                 if clock.finishing == 1:
                     return DONE
                 clock.moving = 1

@@ -39,6 +39,8 @@ class Tally(Bundle):
         Deepest penetration of a contact point (m).
     complementarity, cone, non_penetration : float
         Largest residuals of the contact problems.
+    energy_gain : float
+        Kinetic energy that restitution made (J).
     """
 
     steps: int = cell(int)
@@ -49,6 +51,7 @@ class Tally(Bundle):
     complementarity: float = cell(float)
     cone: float = cell(float)
     non_penetration: float = cell(float)
+    energy_gain: float = cell(float)
 
 
 class Equations(Bundle):

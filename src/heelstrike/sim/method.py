@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact import problem
 from heelstrike.errors import ContactProblemError, SimulationError
-from heelstrike.robot.model import Integers
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.frame import Kernels
@@ -116,6 +116,25 @@ class Method(ABC):
     def row_period(self) -> tuple[str, float]:
         """Setting that says how often there is a row, and its value in seconds."""
 
+    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
+        """Say what makes its answers doubtful, and what to do about it.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        q : (nq,) float
+            A pose that it goes through.
+        sunk : float
+            How much deeper (m) in the ground it was than at the beginning.
+
+        Returns
+        -------
+        list of str
+            In a person's words; nothing if nothing is known against them.
+        """
+        return []
+
     def check(self, setting: Setting) -> None:  # noqa: B027 - most can do everything
         """Refuse what this method cannot simulate.
 
@@ -186,7 +205,9 @@ class Method(ABC):
             return time
         return clock.start + round((time - clock.start) / self.step_length) * self.step_length
 
-    def forget_ground(self, robot: Robot, work: Any, clock: Clock) -> None:  # noqa: B027
+    def forget_ground(  # noqa: B027
+        self, robot: Robot, work: Any, clock: Clock, *, stops: bool = False
+    ) -> None:
         """Forget what touches the ground, because another has been laid.
 
         Parameters
@@ -197,6 +218,8 @@ class Method(ABC):
             Its bundle.
         clock : Clock
             Clock of the simulation.
+        stops : bool
+            Forget what touches joint stops, too: the robot has been moved.
         """
 
     def rows_in(self, duration: float, record_every: int) -> int:
@@ -260,6 +283,25 @@ class UnknownMethod:
     name: str
     settings: Mapping[str, str | int | float] = field(hash=False)
     impulses_in_events: bool = False
+
+    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:  # noqa: ARG002
+        """Say nothing: nothing is known of it.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot.
+        q : (nq,) float
+            A pose that it goes through.
+        sunk : float
+            How much deeper (m) in the ground it was than at the beginning.
+
+        Returns
+        -------
+        list of str
+            None.
+        """
+        return []
 
 
 def solver_order(name: str) -> Integers:

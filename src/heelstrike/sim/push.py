@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import kernel
 from heelstrike.dynamics.kernels import point_position
@@ -56,11 +57,10 @@ class Push:
     point: tuple[float, float] | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         object.__setattr__(self, "force", _pair("force", self.force))
         if self.point is not None:
             object.__setattr__(self, "point", _pair("point", self.point))
-        if isinstance(self.link, bool) or not isinstance(self.link, str | int | np.integer):
-            raise SimulationError(f"a push acts on a link, by its name or index; got {self.link!r}")
         for name, lowest in (("start", -np.inf), ("duration", 0.0)):
             value = getattr(self, name)
             number = isinstance(value, float | int | np.number) and np.isfinite(value)

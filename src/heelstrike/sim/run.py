@@ -111,6 +111,28 @@ class Event:
     contact: int
     impulse: tuple[float, float]
 
+    @property
+    def kind_in_words(self) -> str:
+        """Its kind as people write it."""
+        return self.kind.name.lower().replace("_", " ")
+
+    def place(self, robot: Robot) -> str:
+        """Name of the joint or contact point of a robot at which it happened; "" if at none.
+
+        Parameters
+        ----------
+        robot : Robot
+            The robot of the run.
+
+        Returns
+        -------
+        str
+            The name.
+        """
+        names = robot.joint_names if self.kind.of_joint else robot.contact_names
+        somewhere = self.kind is not EventKind.BRIDGE and 0 <= self.contact < len(names)
+        return names[self.contact] if somewhere else ""
+
 
 @dataclass(frozen=True)
 class Certificates:
@@ -122,12 +144,16 @@ class Certificates:
         Deepest penetration of a contact point, in metres.
     complementarity, cone, non_penetration : float
         Largest residuals of the contact problems, relative to the size of their data.
+    energy_gain : float
+        Kinetic energy that Newton's restitution with friction made, of all impacts together (J).
+        Events of kind ``ENERGY_GAIN`` tell when.
     """
 
     penetration: float
     complementarity: float
     cone: float
     non_penetration: float
+    energy_gain: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -141,6 +167,10 @@ class SolverCount:
     solves, shortcuts, fallbacks, failures : int
         Contact problems; those answered by the modes of the step before, verified; those that
         needed another solver; those that none could certify.
+    combinations : int
+        Of the latter two, those that came to the last resort, combinations of contact modes.
+    relaxed : int
+        Steps that were asked for less than to leave the ground and to bounce: in a wedge.
     """
 
     name: str
@@ -148,6 +178,8 @@ class SolverCount:
     shortcuts: int
     fallbacks: int
     failures: int
+    combinations: int = 0
+    relaxed: int = 0
 
     def __str__(self) -> str:
         backed = f" with {self.fallbacks} fallbacks" if self.fallbacks else ""
@@ -155,6 +187,8 @@ class SolverCount:
             "by the modes of the step before": self.shortcuts,
             f"by {self.name}{backed}": self.solves - self.shortcuts - self.failures,
             "unsolved": self.failures,
+            "by combinations of modes, or not even so": self.combinations,
+            "steps left in a wedge": self.relaxed,
         }
         parts = ", ".join(f"{count} {how}" for how, count in counts.items() if count)
         return f"{self.solves}: {parts}" if parts else "none"
@@ -239,7 +273,8 @@ class Run:
         what is clipped within them is not counted.
     timing : Timing
     error : BaseException or None
-        What the controller raised, if that ended the run.
+        What the controller raised, if that ended the run; a ControllerError if it did what it may
+        not.
     pushes : tuple of Push
         What pushed the robot.
     log : mapping of str to Logged
@@ -331,6 +366,15 @@ class Run:
     def completed(self) -> bool:
         """Whether the run lasted as long as it was asked to."""
         return self.status is RunStatus.COMPLETED
+
+    @property
+    def doubt(self) -> str:
+        """Why the run may mean little though it was completed; empty if nothing is known."""
+        if not len(self.time):
+            return ""
+        begun = max(0.0, -float(self.gap[0].min(initial=0.0)))
+        sunk = self.certificates.penetration - begun
+        return "; ".join(self.method.doubts(self.robot, self.position[0], sunk))
 
     @property
     def final_state(self) -> State:
@@ -470,17 +514,27 @@ class Run:
         return to_dataset(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the run as NetCDF; read it again with :func:`heelstrike.load_run`.
+        """Write the run as NetCDF (``.nc``), or as a table of text for other programs (``.csv``).
+
+        A NetCDF file is read again with :func:`heelstrike.load_run`. A table has a row for each
+        recorded time and a column for each number, headed by its name and unit as in
+        ``position left_knee [rad]``, and at last the events since the row before, in words. It
+        holds neither robot nor ground and cannot be loaded.
 
         Parameters
         ----------
         path : str or path
-            File to write.
+            File to write, whose name ends in .nc or .csv.
 
         Returns
         -------
         Path
-            The file.
+            The file. It appears whole or not at all.
+
+        Raises
+        ------
+        RunFileError
+            If the name ends in anything else or the file cannot be written. The run is as it was.
         """
         from heelstrike.sim.files.run_file import save
 

@@ -17,6 +17,7 @@ from heelstrike.errors import SimulationError
 from heelstrike.robot.model import NUMBERS, SCALES, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.contacts.brakes import brakes_of
 from heelstrike.sim.contacts.latches import latches_at
 from heelstrike.sim.push import Push
@@ -50,6 +51,7 @@ class Setup(TypedDict, total=False):
     latched: Iterable[str | int] | None
     braked: Iterable[str | int]
     checked: bool
+    on_error: OnError | str
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,8 @@ class Setting:
         Which of its brakes are on as it begins.
     checked : bool
         Whether compiled controllers run in Python, every index looked at.
+    on_error : OnError
+        What becomes of an error in the controller.
     """
 
     robot: Robot
@@ -87,6 +91,7 @@ class Setting:
     held: tuple[bool, ...]
     braked: tuple[bool, ...]
     checked: bool
+    on_error: OnError
 
 
 def checked_setting(
@@ -101,6 +106,7 @@ def checked_setting(
     latched: Iterable[str | int] | None = None,
     braked: Iterable[str | int] = (),
     checked: bool = False,
+    on_error: OnError | str = OnError.WARN,
 ) -> Setting:
     """Check what is to be simulated.
 
@@ -116,7 +122,7 @@ def checked_setting(
     ground = FLAT if ground is None else ground
     if not isinstance(ground, Ground):
         raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-    _check_state(robot, state)
+    check_state(robot, state)
     if control_period is not None and not 0.0 < control_period < np.inf:
         raise SimulationError(f"control_period must be a positive number, got {control_period}")
     if not (hasattr(record_every, "__index__") and 1 <= record_every <= MOST_EVERY):
@@ -138,7 +144,17 @@ def checked_setting(
         held=latches_at(robot, state, ground, latched),
         braked=brakes_of(robot, braked),
         checked=checked,
+        on_error=checked_on_error(on_error),
     )
+
+
+def checked_on_error(on_error: OnError | str) -> OnError:
+    """Return what becomes of an error in a controller, or refuse what is no such thing."""
+    try:
+        return OnError(on_error)
+    except ValueError:
+        known = ", ".join(repr(each.value) for each in OnError)
+        raise SimulationError(f"on_error is one of {known}; got {on_error!r}") from None
 
 
 def checked_pushes(robot: Robot, pushes: Sequence[Push] | Push) -> tuple[Push, ...]:
@@ -180,7 +196,8 @@ def model_digest(model: Model) -> str:
     return _DIGESTS[model]
 
 
-def _check_state(robot: Robot, state: State) -> None:
+def check_state(robot: Robot, state: State) -> None:
+    """Refuse what is no state of a robot."""
     if not isinstance(state, State):
         raise SimulationError(
             f"state must be a State, got {type(state).__name__}; write State(q, v) with positions "

@@ -11,16 +11,17 @@ from typing import Any, NoReturn, Unpack
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import ControllerError, SimulationError
 from heelstrike.interruption import acknowledge
-from heelstrike.robot.model import Integers
+from heelstrike.robot.model import Floats, Integers
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.clock import Clock
-from heelstrike.sim.closed_sets import EventKind, RunStatus
+from heelstrike.sim.closed_sets import EventKind, OnError, RunStatus
 from heelstrike.sim.contacts.brakes import braked_joints, brakes_of, brakes_on, put_on
 from heelstrike.sim.contacts.latches import latches_at, latches_of
 from heelstrike.sim.contacts.loops import HOLDS, PUT_ON
@@ -28,6 +29,8 @@ from heelstrike.sim.controller.control import ReadyLaw
 from heelstrike.sim.controller.in_python import AskedLaw
 from heelstrike.sim.controller.interface import Contacts, Controller, Partaking, read_only
 from heelstrike.sim.controller.law import Law, commands_voltage, law_of, no_torque
+from heelstrike.sim.controller.raised import EndOfRun, tell
+from heelstrike.sim.controller.robot import NO_ENDING
 from heelstrike.sim.controller.watch import Watch
 from heelstrike.sim.frame import Outcome, compiled_loop
 from heelstrike.sim.memory import Memory, allocate_memory
@@ -38,6 +41,7 @@ from heelstrike.sim.run import Run, Timing, counted, joined, tallied
 from heelstrike.sim.setting import (
     Setting,
     Setup,
+    check_state,
     checked_pushes,
     checked_setting,
     identity_of,
@@ -96,10 +100,13 @@ class Simulation:
         Joints that their brakes hold as it begins, where they are. A controller in Python that has
         an attribute `braked`, or `latched`, says so itself at every call.
     checked : bool
-        Run a compiled controller in Python, some hundred times slower, and look at every index: one
-        that reads or writes beyond its arrays, or writes where it may not, ends the run with a
-        message that names the array and the index. Like any controller in Python it is then called
-        every `control_period`.
+        Run a compiled controller in Python and look at every index: one that reads or writes beyond
+        its arrays, or writes where it may not, ends the run with a message that names the array and
+        the index. Like any controller in Python it is then called every `control_period`.
+    on_error : OnError or str
+        What becomes of an error in the controller: ``"warn"`` tells of it in a
+        :class:`~heelstrike.ControllerWarning` with its traceback, ``"raise"`` raises it, ``"stop"``
+        does neither. The simulation ends in any case, and its record stays. An attribute, too.
 
     Attributes
     ----------
@@ -132,6 +139,7 @@ class Simulation:
     ('completed', 0.01)
     """
 
+    @takes(SimulationError)
     def __init__(
         self,
         robot: Robot,
@@ -147,6 +155,7 @@ class Simulation:
         latched: Iterable[str | int] | None = None,
         braked: Iterable[str | int] = (),
         checked: bool = False,
+        on_error: OnError | str = OnError.WARN,
     ) -> None:
         begin, given = state.state if isinstance(state, Snapshot) else state, ground
         if isinstance(state, Snapshot) and ground is None:
@@ -154,7 +163,7 @@ class Simulation:
         setting = checked_setting(
             robot, begin, ground=ground, control_period=control_period, record_every=record_every,
             stop_when_fallen=stop_when_fallen, pushes=pushes, latched=latched, braked=braked,
-            checked=checked,
+            checked=checked, on_error=on_error,
         )  # fmt: skip
         law_of(controller, begin=True)
         self._begin(setting, checked_method(method))
@@ -220,6 +229,7 @@ class Simulation:
         self._event_counts = np.zeros(len(EventKind), dtype=np.int64)
         self._recorded_until = 0.0
         self._complaint = ""
+        self.on_error = setting.on_error
         self.status = RunStatus.COMPLETED
         self.message = "not begun"
         self.error: BaseException | None = None
@@ -231,8 +241,26 @@ class Simulation:
 
     @property
     def state(self) -> State:
-        """Position and velocity now."""
+        """Position and velocity now; another may be set, but none with a foot in the ground."""
         return State(self._memory.q, self._memory.v)
+
+    @state.setter
+    def state(self, state: State) -> None:
+        check_state(self.robot, state)
+        deep = self._depth(state, self._ground)
+        if deep.any():
+            point = int(np.argmax(deep))
+            raise SimulationError(
+                f"contact point {self.robot.contact_names[point]!r} would be {deep[point]:.3g} m "
+                "in the ground; robot.placed(state, ground) gives a state that is not"
+            )
+        latches_at(self.robot, state, self._ground, self.latched)
+        self.method.check(replace(self._setting, ground=self._ground, state=state))
+        self._memory.q[:], self._memory.v[:] = state.q, state.v
+        loops = self._memory.loops
+        loops.brake_position[:] = state.q[self.robot.model.brake_joint]
+        self.method.forget_ground(self.robot, self._work, self._clock, stops=True)
+        self.method.reconsider(self._work)
 
     @property
     def contacts(self) -> Contacts:
@@ -254,14 +282,14 @@ class Simulation:
     def ground(self, ground: Ground) -> None:
         if not isinstance(ground, Ground):
             raise SimulationError(f"ground must be a Ground, got {type(ground).__name__}")
-        at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
-        deep = at.gap < min(-LAID, float(np.min(self.contacts.gap, initial=0.0)) - LAID)
-        if np.any(deep):
-            point = int(np.argmin(at.gap))
+        deep = self._depth(self.state, ground)
+        if deep.any():
+            at = contact_kinematics(self.robot, self._memory.q, self._memory.v, ground)
+            point = int(np.argmax(deep))
             raise SimulationError(
-                f"this ground would lie {-at.gap[point]:.3g} m above contact point "
+                f"this ground would lie {deep[point]:.3g} m above contact point "
                 f"{self.robot.contact_names[point]!r}; lower it by "
-                f"{float(np.max(-at.gap[deep] / at.normal[deep, 1])):.3g} m, or lay it before "
+                f"{float(np.max(deep / at.normal[:, 1])):.3g} m, or lay it before "
                 "the robot is there"
             )
         self.method.check(replace(self._setting, ground=ground, state=self.state))
@@ -269,6 +297,12 @@ class Simulation:
         if not all(np.array_equal(mine[name], its[name]) for name in mine):
             self.method.forget_ground(self.robot, self._work, self._clock)
         self._ground = ground
+
+    def _depth(self, state: State, ground: Ground) -> Floats:
+        """How deep points would be in a ground, (nc,) in m; 0 of those no deeper than now."""
+        gap = contact_kinematics(self.robot, state.q, state.v, ground).gap
+        now = float(np.min(self.contacts.gap, initial=0.0))
+        return np.where(gap < min(-LAID, now - LAID), -gap, 0.0)
 
     @property
     def latched(self) -> tuple[str, ...]:
@@ -363,6 +397,8 @@ class Simulation:
         ------
         SimulationError
             If the simulation has come to its end.
+        Exception
+            With ``on_error="raise"``, what the controller raised.
         """
         return self._advance(FAR, self._clock.index + 1)
 
@@ -389,6 +425,8 @@ class Simulation:
         SimulationError
             If the simulation has come to its end, the time is past, or there is no room for the
             record.
+        Exception
+            With ``on_error="raise"``, what the controller raised.
         """
         instant = -np.inf
         if np.isfinite(until):
@@ -419,7 +457,13 @@ class Simulation:
             self.status, self.message = RunStatus.INTERRUPTED, f"interrupted at {self._now}"
         wall_s = self._timing.wall_s + clock_time.perf_counter() - begin
         self._timing = Timing(self._timing.compile_s, wall_s)
+        self._tell_error(self.status, self.message)
         return self.status
+
+    def _tell_error(self, status: RunStatus, message: str) -> None:
+        """Do with an error in the controller as `on_error` says."""
+        if status is RunStatus.CONTROLLER_FAILED and self.error is not None:
+            tell(message, self.error, self.on_error)
 
     def _go(
         self,
@@ -436,7 +480,7 @@ class Simulation:
             elapsed = clock_time.perf_counter() - begin
             misdeed = self._watch.misdeed()
             if misdeed is not None:
-                return RunStatus.CONTROLLER_FAILED, (
+                return self._failed(
                     f"{self._name} {misdeed}; noticed at {self._now}"
                     + ("" if self._python else ". simulate(..., checked=True) tells more")
                 )
@@ -466,11 +510,13 @@ class Simulation:
                 wrong = self._ask() if outcome is Outcome.ASKING else ""
             except KeyboardInterrupt:
                 raise
+            except EndOfRun as end:  # of a compiled law: this instant stays undecided
+                return RunStatus.STOPPED, self._stopped(str(end))
             except BaseException as error:  # of the controller: loops raise nothing
                 self.error = error
                 return Outcome.RAISED
             if wrong:
-                return RunStatus.CONTROLLER_FAILED, wrong
+                return self._failed(wrong)
             if outcome is Outcome.RECORD_FULL:
                 if full := self._new_record():
                     return RunStatus.INTERRUPTED, full
@@ -478,6 +524,11 @@ class Simulation:
                 self._fork = self.snapshot() if self._can_be_kept else None
             elif outcome is not Outcome.ASKING:
                 return outcome
+
+    def _failed(self, message: str) -> tuple[RunStatus, str]:
+        """Return how a controller ends the simulation that did what it may not."""
+        self.error = ControllerError(message)
+        return RunStatus.CONTROLLER_FAILED, message
 
     def _report(self, progress: Callable[[float], None] | None) -> None:
         """Report progress; keep in mind what went wrong with that, if something did."""
@@ -493,9 +544,16 @@ class Simulation:
 
     def _ask(self) -> str:
         """Ask a controller in Python for torques; return what is wrong with them."""
-        torque = np.asarray(
-            self._python.torque(self.time, self.state, self._shown), dtype=np.float64
-        )
+        ending = self._control.robot
+        torque: Floats = self._memory.command
+        try:
+            torque = np.asarray(
+                self._python.torque(self.time, self.state, self._shown), dtype=np.float64
+            )
+        except EndOfRun as end:
+            self._why_stopped, ending.ending = str(end), 0
+        else:
+            ending.ending = self._numbers.control.robot.ending
         if torque.shape != (self.robot.nu,):
             return (
                 f"{self._name} returned shape {torque.shape} at {self._now}; robot "
@@ -533,6 +591,8 @@ class Simulation:
             return RunStatus.FELL, (
                 f"the robot fell at {self._now}: its centre of mass is below half its first height"
             )
+        if outcome is Outcome.STOPPED:
+            return RunStatus.STOPPED, self._stopped(self._why_stopped)
         if outcome is Outcome.RAISED:
             assert self.error is not None
             if isinstance(self._python, AskedLaw) and isinstance(self.error, ControllerError):
@@ -552,15 +612,28 @@ class Simulation:
                 f"the simulation could not go on at {self._now}: {reason}"
                 if reason
                 else f"the state stopped being finite at {self._now}; try a smaller step or softer "
-                "gains"
+                f"gains{self._doubts}"
             )
         if outcome is Outcome.SOLVER_FAILED:
             reason = self.method.reason(self._work)
             return RunStatus.SOLVER_FAILED, (
                 f"no contact solver could certify a solution at {self._now}; residuals "
                 f"{self._memory.assembly.answer.residual.tolist()}{reason and f'. {reason}'}"
+                f"{self._doubts}"
             )
         return self._not_finite(tally.bad_torque, f"at {self._now}")
+
+    @property
+    def _doubts(self) -> str:
+        doubts = self.method.doubts(self.robot, self._setting.state.q)
+        return "".join(f". {doubt[0].upper()}{doubt[1:]}" for doubt in doubts)
+
+    def _stopped(self, why: str) -> str:
+        """Say that the controller ended the run, and why."""
+        number = self._control.robot.ending
+        if not why and number < len(self._endings):
+            why = self._endings[number]
+        return f"the controller ended the run at {self._now}: {why or f'ending {number}'}"
 
     def _not_finite(self, actuator: int, when: str) -> tuple[RunStatus, str]:
         return RunStatus.CONTROLLER_FAILED, (
@@ -623,16 +696,20 @@ class Simulation:
                 "begin another simulation with it, from state=simulation.state"
             )
         self._kernel = compiled.function.finish()
+        if python is not None:  # loops do not call it, and Numba need not look for its addresses
+            self._kernel = compiled.function.separate
         voltage = commands_voltage(controller, robot)
         self.method.set_clock(setting, clock)
         self._setting, self._logs, self._python_log = setting, ready, told
         self._controller, self._python, self._control = controller, python, ready.control
         self._numbers = python.numbers if isinstance(python, AskedLaw) else ready
+        self._endings = () if law is None else law.function.endings
+        self._why_stopped = ""
         self._control.voltage = voltage
-        self._name = f"{type(controller).__name__}.torque"
+        self._name: str = f"{type(controller).__name__}.torque"
         self._decides = _place(type(controller) if law is None else law.function.python)
         self._decides += " (voltages)" if voltage else ""
-        self._shown = read_only(memory.contacts)
+        self._shown: Contacts = read_only(memory.contacts)
         if law is not None:
             self._name = f"controller {law.function.name!r}"
         self._take_gains(law, voltage)
@@ -747,6 +824,9 @@ class Simulation:
                 raise SimulationError(f"the snapshot is damaged: {error}") from error
             raise
         self._memory, self._pushes, self._ground = memory, pushes, ground
+        self._why_stopped = ""
+        for numbers in (self._control, self._numbers.control):
+            numbers.robot.ending = NO_ENDING
 
     def _bundles(self, memory: Memory) -> tuple[tuple[str, Bundle], ...]:
         """Name the bundles that change as a simulation goes on, with the dot of their arrays."""
@@ -828,6 +908,7 @@ class Simulation:
         )
 
 
+@takes(SimulationError)
 def simulate(
     robot: Robot,
     controller: Controller | None = None,
@@ -852,30 +933,35 @@ def simulate(
     **setup
         How it begins and what it is simulated with: `state`, which has to be given, `method`,
         `ground`, `control_period`, `record_every`, `stop_when_fallen`, `pushes`, `latched`,
-        `braked`, `checked`; see
-        :class:`Simulation`.
+        `braked`, `checked`, `on_error`; see :class:`Simulation`.
 
     Returns
     -------
     Run
         Everything that happened, also after a fall, a failure or Ctrl-C; see ``run.status``. A
         controller that raises anything but KeyboardInterrupt, even SystemExit, ends the run with
-        status ``controller_failed``, as does one that writes beyond its arrays or changes the
-        robot; what was raised is in ``run.error``. While compiling, when there is nothing to keep,
-        Ctrl-C raises KeyboardInterrupt.
+        status ``controller_failed``, as does one that writes beyond its arrays, changes the robot,
+        or returns torques of the wrong shape; the error is in ``run.error``, and `on_error` says
+        what else becomes of it. Torques that are not finite end the run with that status, too, but
+        are no error. While compiling, when there is nothing to keep, Ctrl-C raises
+        KeyboardInterrupt.
 
     Raises
     ------
     SimulationError, ControllerError
         If the arguments are not usable, or the state is not one that the method can begin with;
-        raised before anything is simulated, except for a torque of the wrong shape, which ends the
-        run with status ``controller_failed``.
+        raised before anything is simulated.
+    Exception
+        With ``on_error="raise"``, what the controller raised.
     """
     check_duration(duration)
     simulation = Simulation(robot, controller, **setup)
-    simulation.advance(simulation._recorded_until + duration, progress=progress)
+    going = simulation.advance(simulation._recorded_until + duration, progress=progress)
     final = simulation._final()
-    return simulation._run(*simulation._decide_last(), final=final)
+    status, message = simulation._decide_last()
+    if status is not going:  # the last call of the controller is one more
+        simulation._tell_error(status, message)
+    return simulation._run(status, message, final=final)
 
 
 @dataclass(frozen=True)
@@ -886,6 +972,8 @@ class Ending:
     ----------
     status, message
         How, and the same in a person's words.
+    error : BaseException or None
+        What the controller raised, if that ended it.
     state, time
         Where the robot was, and when.
     events : (kinds,) int
@@ -898,6 +986,7 @@ class Ending:
 
     status: RunStatus
     message: str
+    error: BaseException | None
     state: State
     time: float
     events: Integers
@@ -930,7 +1019,7 @@ def simulation_to_the_end(
     for each in simulation._records:
         simulation._count_events(each)
     return Ending(
-        status, message, state, simulation.time, simulation._event_counts,
+        status, message, simulation.error, state, simulation.time, simulation._event_counts,
         counted(memory), run,
     )  # fmt: skip
 

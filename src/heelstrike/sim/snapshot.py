@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from heelstrike.errors import SimulationError
+from heelstrike.arguments import takes
+from heelstrike.errors import RunFileError, SimulationError
 from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
 
@@ -123,6 +124,7 @@ class Snapshot:
         return write_whole(path, image.getbuffer())
 
 
+@takes(RunFileError)
 def load_snapshot(path: str | os.PathLike[str]) -> Snapshot:
     """Read a snapshot that was saved with :meth:`Snapshot.save`.
 

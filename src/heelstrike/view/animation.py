@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import Run
 from heelstrike.view.film import Film
@@ -18,6 +19,7 @@ from heelstrike.whole_file import check_target, whole_file
 GIF_COLORS = 64
 
 
+@takes(ViewError)
 def animate(
     run: Run,
     path: str | os.PathLike[str],

@@ -26,6 +26,7 @@ from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.sole import are_around
 from heelstrike.sim.push import Push
 from heelstrike.view.bars import bars
 from heelstrike.view.style import (
@@ -266,14 +267,6 @@ def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
         and np.ptp(joints, axis=0).max() <= SAME_PLACE
         and link not in model.contact_link
     )
-
-
-def are_around(points: Floats) -> bool:
-    """Whether points lie on all sides of the joint, as those of a wheel: no half-plane is free."""
-    if len(points) < 3:
-        return False
-    angle = np.sort(np.arctan2(points[:, 1], points[:, 0]))
-    return bool(np.diff(angle, append=angle[0] + 2.0 * np.pi).max() < np.pi)
 
 
 def _outline(points: Floats) -> list[tuple[Floats, Floats]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.figure import Figure
 
+from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
 from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view import contact_figures, energy_figure, joint_figures, snapshots
@@ -36,6 +37,7 @@ FIGURES = tuple(_DRAWINGS)
 """Names of the figures that :func:`plot` draws."""
 
 
+@takes(ViewError)
 def plot(
     run: Run,
     what: str,

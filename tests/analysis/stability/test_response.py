@@ -156,7 +156,7 @@ def test_multipliers_are_those_of_the_walk() -> None:
     ("given", "said"),
     [
         ({}, "given by name"),
-        ([pushed], "given by name"),
+        ([pushed], "disturbances must be a mapping"),
         ({"push": pushed}, "'push' must be a function"),
         ({"push": (pushed, 0.0)}, "a positive size"),
         ({"push": (1.0, pushed)}, "'push' must be a function"),

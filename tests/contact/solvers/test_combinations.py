@@ -91,6 +91,17 @@ def test_many_contacts_change_by_two_at_first() -> None:
     assert 16 * count * 4 + 1 + left == MOST
 
 
+@pytest.mark.parametrize(("count", "most"), [(6, 8000), (8, 8000), (12, 2370), (24, 296)])
+def test_of_more_contacts_fewer_are_tried(count: int, most: int) -> None:
+    """Each is an elimination, whose work grows with the cube of their number."""
+    work = workspace(count)
+    begin(count, np.full(count, STICK), 1.0, work)
+    tried = 0
+    while following(count, work):
+        tried += 1
+    assert tried == most
+
+
 def test_the_better_becomes_the_base() -> None:
     count, base = 6, (STICK,) * 6
     work = workspace(count)

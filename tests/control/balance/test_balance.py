@@ -173,7 +173,22 @@ def test_it_stands_still() -> None:
     assert contact_positions(robot, simulation.state.q)[:, 1] == pytest.approx(0.0, abs=1e-4)
 
 
-@pytest.mark.parametrize(("impulse", "steps"), [(15.0, False), (-16.0, False), (60.0, True)])
+def test_it_stands_with_bent_knees() -> None:
+    """A straight one could not be bent in time: there it moves the hip hardly at all."""
+    simulation = hs.Simulation(
+        walking.bravo7(), law(speed=0.0), state=walking.bravo7().reference_state()
+    )
+    simulation.advance(3.0)
+    legs = simulation.parameters.legs
+    joints = simulation.state.q[walking.bravo7().model.actuator_joint]
+    bent = legs.bend * (joints[legs.knee] - legs.straight)
+    assert np.all(bent > 0.19)
+
+
+@pytest.mark.parametrize(
+    ("impulse", "steps"),
+    [(15.0, False), (-16.0, False), (60.0, True), (100.0, True), (-95.0, True)],
+)
 def test_pushed_as_it_stands_it_stands_again(impulse: float, steps: bool) -> None:
     """Without a step as long as the sole is long enough for the capture point."""
     robot = walking.bravo7()

@@ -190,3 +190,29 @@ def test_the_line_of_a_motor_is_a_number_of_the_robot(tmp_path: Path) -> None:
     for ending in ("urdf", "sdf"):
         with pytest.warns(RobotWarning, match="Left out: stall torque of hip; no load speed of hi"):
             robot.save(tmp_path / f"r.{ending}")
+
+
+@pytest.mark.parametrize("limit", ["", '<limit lower="-1" upper="1" velocity="4"/>'])
+def test_what_is_said_of_a_joint_without_effort_agrees_with_its_transmission(limit: str) -> None:
+    """A joint that a transmission drives has a motor, whatever its <limit> leaves out."""
+    bare = (
+        f'<joint name="ankle" type="revolute"><parent link="shin"/><child link="foot"/>{limit}'
+        '<axis xyz="0 1 0"/></joint>'
+    )
+    text = leg(link("foot") + bare)
+
+    def said(text: str) -> tuple[Robot, str]:
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", RobotWarning)
+            robot = read_mjcf(text)
+        return robot, " ".join(str(each.message) for each in told)
+
+    robot, words = said(text)
+    assert "ankle" not in robot.actuator_names
+    assert "no motor" in words
+    robot, words = said(text.replace("</robot>", transmission("ankle", "") + "</robot>"))
+    assert robot.actuator_names == ("ankle",)
+    assert "ankle have a motor and no effort limit: its torque is unlimited" in words
+    assert "motor" in words.split("may not say what is meant", 1)[1].split(".")[0]
+    assert "no motor moves it" not in words
+    assert "it has no motor" not in words

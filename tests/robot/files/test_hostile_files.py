@@ -89,9 +89,10 @@ def replicas(count: int, inside: str) -> str:
 
 
 def mesh_link(file: str) -> str:
-    """Return a link of a URDF that is a mesh, and has no inertia of its own."""
+    """Return a link of a URDF that is weighed by its mesh."""
     shape = f'<geometry><mesh filename="{file}"/></geometry>'
-    return f'<link name="x"><collision>{shape}</collision></link>'
+    asked = '<mujoco><compiler inertiafromgeom="true"/></mujoco>'
+    return f'<link name="x"><collision>{shape}</collision></link>{asked}'
 
 
 BALL = '<geom size="1"/>'

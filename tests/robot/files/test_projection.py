@@ -8,7 +8,7 @@ the plane does no work. No line of this knows how the planar robot was made.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import mujoco
@@ -26,6 +26,7 @@ from heelstrike.robot import (
     load_robot,
     read_mjcf,
 )
+from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.inspection import facts
 
 Floats = NDArray[np.float64]
@@ -389,3 +390,57 @@ def test_what_the_root_had_is_said_when_it_floats() -> None:
       </robot>"""
     with pytest.warns(RobotWarning, match=r"trunk floats; the limits, damping and friction"):
         assert read_mjcf(text).floating
+
+
+# Robots that are planar in no direction
+
+
+def radial(angles: Sequence[float], *, yaw: bool = False, turned: float = 0.0) -> str:
+    """A trunk whose legs look outwards at angles (degrees) about z, on a free joint."""
+    legs = "".join(
+        f"""<body name="leg{k}" euler="0 0 {angle}">
+          {f'<joint name="yaw{k}" axis="0 0 1"/>' if yaw else ""}
+          <joint name="hip{k}" axis="0 1 0"/>
+          <geom type="capsule" fromto="0.1 0 0 0.1 0 -0.3" size="0.02" mass="1"/></body>"""
+        for k, angle in enumerate(angles)
+    )
+    return f"""<mujoco><worldbody><body name="trunk" pos="0 0 1" euler="0 0 {turned}">
+      <freejoint/><geom type="box" size="0.2 0.2 0.1" mass="5"/>{legs}
+      </body></worldbody></mujoco>"""
+
+
+DIAGONAL = (45.0, 135.0, 225.0, 315.0)
+
+
+@pytest.mark.parametrize("how", [{}, {"floating": True}, {"projected": True}], ids=str)
+def test_legs_in_several_planes_are_refused_with_advice_that_is_good(how: LoadOptions) -> None:
+    """Whatever is asked for first: no turn helps, and neither option does."""
+    with pytest.raises(RobotError, match=r"angles of 45, 135 degrees.*no turn of the whole") as no:
+        read_mjcf(radial(DIAGONAL), **how)
+    assert "projected=True" not in str(no.value)
+    assert "the pose" not in str(no.value)
+    with pytest.raises(RobotError, match="Joints about z, as 'yaw0', can turn its legs") as yes:
+        read_mjcf(radial(DIAGONAL, yaw=True), **{**how, "projected": True})
+    assert "give their angles as the pose" in str(yes.value)
+    quarter = np.pi / 4.0
+    pose = {f"yaw{k}": quarter * (-1.0 if k % 2 == 0 else 1.0) for k in range(4)}
+    robot = read_mjcf(radial(DIAGONAL, yaw=True), projected=True, pose=pose)
+    assert robot.joint_names[3:] == ("hip0", "hip1", "hip2", "hip3")
+
+
+def test_legs_in_one_plane_are_turned_by_what_is_advised() -> None:
+    for how in ({"floating": True}, {"projected": True}):
+        with pytest.raises(RobotError, match="turn the robot in its file by -30 degrees about z"):
+            read_mjcf(radial((30.0, 210.0)), **how)  # type: ignore[arg-type]
+    robot = read_mjcf(radial((30.0, 210.0), turned=-30.0), floating=True)
+    assert robot.joint_names[3:] == ("hip0", "hip1")
+
+
+def test_a_free_joint_is_replaced_as_advised() -> None:
+    with pytest.raises(RobotError, match="load it with floating=True"):
+        read_mjcf(radial((0.0, 180.0)))
+    assert read_mjcf(radial((0.0, 180.0)), floating=True).nv == 5
+    mixed = radial((0.0, 180.0, 90.0, 270.0))
+    with pytest.raises(RobotError, match="load it with projected=True, which does so and locks"):
+        read_mjcf(mixed)
+    assert read_mjcf(mixed, projected=True).nv == 5

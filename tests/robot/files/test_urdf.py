@@ -11,6 +11,7 @@ import pytest
 from heelstrike import dynamics
 from heelstrike.errors import RobotError
 from heelstrike.robot import RobotWarning, load_robot, read_mjcf
+from heelstrike.robot.files.options import LoadOptions
 from heelstrike.robot.library import NO_CONTACTS, NO_MOTORS
 
 INERTIA = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
@@ -170,12 +171,72 @@ def test_visual_meshes_need_not_be_there() -> None:
     assert read_mjcf(biped(joint("planar"), SPHERE + visual)).nc == 2
 
 
-def test_a_link_that_is_weighed_by_its_shape_is_mentioned() -> None:
+def without_inertial(text: str, link: str) -> str:
+    """Return a URDF whose link has lost its ``<inertial>``."""
+    start = text.index("<inertial>", text.index(f'"{link}"'))
+    return text[:start] + text[text.index("</inertial>", start) + len("</inertial>") :]
+
+
+def fixed(link: str, parent: str) -> str:
+    """Return a link that is fixed to another, with a box and no ``<inertial>``."""
+    box = '<collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision>'
+    return (
+        f'<link name="{link}">{box}</link><joint name="{link}_weld" type="fixed">'
+        f'<parent link="{parent}"/><child link="{link}"/></joint></robot>'
+    )
+
+
+def padded(text: str) -> str:
+    """Return the biped with a pad fixed to either leg."""
+    for side in ("left", "right"):
+        text = text.replace("</robot>", fixed(f"{side}_pad", f"{side}_leg"))
+    return text
+
+
+@pytest.mark.parametrize(
+    "how", [{}, {"projected": True}, {"forward": "x"}, {"floating": True}], ids=str
+)
+def test_shapes_without_inertial_weigh_nothing(how: LoadOptions) -> None:
+    whole = biped(joint("planar"))
+    plain = read_mjcf(whole, **how)
+    with pytest.warns(RobotWarning, match="left_pad, right_pad have a <collision> and no") as told:
+        robot = read_mjcf(padded(whole), **how)
+    assert len(told) == 1
+    np.testing.assert_array_equal(robot.model.mass, plain.model.mass)
+    np.testing.assert_array_equal(robot.model.inertia, plain.model.inertia)
+    assert robot.nc > plain.nc  # they touch the ground all the same
+
+
+def test_a_file_that_asks_for_the_mass_of_shapes_gets_it() -> None:
+    asked = '<mujoco><compiler inertiafromgeom="true"/></mujoco></robot>'
+    whole = biped(joint("planar")).replace("</robot>", asked)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RobotWarning)
+        heavier = read_mjcf(padded(whole))
+    boxes = 2 * 1000.0 * 0.1**3
+    assert heavier.total_mass == pytest.approx(read_mjcf(whole).total_mass + boxes)
+
+
+def test_a_leg_that_has_lost_its_mass_is_refused() -> None:
+    with (
+        pytest.warns(RobotWarning, match="left_leg has a <collision>"),
+        pytest.raises(RobotError, match=r"moves no mass.*or make it a fixed joint"),
+    ):
+        read_mjcf(without_inertial(biped(joint("planar")), "left_leg"))
+
+
+def test_two_hinges_at_one_place_with_no_mass_between_them_are_refused() -> None:
+    leg = (
+        '<link name="between"/><joint name="one" type="continuous"><parent link="left_leg"/>'
+        '<child link="between"/><axis xyz="0 1 0"/></joint>'
+        f'{link("tip", 1, "")}<joint name="two" type="continuous">'
+        '<parent link="between"/><child link="tip"/><origin xyz="AT"/><axis xyz="0 1 0"/></joint>'
+    )
     text = biped(joint("planar"))
-    start = text.index("<inertial>", text.index('"left_leg"'))
-    bare = text[:start] + text[text.index("</inertial>", start) + len("</inertial>") :]
-    with pytest.warns(RobotWarning, match="left_leg have no <inertial>"):
-        read_mjcf(bare)
+    with pytest.raises(RobotError, match="joints 'one' and 'two' can move together without"):
+        read_mjcf(text.replace("</robot>", leg.replace("AT", "0 0 0") + "</robot>"))
+    apart = read_mjcf(text.replace("</robot>", leg.replace("AT", "0 0 -0.1") + "</robot>"))
+    assert apart.nv == 7
 
 
 def test_a_link_without_mass_that_ends_a_leg_is_refused() -> None:

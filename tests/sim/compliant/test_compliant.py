@@ -22,7 +22,7 @@ from heelstrike.sim.compliant.contact_law import (
     KelvinVoigt,
     RegularisedFriction,
 )
-from heelstrike.sim.compliant.method import Compliant
+from heelstrike.sim.compliant.method import PATIENCE, Compliant
 
 
 @cache
@@ -196,6 +196,63 @@ def test_slip_and_stick(friction: RegularisedFriction | BristleFriction) -> None
     )
     assert [event.kind for event in run.events] == [EventKind.SLIP, EventKind.STICK]
     assert run.events[1].time == pytest.approx(1.0 / (0.5 * 9.81), abs=2e-3)
+
+
+def switched_arm(step: float) -> hs.Run:
+    """Two links in the air whose torques jump at v + 4 q = 0, and hold both of them there."""
+    build = hs.RobotBuilder("arm")
+    link = {"mass": 1.0, "inertia": 0.02, "center_of_mass": (0, -0.25), "torque": 1e3}
+    build.hinge("elbow", build.hinge("shoulder", None, at=(0, 1), **link), at=(0, -0.5), **link)
+
+    @hs.controller
+    def switch(t, state, contacts, robot, torque):  # type: ignore[no-untyped-def]
+        for i in range(2):
+            torque[i] = -30.0 * np.sign(state.v[i] + 4.0 * state.q[i])
+
+    return hs.simulate(
+        build.build(), switch(), state=hs.State([0.3, 0.5], [-1.2, -2.0]), duration=0.1,
+        method=Compliant(step=step), stop_when_fallen=False, record_every=round(1e-2 / step),
+    )  # fmt: skip
+
+
+def test_a_law_that_switches_to_and_fro_is_crossed_and_the_run_says_so() -> None:
+    """Where v = −4 q attracts from both sides q decays as exp(−4 t), whatever the masses.
+
+    They begin on it, where the law asks for nothing. Torques are held for a hundredth of a sample,
+    and everything is wrong by that in the first order. Followed, each millisecond took a million
+    steps.
+    """
+    errors = []
+    for step in (2e-3, 1e-3):
+        run = switched_arm(step)
+        told = [event.impulse for event in run.events if event.kind is EventKind.BRIDGE]
+        assert run.completed
+        assert run.steps <= 2 * PATIENCE + 500 * round(0.1 / step)
+        assert 0 < len(told) <= round(0.1 / step)
+        assert 0.02 <= sum(length for length, _ in told) <= 0.1 + 1e-12
+        wrong = max(wrong for _, wrong in told)
+        off = run.velocity + 4.0 * run.position
+        assert 0.0 < np.abs(off).max() <= wrong <= 100.0 * step
+        exact = np.exp(-4.0 * run.time)[:, None] * run.position[0]
+        errors.append(np.abs(run.position - exact).max())
+    assert errors[1] <= 0.6 * errors[0] <= 0.6e-2, errors
+
+
+def test_a_law_that_jumps_once_is_followed() -> None:
+    """Torques that jump within a sample, and stay: no torque is held, and it is as exact."""
+    build = hs.RobotBuilder("wheel", gravity=0.0)
+    build.hinge("axle", None, mass=1.0, inertia=0.5, torque=1e3)
+
+    @hs.controller
+    def late(t, state, contacts, robot, torque):  # type: ignore[no-untyped-def]
+        torque[0] = 100.0 if t > 0.00537 else -100.0
+
+    run = hs.simulate(
+        build.build(), late(), state=hs.State([0.0], [0.0]), duration=0.01, method=Compliant(),
+        stop_when_fallen=False,
+    )  # fmt: skip
+    assert not run.events
+    assert run.velocity[-1, 0] == pytest.approx(200.0 * (0.01 - 2.0 * 0.00537), abs=5e-5)
 
 
 def test_joint_stops_push_back() -> None:

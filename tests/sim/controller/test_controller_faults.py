@@ -98,6 +98,7 @@ def run(controller: Any, method: Method, **options: Any) -> hs.Run:
         state=walking.gait().initial_state,
         duration=0.1,
         method=method,
+        on_error="stop",
         **options,
     )
 

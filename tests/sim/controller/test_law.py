@@ -144,7 +144,7 @@ def test_a_law_is_copied_by_pickle(outside: Any) -> None:
 def test_machine_code_is_good_for_the_queries_it_was_made_with(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    called = computed_torque._separate._function
+    called = computed_torque.separate._function
     before = numba_in_use().made_of(called)
     assert numba_in_use().made_of(called) == before
     other = stance.point_foot_torque.py_func.__code__  # type: ignore[attr-defined]

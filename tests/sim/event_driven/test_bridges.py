@@ -14,6 +14,7 @@ from scenes.record import Rows
 from scenes.scene import random_scene
 
 import heelstrike as hs
+from heelstrike import dynamics
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.sim import Event, EventKind, RunStatus, Simulation
 from heelstrike.sim.event_driven.bridge import MOST_BRIDGES
@@ -92,6 +93,58 @@ def test_what_a_bridge_in_free_fall_is_wrong_by() -> None:
     (bridge,) = bridges(simulation.record)
     assert bridge.impulse[0] == pytest.approx(length)
     assert bridge.impulse[1] == pytest.approx(0.5 * 9.81 * length**2, rel=1e-6)
+
+
+def test_a_bridge_says_how_wrong_it_may_be_with_the_doubt_about_that() -> None:
+    """Of a pendulum, q̈ = −ω² sin q, each bridge moves on with the velocity of its end.
+
+    The error of order one from halves, 2 (whole − halves), and what that from quarters,
+    4 (halves − quarters), differs from it by: the largest of each.
+    """
+    build = hs.RobotBuilder("pendulum")
+    build.hinge("hinge", None, mass=1.0, inertia=0.05, center_of_mass=(0, -0.5))
+    simulation = Simulation(
+        build.build(), state=hs.State([1.2], [9.0]), method=hs.EventDriven(),
+        stop_when_fallen=False,
+    )  # fmt: skip
+    simulation.advance(0.01)
+    begin = simulation.state
+    phase, length = simulation._work, 1e-6 * 4.0**4
+    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    simulation.advance(0.01 + length)
+    (bridge,) = bridges(simulation.record)
+
+    def reached(parts: int) -> np.ndarray:
+        q, v = begin.q[0], begin.v[0]
+        for _ in range(parts):
+            v -= length / parts * 9.81 * 0.5 / (0.05 + 0.25) * np.sin(q)
+            q += length / parts * v
+        return np.array([q, v])
+
+    whole, halves, quarters = (reached(parts) for parts in (1, 2, 4))
+    first, second = 2.0 * (whole - halves), 4.0 * (halves - quarters)
+    doubt = np.abs(first - second).max()
+    assert bridge.impulse == pytest.approx((length, np.abs(first).max() + doubt), rel=1e-7)
+    assert doubt >= 1e-5 * np.abs(first).max()
+
+
+def test_loops_hold_at_the_end_of_a_bridge() -> None:
+    """Their rows turn on the way: velocities behind it would tear at them by ½ h J̇ v."""
+    robot = mechanisms.four_bar()
+    simulation = Simulation(
+        robot, state=robot.closed(hs.State([0.5, 0.0, 0.0], [4.0, 0.0, 0.0]), keep=["crank"]),
+        method=hs.EventDriven(), stop_when_fallen=False,
+    )  # fmt: skip
+    simulation.advance(0.01)
+    phase, length = simulation._work, 1e-6 * 4.0**4
+    phase.bridging, phase.bridges, phase.series = 1, 4, simulation.time
+    simulation.advance(0.01 + length)
+    run, reached = simulation.record, phase.end  # before the next phase puts it right
+    (bridge,) = bridges(run)
+    assert run.completed
+    assert np.abs(dynamics.loop_displacement(robot, reached[:3])).max() <= 1e-12
+    assert np.abs(dynamics.loop_jacobian(robot, reached[:3]) @ reached[3:]).max() <= 1e-6
+    assert bridge.impulse[1] <= 1e-4
 
 
 def test_a_bridge_obeys_the_laws_and_is_kept_in_files(tmp_path: Path) -> None:

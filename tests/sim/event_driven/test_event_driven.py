@@ -377,3 +377,47 @@ def test_a_block_holds_until_the_force_is_all_of_its_friction(direction: float) 
     tangent = run.contact_force[..., 1].sum(axis=1)
     np.testing.assert_allclose(tangent[holds], -rate * run.time[holds], atol=1e-7)
     assert run.position[-1, 0] == pytest.approx(rate * (0.6 - begins) ** 3 / 12.0, rel=1e-5)
+
+
+def chain() -> hs.Robot:
+    build, link = hs.RobotBuilder("chain"), None
+    for index in range(3):
+        link = build.hinge(
+            f"joint {index}", link, at=(0, -0.5), mass=1.0, inertia=0.02, center_of_mass=(0, -0.25)
+        )
+    return build.build()
+
+
+def test_rows_between_steps_are_nearly_as_exact_as_the_steps() -> None:
+    """Within a step the dense output may be ten times as wrong as its end, and no more.
+
+    Errors are measured as the integration measures them: by the larger of the values at both ends
+    of a step. A velocity that passes zero within is hundreds of times its own tolerance off.
+    """
+
+    def swings(**options: float | None) -> hs.Run:
+        return hs.simulate(
+            chain(), state=hs.State([0.3, -0.8, 0.5], [5.0, -9.0, 14.0]), duration=0.25,
+            method=hs.EventDriven(**options), stop_when_fallen=False,
+        )  # fmt: skip
+
+    exact, rows = swings(rtol=1e-13, atol=1e-14), swings()
+    ends = swings(output_period=None)
+    after = np.clip(np.searchsorted(ends.time, rows.time - 1e-12), 1, len(ends.time) - 1)
+    between = np.min(np.abs(rows.time[:, None] - ends.time), axis=1) > 1e-9
+    assert between.sum() >= 200
+    for name in ("position", "velocity"):
+        size = np.abs(getattr(ends, name))
+        scale = 1e-10 + 1e-8 * np.maximum(size[after - 1], size[after])
+        off = np.abs(getattr(rows, name) - getattr(exact, name)) / scale
+        assert off.max() <= 15.0, name
+
+
+def test_no_step_is_longer_than_the_longest() -> None:
+    """In the air, where nothing asks for a step; and so it is behind a first one of its own."""
+    run = hs.simulate(
+        chain(), state=hs.State(np.zeros(3), np.zeros(3)), duration=0.1,
+        method=hs.EventDriven(max_step=4e-3, output_period=None), stop_when_fallen=False,
+    )  # fmt: skip
+    assert np.diff(run.time).max() == pytest.approx(4e-3, rel=1e-9)
+    assert run.steps == pytest.approx(26, abs=2)

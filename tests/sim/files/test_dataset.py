@@ -19,7 +19,7 @@ from synthetic_runs import box, make_run, pendulum
 import heelstrike as hs
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.robot import Robot, read_mjcf
-from heelstrike.sim import Event, EventKind, RunStatus, Scheme
+from heelstrike.sim import Event, EventKind, RunStatus, Scheme, SolverCount
 from heelstrike.sim.files.dataset import to_dataset
 from heelstrike.sim.files.run_file import load_run, save
 
@@ -328,6 +328,25 @@ def test_nothing_there(tmp_path: Path) -> None:
 
 
 # Writing
+
+
+def test_what_older_files_do_not_count_is_none(tmp_path: Path) -> None:
+    path = make_run(box(), [0.0, 0.1], solver=SolverCount("lemke", 9, 5, 3, 2, 1, 1)).save(
+        tmp_path / "older.nc"
+    )
+    with h5py.File(path, "a") as file:
+        for name in ("solver_combinations", "solver_relaxed", "worst_energy_gain"):
+            del file.attrs[name]
+        assert "method_bounded_restitution" in file.attrs
+        del file.attrs["method_bounded_restitution"]
+    again = load_run(path)
+    assert again.solver == SolverCount("lemke", 9, 5, 3, 2, 0, 0)
+    assert again.certificates.energy_gain == 0.0
+    assert again.method == hs.TimeStepping(step=0.1)
+    with h5py.File(path, "a") as file:
+        del file.attrs["solver_failures"]
+    with pytest.raises(hs.RunFileError, match="solver_failures"):
+        load_run(path)
 
 
 def test_missing_folder(tmp_path: Path) -> None:

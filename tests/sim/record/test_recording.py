@@ -15,6 +15,7 @@ from heelstrike.sim.memory import Memory, allocate_memory
 from heelstrike.sim.record.recording import note_extremes
 
 G = 9.81
+TOUCHDOWN, LIFTOFF = EventKind.TOUCHDOWN, EventKind.LIFTOFF
 
 
 def worst(memory: Memory) -> tuple[float, float, float, float]:
@@ -54,10 +55,10 @@ def test_worst_values_come_out_under_their_names() -> None:
     simulation = hs.Simulation(box(), state=state)
     tally = simulation._memory.tally
     tally.penetration, tally.complementarity, tally.cone = 1e-3, 2e-12, 3e-12
-    tally.non_penetration = 4e-12
+    tally.non_penetration, tally.energy_gain = 4e-12, 5.0
     found = simulation.record.certificates
     assert found == Certificates(
-        penetration=1e-3, complementarity=2e-12, cone=3e-12, non_penetration=4e-12
+        penetration=1e-3, complementarity=2e-12, cone=3e-12, non_penetration=4e-12, energy_gain=5.0
     )
 
 
@@ -304,3 +305,18 @@ def test_events_of_a_step_come_in_the_order_in_which_they_happened() -> None:
     )
     told = [(event.kind, event.contact, pytest.approx(event.time)) for event in run.events]
     assert told == [(EventKind.LIFTOFF, 1, 0.050), (EventKind.TOUCHDOWN, 0, 0.051)]
+
+
+def test_what_a_step_ends_with_comes_before_what_the_next_begins_with() -> None:
+    """A point that bounces for one step comes down and leaves at one time, the same to the bit."""
+    run = hs.simulate(
+        point(), state=hs.State([0.0, 0.05], [0.2, 0.0]), duration=1.0,
+        method=hs.TimeStepping(scheme=Scheme.MOREAU_JEAN),
+        ground=hs.Ground(friction=0.5, restitution=0.8), stop_when_fallen=False,
+    )  # fmt: skip
+    kinds = [event.kind for event in run.events if event.kind in (TOUCHDOWN, LIFTOFF)]
+    assert len(kinds) >= 10
+    assert kinds == [TOUCHDOWN, LIFTOFF] * (len(kinds) // 2) + [TOUCHDOWN] * (len(kinds) % 2)
+    times = np.array([event.time for event in run.events])
+    assert np.isin(times, run.time).all()
+    assert np.any(np.diff(times) == 0.0)

@@ -3,114 +3,20 @@
 from __future__ import annotations
 
 import http.server
-import io
 import threading
-from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import walking
-from browsers import browser, wait_until
-from PIL import Image
+from browsers import wait_until
+from live_page import CENTER, FORCE, LEFT_LEG, PRESSURE, PUSH, RIGHT_LEG, TRUNK, Page
 
 import heelstrike as hs
-from heelstrike.cli.options import method_called
-from heelstrike.cli.watch import METHODS
-from heelstrike.experiments.watching import First, WalkStage
 from heelstrike.view.live.viewer import Viewer, view
 
 pytest.importorskip("websockets", reason="the live view is not installed: heelstrike[watch]")
 pytest.importorskip("playwright", reason="playwright, which drives the browser, is missing")
-
-# 8-bit red, green, blue of what is drawn.
-RIGHT_LEG, LEFT_LEG, TRUNK = (0, 114, 178), (213, 94, 0), (34, 34, 34)
-FORCE, CENTER, PRESSURE, PUSH = (0, 120, 90), (230, 159, 0), (169, 68, 127), (176, 0, 32)
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    with browser() as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def gait(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    walking.walk(steps=1)  # compiled, before anybody waits for it
-    path = tmp_path_factory.mktemp("gait") / "gait.json"
-    walking.gait().save(path)
-    return path
-
-
-@pytest.fixture
-def viewer(gait: Path) -> Iterator[Viewer]:
-    """A live walk of bravo7 with all controls."""
-    with view(stage=WalkStage("bravo7", method_called, METHODS, First(gait=gait))) as viewer:
-        yield viewer
-
-
-class Page:
-    """A page in the browser, and all that went wrong on it."""
-
-    def __init__(self, chromium: Any, viewer: Viewer, **options: Any) -> None:
-        self.page = chromium.new_page(viewport={"width": 1280, "height": 800}, **options)
-        self.wrong: list[str] = []
-        self.asked: set[str] = set()
-        self.page.on("console", self._heard)
-        self.page.on("pageerror", lambda error: self.wrong.append(str(error)))
-        self.page.on("request", lambda request: self.asked.add(request.url))
-        self.page.goto(viewer.url)
-        wait_until(lambda: self.time > 0.0, "the first picture")
-
-    def _heard(self, message: Any) -> None:
-        if message.type in ("error", "warning"):
-            self.wrong.append(message.text)
-
-    def __enter__(self) -> Page:
-        return self
-
-    def __exit__(self, kind: Any, *_: Any) -> None:
-        self.page.close()
-        if kind is None:
-            assert self.wrong == []
-
-    def data(self, name: str) -> float:
-        told = self.page.evaluate(f"document.getElementById('plane').dataset.{name} || 0")
-        return float(told)
-
-    @property
-    def time(self) -> float:
-        return self.data("time")
-
-    def text(self, name: str) -> str:
-        return str(self.page.locator(f"#{name}").inner_text())
-
-    def picture(self) -> np.ndarray:
-        with Image.open(io.BytesIO(self.page.locator("#plane").screenshot())) as picture:
-            return np.asarray(picture.convert("RGB")).astype(int)
-
-    def where(self, color: tuple[int, int, int]) -> np.ndarray:
-        """Rows and columns of the pixels of a colour, (n, 2)."""
-        return np.argwhere(np.abs(self.picture() - color).max(axis=-1) < 16)
-
-    def halt(self) -> float:
-        """Pause; return the time at which it stands."""
-        self.page.click("#play")
-        wait_until(lambda: "play" in self.text("play"), "the pause")
-        return self.settled()
-
-    def settled(self) -> float:
-        """Wait until the picture shows the same time twice."""
-        seen = [self.time]
-
-        def stands() -> bool:
-            self.page.wait_for_timeout(60)
-            seen.append(self.time)
-            return seen[-1] == seen[-2]
-
-        wait_until(stands, "a picture that stands still")
-        return seen[-1]
 
 
 def test_the_robot_moves(chromium: Any, viewer: Viewer) -> None:
@@ -193,9 +99,22 @@ def test_scrub_step_back_and_jump(chromium: Any, viewer: Viewer) -> None:
         wait_until(lambda: seen.time == pytest.approx(end), "a step forth")
         seen.page.click("#forth")
         wait_until(lambda: seen.time == pytest.approx(end + 1e-3), "a new step")
-        strip = seen.page.locator("#time").bounding_box()
+        for name in ("strip", "curves"):
+            box = seen.page.locator(f"#{name}").bounding_box()
+            y = box["y"] + 30
+            seen.page.mouse.move(box["x"] + 0.4 * box["width"], y)
+            seen.page.mouse.down()
+            times = []
+            for share in (0.35, 0.3, 0.25):
+                seen.page.mouse.move(box["x"] + share * box["width"], y)
+                times.append(seen.settled())
+            seen.page.mouse.up()
+            assert times[0] > times[1] > times[2] > 0.0, name
+        strip = seen.page.locator("#strip").bounding_box()
         seen.page.mouse.click(strip["x"] + 0.3 * strip["width"], strip["y"] + 8)
         wait_until(lambda: abs(seen.time - 0.3 * end) < 0.05 * end, "the place on the strip")
+        session = viewer._session
+        wait_until(lambda: abs(session.cursor - seen.time) < 2e-3, "that of the server, too")
         seen.page.select_option("#kinds", "touchdown")
         seen.page.click("#event-after")
         wait_until(lambda: seen.time == pytest.approx(0.7), "the first touchdown")
@@ -215,7 +134,7 @@ def test_curves_follow(chromium: Any, viewer: Viewer) -> None:
         seen.halt()
         shown = []
         for group in ("joints", "torques", "feet", "energy"):
-            seen.page.click(f"text={group}")
+            seen.page.click(f"#groups >> text={group}")
             seen.page.wait_for_timeout(200)
             shown.append(seen.page.locator("#curves").screenshot())
         assert len(set(shown)) == 4
@@ -270,6 +189,30 @@ def test_a_run_is_looked_at(chromium: Any) -> None:
         assert box["width"] > 400.0
         seen.halt()
         assert len(seen.where(RIGHT_LEG)) > 20
+
+
+def test_joints_are_moved_when_halted(chromium: Any, viewer: Viewer) -> None:
+    session = viewer._session
+    with Page(chromium, viewer) as seen:
+        knee = seen.page.locator("input[name=left_knee]")
+        assert knee.is_disabled()
+        seen.halt()
+        wait_until(knee.is_enabled, "sliders that can be moved")
+        before = seen.picture()
+        knee.focus()
+        seen.page.keyboard.press("End")
+        farthest = walking.bravo7().model.upper[walking.bravo7().joint_index("left_knee")]
+
+        def position() -> float:
+            return float(walking.bravo7().positions(session.live.simulation.state)["left_knee"])
+
+        wait_until(lambda: position() == pytest.approx(farthest, abs=0.01), "a bent knee")
+        wait_until(lambda: np.abs(seen.picture() - before).max() > 100, "its picture")
+        wait_until(lambda: "2.2" in knee.locator("xpath=../b").inner_text(), "its number")
+        now = seen.time
+        seen.page.click("#play")
+        wait_until(lambda: seen.time > now, "that it goes on")
+        wait_until(knee.is_disabled, "sliders that follow")
 
 
 FOREIGN = """<!DOCTYPE html><script>

@@ -10,10 +10,12 @@ import pytest
 import walking
 
 import heelstrike as hs
+from heelstrike.dynamics import link_poses
 from heelstrike.sim import EventKind
 from heelstrike.view.live import live_simulation
 from heelstrike.view.live import session as sessions
 from heelstrike.view.live.board import Board
+from heelstrike.view.live.frames import Layout
 from heelstrike.view.live.session import Session
 from heelstrike.view.live.stage import GivenStage, Stage
 
@@ -232,6 +234,48 @@ def test_it_goes_on_from_an_earlier_time_bit_by_bit() -> None:
     assert np.array_equal(free.position, walking.walk(steps=2).position[: len(free.time)])
 
 
+def test_a_joint_of_the_halted_robot_is_moved() -> None:
+    session, shown = watching(walker())
+    robot = walking.bravo7()
+    go_on(session, 0.3)
+    before = session.live.simulation.state
+    knee = robot.joint_index("left_knee")
+    assert ask(session, "pose", joint="left_knee", value=1.2) == ""
+    assert not session.playing
+    state = session.live.simulation.state
+    assert state.q[knee] == 1.2
+    changed = np.flatnonzero(state.q != before.q)
+    assert set(changed) <= {knee, robot.joint_index("root_z")}  # it stands on the ground
+    assert session.live.simulation.contacts.gap.min() == pytest.approx(0.0, abs=1e-9)
+    assert np.array_equal(state.v, before.v)
+    sliders = {each["name"]: each for each in shown.scene["layout"]["joints"]}
+    assert set(sliders) == set(robot.joint_names[3:])
+    assert shown.seen[sliders["left_knee"]["at"]] == 1.2
+    assert (sliders["left_knee"]["low"], sliders["left_knee"]["high"]) == (
+        robot.model.lower[knee], robot.model.upper[knee],
+    )  # fmt: skip
+    assert shown.seen[0] == session.cursor == session.live.time
+    # Beyond its range it comes to the end of it; it goes on from there, and can be taken back.
+    ask(session, "pose", joint="left_knee", value=9.0)
+    assert session.live.simulation.state.q[knee] == robot.model.upper[knee]
+    ask(session, "play", on=True)
+    go_on(session, 0.32)
+    ask(session, "seek", time=0.2)
+    ask(session, "pose", joint="left_knee", value=0.5)
+    assert session.history.time[-1] == session.live.time == pytest.approx(0.2)
+    assert session.live.simulation.state.q[knee] == 0.5
+    assert "has no joint" in ask(session, "pose", joint="tail", value=1.0)
+    assert "not a finite number" in ask(session, "pose", joint="left_knee", value="nan")
+
+
+def test_joints_that_carry_the_robot_through_the_world_have_no_slider() -> None:
+    compass = hs.load_robot("compass_gait")
+    assert [each["name"] for each in Layout(compass).described()["joints"]] == [
+        "right_leg", "left_leg",
+    ]  # fmt: skip
+    assert Layout(hs.load_robot("rimless_wheel")).described()["joints"] == []
+
+
 def test_friction_acts_at_once_and_is_there_when_gone_back() -> None:
     session, _ = watching(walker())
     go_on(session, 0.2)
@@ -283,12 +327,13 @@ def test_nothing_that_viewers_do_breaks_it(seed: int) -> None:
         return float(random.normal())
 
     kinds = ["play", "step", "seek", "event", "rate", "hold", "release", "random push", "choose",
-             "reset", "resume", "leave", "nothing"]  # fmt: skip
+             "pose", "reset", "resume", "leave", "nothing"]  # fmt: skip
     for _ in range(150):
         do = str(random.choice(kinds))
         sane: dict[str, Any] = {
             "on": True, "rows": random.choice([-1, 1]), "time": 0.5 * abs(number()),
             "direction": random.choice([-1, 1]), "value": abs(number()), "name": "friction",
+            "joint": str(random.choice(walking.bravo7().joint_names)),
             "link": int(random.integers(-1, 10)), "point": [number(), number()],
             "force": [200.0 * number(), 200.0 * number()],
         }  # fmt: skip
@@ -424,6 +469,28 @@ def test_what_cannot_begin_says_why() -> None:
     assert not session.playing
     # What acts at once on a walk begins one where there is none.
     assert ask(session, "choose", name="friction", value=0.3).startswith("there is no such gait")
+
+
+class Slow(Broken):
+    """A stage that shows where it would begin before it fails."""
+
+    def outline(self, values: Any) -> tuple[hs.Robot, hs.State, hs.Ground]:
+        return walking.bravo7(), walking.gait().initial_state, hs.Ground()
+
+
+def test_where_it_begins_is_seen_before_there_is_a_simulation() -> None:
+    """The robot in its pose, and no forces; once a walk has begun it stays instead."""
+    session, shown = watching(Slow(walker()))
+    assert session.live is None
+    expected = link_poses(walking.bravo7(), walking.gait().initial_state.q)
+    pose = shown.field("pose").reshape(-1, 3)
+    np.testing.assert_array_equal(pose, np.column_stack((expected.origin, expected.angle)))
+    assert not shown.field("force").any()
+    walks, shown = watching(walker())
+    go_on(walks, 0.1)
+    walks._stage = Slow(walker())
+    ask(walks, "reset")
+    assert len(shown.course) > 1
 
 
 def test_updates_come_however_many_commands_do(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import falls
 import numpy as np
 import pytest
 import walking
@@ -176,6 +177,17 @@ def test_a_report_plays_its_film(chromium: Any, files: dict[str, Path]) -> None:
     sizes = opened.page.eval_on_selector_all("img", "all => all.map(one => one.naturalWidth)")
     assert len(sizes) == 9
     assert min(sizes) > 300  # every figure is there
+    opened.check()
+
+
+def test_a_report_of_a_fall_begins_where_it_went_wrong(chromium: Any, tmp_path: Path) -> None:
+    """A click on what happened takes the film there."""
+    run, gait = falls.run_of("pushed forwards"), walking.gait()
+    opened = Opened(chromium, run.save_report(tmp_path / "fall.html", gait=gait)).ready()
+    assert 0.85 < opened.time < 1.0
+    opened.page.click(".happened tr:last-child button")
+    assert opened.time == pytest.approx(float(run.time[-1]), abs=1e-3)
+    assert opened.share("canvas", LIGHT["right leg"]) > 5e-4
     opened.check()
 
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 
+import falls
 import numpy as np
 import pytest
 import walking
 from synthetic_runs import make_run, pendulum, pushes
 
 import heelstrike as hs
+from heelstrike.analysis import Limit, Tried
 from heelstrike.sim import RunStatus, SolverCount
-from heelstrike.view.page import Limit, judge
+from heelstrike.view.page import judge
+from heelstrike.view.page.verdict import told
 
 
 def limits_of(run: hs.Run) -> dict[str, Limit]:
@@ -23,7 +27,13 @@ def test_a_walk_that_reaches_nothing() -> None:
     verdict = judge(walking.walk(steps=2), walking.gait())
     assert verdict.good
     assert verdict.headline.startswith("bravo7 walks: 2 steps, 0.")
-    assert verdict.headline.endswith("Nothing has to change.")
+    assert verdict.headline.endswith(
+        "Nothing has to change for this walk. No push and no slope was tried."
+    )
+    push = Tried("largest push", "5 N s (not 6)")
+    tried = judge(walking.walk(steps=2), walking.gait(), tried=[push])
+    assert tried.headline.endswith("Tried beside it: largest push: 5 N s (not 6).")
+    assert tried.tried == (push,)
     assert verdict.advice == ()
     assert {limit.kind for limit in verdict.limits} == {
         "friction", "zero moment point", "torque", "joint"
@@ -70,23 +80,53 @@ def test_zero_moment_point_and_friction_of_one_foot() -> None:
 
 
 def test_a_fall_names_what_came_first() -> None:
-    robot = walking.bravo7()
-    force = pushes(robot, [[0], [0]])
-    force[1, :, 1] = 0.75 * force[1, :, 0]
-    fell = {"status": RunStatus.FELL, "message": "fell"}
-    run = make_run(robot, [0.0, 0.1], force=force, **fell)
-    verdict = judge(run, walking.gait())
+    verdict = judge(falls.run_of("pushed forwards"), walking.gait())
     assert not verdict.good
-    assert "falls at 0.1 s" in verdict.headline
-    assert "optimize_gait(robot, friction=...)" in verdict.advice[0]
-    assert "optimize_gait" not in judge(run).headline  # nothing is known of a gait
-    early = hs.Push("trunk", force=(3.0, 4.0), start=0.05, duration=0.1)
-    pushed = judge(make_run(robot, [0.0, 0.1], force=force, pushes=(early,), **fell))
-    assert pushed.advice[0].startswith("the push of 5 N from 0.05 s on")
-    for start in (0.2, -0.6):  # after it, and long before
-        other = hs.Push("trunk", force=(3.0, 4.0), start=start, duration=0.1)
-        found = judge(make_run(robot, [0.0, 0.1], force=force, pushes=(other,), **fell))
-        assert found.advice[0].startswith("friction")
+    first, why, change = re.split(r"\. (?=First|To)", verdict.headline)
+    assert first.startswith("bravo7 falls at 1.8")
+    assert why.startswith("First cause: the left foot tips over its toe at 1.0")
+    assert "ms after a push of 300 N began; then torques reach their limits" in why
+    assert change.startswith("To change: walk it by hs.FootstepFeedback(robot, gait)")
+    assert verdict.fall is not None
+    assert verdict.changes[0].value == "FootstepFeedback"
+    # Limits are those before: in a fall all are reached.
+    assert all(limit.time <= verdict.fall.time for limit in verdict.limits)
+    assert "torque of right hip" not in {v.name for v in verdict.limits if v.reached < math.inf}
+    without = judge(falls.run_of("pushed forwards"))
+    assert "its gait is not known here" in without.headline
+
+
+def test_a_walk_without_reserve_is_told_so() -> None:
+    """It lasts, and its feet use all of the friction that there is."""
+    force = pushes(walking.bravo7(), [[0], [0]])
+    force[1, :, 1] = 0.75 * force[1, :, 0]
+    verdict = judge(make_run(walking.bravo7(), [0.0, 0.1], force=force))
+    assert verdict.good
+    assert "friction of the right foot has no reserve at 0.1 s" in verdict.advice[0]
+    assert "Nothing has to change" not in verdict.headline
+
+
+def test_what_was_seen_to_work_comes_first() -> None:
+    run, gait = falls.run_of("ice"), walking.gait()
+    friction, design = judge(run, gait).changes
+    seen = [Tried("friction", "it fell", False, friction), Tried("gait", "7 steps", True, design)]
+    advice = judge(run, gait, tried=seen).advice
+    assert advice[0].startswith("optimize_gait(robot, friction=0.048)")
+    assert advice[0].endswith("Tried: it walks, 7 steps.")
+    assert advice[1].endswith("Tried: it does not help, it fell.")
+
+
+@pytest.mark.parametrize("name", falls.KNOWN)
+def test_every_cause_is_told_in_words(name: str) -> None:
+    run = falls.run_of(name)
+    fall = judge(run, walking.gait()).fall
+    assert fall is not None
+    for each in fall.chain:
+        sentence = told(each, run.robot)
+        assert f"{each.time:.3f} s" in sentence
+        assert "nan" not in sentence
+        assert each.where.replace("_", " ") in sentence
+        assert f"{each.time:.3f} s" not in told(each, run.robot, when=False)
 
 
 def test_a_wheel_has_no_sole() -> None:
@@ -107,4 +147,4 @@ def test_what_is_not_certified_is_not_good() -> None:
 def test_runs_without_rows_or_numbers_are_judged_too() -> None:
     assert "did not begin" in judge(make_run(pendulum(), [])).headline
     run = make_run(pendulum(), [0.0, 0.1], torque=[[np.nan], [np.nan]], status=RunStatus.DIVERGED)
-    assert "smaller time step" in judge(run).headline
+    assert "a time step of 0.01 s" in judge(run).headline

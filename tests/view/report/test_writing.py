@@ -7,13 +7,16 @@ import json
 import re
 from pathlib import Path
 
+import falls
 import pytest
 import walking
 from synthetic_runs import box, make_run, pendulum
 
 import heelstrike as hs
+from heelstrike.analysis import first_cause
 from heelstrike.view import ViewError
 from heelstrike.view.report import writing
+from heelstrike.view.report.writing import report_page
 
 HOSTILE = "</script><img src=x onerror=alert(1)>\"'&"
 
@@ -85,6 +88,37 @@ def test_hostile_names_are_text(tmp_path: Path) -> None:
     assert "&lt;/script&gt;&lt;img src=x onerror=alert(1)&gt;" in text
 
 
+@pytest.mark.usefixtures("one_figure")
+def test_a_fall_is_shown_from_before_its_cause() -> None:
+    """And a walk that goes well in the middle of a step, both in figures that can be signed."""
+    fallen = falls.run_of("pushed forwards")
+    text = report_page({"bravo7": fallen}, walking.gait())
+    fall = first_cause(fallen, walking.gait())
+    assert fall is not None
+    assert shown(text) == pytest.approx(fall.time - writing.BEFORE)
+    times = [float(each) for each in re.findall(r'data-time="([^"]+)"', text)]
+    assert times == sorted(times)
+    assert times[0] == 1.0  # the push
+    assert times[1] == pytest.approx(fall.time)
+    assert times[-1] == pytest.approx(fallen.time[-1])
+    assert "How close to each limit before the first cause" in text
+    good = report_page({"bravo7": walking.walk(steps=2)}, walking.gait())
+    assert shown(good) == pytest.approx(1.05)  # of the second step
+    assert "data-time=" not in good
+    for part in ("clearance of the swing foot", "touchdown impulse", "touchdown velocity",
+                 "walking speed", "cost of transport", "tracking error", "mean power (W)",
+                 "peak power (W)", "Tried beside this run: nothing."):  # fmt: skip
+        assert part in good, part
+
+
+def shown(text: str) -> float:
+    """Time of the first picture of a report's film."""
+    found = re.search(r'<script type="application/json" id="runs">(.*?)</script>', text, re.DOTALL)
+    assert found is not None
+    (run,) = json.loads(found[1])
+    return float(run["shown"])
+
+
 def test_bad_requests(tmp_path: Path) -> None:
     run = make_run(box(), [0.0, 0.1])
     with pytest.raises(ViewError, match="prints it to PDF"):
@@ -92,7 +126,7 @@ def test_bad_requests(tmp_path: Path) -> None:
     for wrong in ("run.nc", ["run.nc"], {"a": 3}):
         with pytest.raises(ViewError, match="load_run"):
             hs.report(wrong, tmp_path / "report.html")  # type: ignore[arg-type]
-    with pytest.raises(hs.GaitError, match="load_gait"):
+    with pytest.raises(hs.ViewError, match="load_gait"):
         hs.report(run, tmp_path / "report.html", gait="gait.json")  # type: ignore[arg-type]
     with pytest.raises(ViewError, match="no run"):
         hs.report([], tmp_path / "report.html")

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.stability.across import Across
 from heelstrike.analysis.stability.loop import ClosedLoop
 from heelstrike.analysis.stability.measurement import measure
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.robot.robot import Robot
@@ -134,6 +135,7 @@ class Floquet:
 
 
 # More arguments than eight: what walks, and what is disturbed how, are a user's to say.
+@takes(SimulationError)
 def floquet_multipliers(
     robot: Robot,
     state: State | Snapshot,

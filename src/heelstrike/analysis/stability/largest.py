@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from heelstrike.analysis.stability.trial import Trial
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import SimulationError
 from heelstrike.sim.push import Push
@@ -99,6 +100,7 @@ def largest(
     return Largest(recovered=max(good, 0.0), failed=bad, trials=trials, unit=unit)
 
 
+@takes(SimulationError)
 def largest_push(
     trial: Trial, *, phase: float = 0.5, direction: tuple[float, float] = (1.0, 0.0),
     duration: float = 0.1, link: str | int = 2, most: float = 100.0, strides: int = 8,
@@ -166,6 +168,7 @@ def largest_push(
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="N s")
 
 
+@takes(SimulationError)
 def largest_slope(
     trial: Trial, *, uphill: bool, most: float = 15.0, strides: int = 15, halvings: int = 2
 ) -> Largest:
@@ -203,6 +206,7 @@ def largest_slope(
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="degrees")
 
 
+@takes(SimulationError)
 def largest_ground_step(
     trial: Trial, *, up: bool, most: float = 0.1, strides: int = 10, halvings: int = 2
 ) -> Largest:
@@ -240,6 +244,7 @@ def largest_ground_step(
     return largest(recovers, most=most, strides=strides, halvings=halvings, unit="m")
 
 
+@takes(SimulationError)
 def largest_roughness(
     trial: Trial, *, seed: int, spacing: float = 0.1, most: float = 0.05, strides: int = 10,
     halvings: int = 2,

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.poincare_map import SAME_INSTANT, Chart, PoincareMap, Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
 from heelstrike.analysis.stability.variation import Variation
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.queries.linearization import (
@@ -204,6 +205,7 @@ class Monodromy:
         )
 
 
+@takes(SimulationError)
 def monodromy(
     robot: Robot,
     state: State,

@@ -23,6 +23,7 @@ from heelstrike.analysis.stability.measurement import Measurement, measure
 from heelstrike.analysis.stability.returns import DIFFERENT, returned
 from heelstrike.analysis.stability.section import Section
 from heelstrike.analysis.stability.sensitivity import gait_sensitivity_norm
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.errors import LimitCycleError, SimulationError
@@ -208,6 +209,7 @@ class DisturbanceResponse:
 
 
 # More arguments than eight: what walks, and what is disturbed how, are a user's to say.
+@takes(SimulationError)
 def disturbance_response(
     robot: Robot,
     state: State | Snapshot,

@@ -13,9 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.errors import SimulationError
 
 
+@takes(SimulationError)
 def gait_sensitivity_norm(A: ArrayLike, B: ArrayLike, C: ArrayLike, D: ArrayLike) -> float:
     """Gait sensitivity norm of a walk that is linearised from step to step.
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from heelstrike.analysis.recovery import Recovery, recovery
+from heelstrike.arguments import check_fields
 from heelstrike.contact.ground import Ground
 from heelstrike.control import Law
 from heelstrike.dynamics import contact_positions
@@ -84,6 +85,7 @@ class Trial:
     progress: Callable[[float], None] | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         if not self.robot.floating:
             raise SimulationError(
                 f"trials of balance need a robot with a trunk that floats; {self.robot.name!r} is "

@@ -16,8 +16,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import LimitCycleError
+from heelstrike.errors import GaitError, LimitCycleError
 from heelstrike.gait.phased.phased_gait import PhasedGait
 from heelstrike.gait.phased.surface import Surface, Touchdown
 from heelstrike.gait.polynomials import gauss
@@ -140,6 +141,7 @@ class ZeroDynamics:
         return f"ZeroDynamics({self.gait.robot.name!r}: contraction {self.contraction:.9g}, {kind})"
 
 
+@takes(GaitError)
 def zero_dynamics(gait: PhasedGait, ground: Ground | None = None) -> ZeroDynamics:
     """Find the hybrid zero dynamics of a gait over its phase.
 

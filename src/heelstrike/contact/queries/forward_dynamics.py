@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.contact.certificate import Certificate
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.modes import OPEN, SLIDING_BACKWARD, SLIDING_FORWARD, ContactMode, Solver
@@ -60,6 +61,7 @@ class ContactForwardDynamics:
     loop_force: Floats
 
 
+@takes(ContactProblemError)
 def contact_forward_dynamics(
     robot: Robot,
     q: ArrayLike,

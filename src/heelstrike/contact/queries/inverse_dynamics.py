@@ -9,6 +9,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.force_distribution import ForceDistribution, distribute
 from heelstrike.contact.queries.forward_dynamics import TOUCHING
@@ -70,6 +71,7 @@ class ContactInverseDynamics:
     message: str
 
 
+@takes(ContactProblemError)
 def contact_inverse_dynamics(
     robot: Robot,
     q: ArrayLike,

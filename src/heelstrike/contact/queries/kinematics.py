@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground, ground_contact
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.frames import into_frame
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import Evaluation
+from heelstrike.errors import ContactProblemError
 from heelstrike.robot.robot import Robot
 
 
@@ -48,6 +50,7 @@ class ContactKinematics:
     bias_acceleration: Floats
 
 
+@takes(ContactProblemError)
 def contact_kinematics(
     robot: Robot, q: ArrayLike, v: ArrayLike, ground: Ground | None = None
 ) -> ContactKinematics:

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.places import write_point_rows
 from heelstrike.dynamics.queries.evaluation import contact_indices, joint_vector
-from heelstrike.errors import RobotError, SimulationError
+from heelstrike.errors import ContactProblemError, RobotError, SimulationError
 from heelstrike.robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -90,6 +91,7 @@ class ImpactLinearization:
     reset: Floats
 
 
+@takes(ContactProblemError)
 def linearize_contact(
     robot: Robot,
     q: ArrayLike,
@@ -157,6 +159,7 @@ def linearize_contact(
     )
 
 
+@takes(ContactProblemError)
 def linearize_impact(
     robot: Robot,
     q: ArrayLike,
@@ -215,6 +218,7 @@ def linearize_impact(
     return ImpactLinearization(velocity=solution[:n], reset=np.vstack([upper, after]))
 
 
+@takes(ContactProblemError)
 def saltation_matrix(
     reset: ArrayLike, gradient: ArrayLike, before: ArrayLike, after: ArrayLike
 ) -> Floats:

@@ -15,6 +15,7 @@ from heelstrike.contact.modes import (
     COMBINATIONS,
     FISCHER_BURMEISTER,
     GAUSS_SEIDEL,
+    ITERATION_LIMIT,
     LEMKE,
     OPEN,
     RAY,
@@ -43,6 +44,7 @@ from heelstrike.contact.workspace import (
     Equations,
     Integers,
     ReducedProblem,
+    Settings,
     StickingRows,
     Yardstick,
 )
@@ -79,6 +81,13 @@ def is_doubtful(count: int, worst: float, tolerance: float, yardstick: Yardstick
     """
     rounding = UNIT_ROUNDOFF * yardstick.effort
     return tolerance < worst and tolerance < rounding and worst <= count * rounding
+
+
+@kernel
+def is_clean(count: int, worst: float, settings: Settings, yardstick: Yardstick) -> bool:
+    """Whether no better answer is to be had: the residual is nil, or the impulses are rounded."""
+    rounding = count * UNIT_ROUNDOFF * yardstick.effort if settings.patient == 0 else 0.0
+    return worst <= min(settings.tolerance, max(CLEAN, rounding))
 
 
 @kernel
@@ -144,14 +153,15 @@ def propose(
 ) -> int:  # fmt: skip
     """Write the modes that a solver would have tried next, its ``call``-th, to the trial.
 
-    Returns ``SOLVED``, or how it ended if there are no more. ``guess`` are the modes of the best
-    answer so far and ``best`` its residual.
+    Returns ``SOLVED``, or how it ended if there are no more: ``UNCERTIFIED`` of modes that were
+    guessed if their answer contradicts none of them. ``guess`` are the modes of the best answer so
+    far and ``best`` its residual.
     """
     count, reduced, tally, mode = problem.count, work.reduced, work.tally, work.trial.mode
     if solver == WARM_START:
         if call == 0:
             return SOLVED
-        return amend(problem, work) if call <= work.settings.amendments else UNCERTIFIED
+        return amend(problem, work) if call <= work.settings.amendments else ITERATION_LIMIT
     if solver == LEMKE:
         return lemke(count, call, reduced, tally, work.lemke, mode)
     if solver == FISCHER_BURMEISTER:
@@ -168,10 +178,12 @@ def propose(
 def seek(
     solver: int, problem: ContactProblem, best: float, work: ContactWorkspace, answer: ContactAnswer
 ) -> tuple[int, float]:
-    """Try what a solver proposes until an answer is clean, and keep the best.
+    """Try what a solver proposes until an answer is certified, and keep the best.
 
-    Returns how it ended, and the residual of the answer, which was ``best`` so far.
+    Of modes that were guessed and amended, or if patient, the answer has to be clean. Returns how
+    it ended, and the residual of the answer, which was ``best`` so far.
     """
+    settings = work.settings
     call = 0
     while True:
         outcome = propose(solver, call, problem, best, answer.mode, work)
@@ -184,7 +196,9 @@ def seek(
         if worst < best:
             best = worst
             keep(problem.count, work.trial, answer)
-        if worst <= min(work.settings.tolerance, CLEAN):
+        if solver != WARM_START and settings.patient == 0 and best <= settings.tolerance:
+            return SOLVED, best
+        if is_clean(problem.count, worst, settings, work.yardstick):
             return SOLVED, best
 
 
@@ -220,6 +234,7 @@ def try_solvers(
     Arguments are those of :func:`~heelstrike.contact.problem.solve_contact_kernel`.
     """
     tally, reduced, tolerance = work.tally, work.reduced, work.settings.tolerance
+    patient = work.settings.patient != 0
     begin(problem, work, answer)
     status = UNCERTIFIED
     best = math.inf
@@ -234,9 +249,10 @@ def try_solvers(
             tally.fallbacks += 1
             tally.last_fallbacks += 1
         before = best
+        tally.combinations += solver == COMBINATIONS
         outcome, best = seek(solver, problem, best, work, answer)
-        clean = best <= min(tolerance, CLEAN)
-        if attempt < 0 and not clean:
+        agrees = outcome == UNCERTIFIED and best <= tolerance and not patient
+        if attempt < 0 and outcome != SOLVED and not agrees:
             continue
         settled, best = release(problem, best, work, answer)
         if attempt < 0 and not settled:
@@ -245,7 +261,7 @@ def try_solvers(
             tally.solver = solver
         if best <= tolerance:
             status = SOLVED
-            if clean:
+            if outcome == SOLVED or not patient:
                 tally.shortcuts += attempt < 0
                 break
         elif attempt == 0 or outcome == RAY:

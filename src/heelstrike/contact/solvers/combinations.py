@@ -18,7 +18,8 @@ FEW = 5
 """Contacts up to which all combinations are tried: 4^5 are a thousand."""
 
 MOST = 8000
-"""Combinations of many contacts that are tried before giving up."""
+"""Combinations of many contacts that are tried before giving up, if there are up to eight; of more
+contacts fewer, so that the work is the same: each is an elimination."""
 
 CHOICES = SLIP_BACKWARD + 1
 
@@ -49,7 +50,7 @@ def next_combination(
     number = combinations.place
     combinations.place += 1
     if count > FEW:
-        if combinations.tried >= MOST:
+        if combinations.tried >= most_of(count):
             return False
         if number >= CHOICES * CHOICES * count * (count // 2 + 1):
             start_elsewhere(count, combinations)
@@ -65,6 +66,12 @@ def next_combination(
             number //= choices
     tally.iterations += 1
     return number == 0
+
+
+@kernel
+def most_of(count: int) -> int:
+    """How many combinations of so many contacts are tried."""
+    return MOST * 8**3 // max(count, 8) ** 3
 
 
 @kernel

@@ -153,7 +153,9 @@ class WholeBody(Law):
         friction: float = 0.6,
         numbers: Mapping[str, float] | None = None,
     ) -> None:
-        feet = _feet(robot, gait)
+        must_be(Robot, "robot", robot)
+        check_gait(robot, gait)
+        feet = feet_to_balance_on(robot, point_feet=gait.point_feet)
         groups = _numbers(robot, gait, feet)
         if numbers is not None:
             must_be(Mapping, "numbers", numbers)
@@ -236,11 +238,22 @@ class FootstepFeedback(WholeBody):
     adapts = True
 
 
-def _feet(robot: Robot, gait: Gait) -> list[Sole]:
-    """Return the soles, or refuse what the law cannot control."""
-    must_be(Robot, "robot", robot)
+def feet_to_balance_on(robot: Robot, *, point_feet: bool = False) -> list[Sole]:
+    """Return the soles of a robot whose whole body can keep its balance.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    point_feet : bool
+        Whether its gait is one on points.
+
+    Raises
+    ------
+    ControllerError
+        If the laws of this room cannot control it; the message says why.
+    """
     refuse_loops(robot, "whole-body control", ControllerError)
-    check_gait(robot, gait)
     free = robot.nv - robot.nu
     if not robot.floating or len(robot.feet) != 2 or free != 3:
         raise ControllerError(
@@ -249,7 +262,7 @@ def _feet(robot: Robot, gait: Gait) -> list[Sole]:
             "motor, of which three are the trunk's"
         )
     feet = [sole(robot, foot) for foot in range(2)]
-    if gait.point_feet or not all(foot.flat for foot in feet):
+    if point_feet or not all(foot.flat for foot in feet):
         raise ControllerError(
             f"whole-body control stands on flat feet; those of robot {robot.name!r}, or of its "
             "gait, are points"

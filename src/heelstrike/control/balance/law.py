@@ -418,7 +418,9 @@ def want_posture(
 def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory) -> None:
     """Add rows that let no knee pass the angle beyond which its leg could not lift the body.
 
-    A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v.
+    A knee that nears it is slowed down in time: a ≥ k (least − bent) − 2 √k v. A robot that stands
+    keeps both bent: a knee that stood straight, or beyond, would have to pass there when alarmed,
+    where bending it moves the hip hardly at all, and then throws the body off its foot.
     """
     legs, program, stiffness = parameters.legs, memory.program, parameters.knee_kp
     range_of = parameters.bent_knee - parameters.straight_knee
@@ -426,7 +428,9 @@ def keep_knees_bent(state: ControlState, parameters: Parameters, memory: Memory)
         knee, sign = legs.knee[foot], legs.bend[foot]
         bent = sign * (state.joint_position[knee] - legs.straight[foot])
         part = memory.alarm
-        if foot != memory.stance:
+        if memory.stands == 1:
+            part = 1.0
+        elif foot != memory.stance:
             # A swing leg that is bent the wrong way could not be lifted.
             table = parameters.reference.joints[memory.stance, :, knee]
             gait = sign * (value_at(table, memory.phase) - legs.straight[foot])

@@ -36,9 +36,10 @@ class Program(Bundle):
     multiplier : (m,) float
         Those of the rows, H x + g = Cᵀ multiplier; of inequalities not negative.
     status, iterations : int
-        How solving it ended, and after how many rows were taken up or dropped.
+        How solving it ended (0 solved, 1 infeasible, 2 not convex, 3 too many iterations), and
+        after how many rows were taken up or dropped.
     relaxed : int
-        Levels that were given up; see :func:`~heelstrike.control.quadratic.relax.solve_or_relax`.
+        Levels that were given up; see :func:`heelstrike.control.solve_or_relax`.
     stationarity, violation, complementarity : float
         The certificate: how far the answer is from the conditions of Karush, Kuhn and Tucker,
         relative to the size of the data.

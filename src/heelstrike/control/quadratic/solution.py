@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from heelstrike.arguments import takes
 from heelstrike.control.quadratic.dual_active_set import solve_or_relax
 from heelstrike.control.quadratic.program import (
     INFEASIBLE,
@@ -46,6 +47,7 @@ class QuadraticSolution:
     complementarity: float
 
 
+@takes(ControllerError)
 def solve_quadratic_program(
     hessian: ArrayLike,
     gradient: ArrayLike,

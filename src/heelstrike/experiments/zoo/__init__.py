@@ -4,8 +4,8 @@ A controller is an :class:`Entry` of `CONTROLLERS`, a line; a disturbance one of
 :func:`zoo` fills the cells, ``heelstrike zoo`` is its command.
 """
 
+from heelstrike.experiments.laws import CONTROLLERS, Entry, on_points, standing, walking
 from heelstrike.experiments.zoo.campaign import Progress, zoo
-from heelstrike.experiments.zoo.controllers import CONTROLLERS, Entry, on_points, standing, walking
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Chance, Disturbance, Effort
 from heelstrike.experiments.zoo.results import Animal, Cell, Results, Settings
 

@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.errors import GaitError, HeelstrikeError, RobotError, SimulationError
-from heelstrike.experiments.zoo.controllers import CONTROLLERS, Entry, gait_for, sampled
+from heelstrike.experiments.laws import CONTROLLERS, SAMPLE, Entry, gait_for, law_called
 from heelstrike.experiments.zoo.disturbances import DISTURBANCES, Disturbance, Effort, chances
 from heelstrike.experiments.zoo.results import (
     STANDS,
@@ -36,8 +36,6 @@ USUAL, QUICK = Settings(), Settings(trials=1, strides=5, halvings=2)
 
 LOOK_EVERY = 0.1
 """Seconds between two looks at what the threads do."""
-
-Named = TypeVar("Named", Entry, Disturbance)
 
 
 @dataclass
@@ -177,33 +175,31 @@ def chosen_controllers(words: str | None) -> tuple[Entry, ...]:
 
     Raises
     ------
-    SimulationError
-        If there is none of a name; the message has the nearest.
+    ControllerError
+        If there is none of a name; see :func:`~heelstrike.experiments.laws.law_called`.
     """
-    return _named("controller", words, CONTROLLERS)
+    if words is None:
+        return CONTROLLERS
+    return tuple({entry.name: entry for entry in map(law_called, _words(words))}.values())
 
 
 def chosen_disturbances(words: str | None) -> tuple[Disturbance, ...]:
-    """Return disturbances, as :func:`chosen_controllers` does.
+    """Return disturbances by their names, with commas between; all of the zoo for None.
 
     Raises
     ------
     SimulationError
-        If there is none of a name.
+        If there is none of a name; the message has the nearest.
     """
-    return _named("disturbance", words, DISTURBANCES)
-
-
-def _named(kind: str, words: str | None, known: Sequence[Named]) -> tuple[Named, ...]:
-    found = {each.name.lower(): each for each in known}
+    found = {each.name.lower(): each for each in DISTURBANCES}
     chosen = found if words is None else {}
     for name in _words(words or ""):
         if name.lower() not in found:
             near = difflib.get_close_matches(name.lower(), found, n=1)
             guess = f" Did you mean {found[near[0]].name!r}?" if near else ""
             raise SimulationError(
-                f"there is no {kind} {name!r}.{guess} There are "
-                f"{', '.join(each.name for each in known)}."
+                f"there is no disturbance {name!r}.{guess} There are "
+                f"{', '.join(each.name for each in DISTURBANCES)}."
             )
         chosen[name.lower()] = found[name.lower()]
     return tuple(chosen.values())
@@ -434,3 +430,9 @@ class _Watch:
     def share(self) -> float:
         """How much of the cell is done, at least, from 0 to 1."""
         return min(self._walks / self._most, 1.0)
+
+
+def sampled(trial: Trial, method: Method) -> Trial:
+    """Return a trial by another method, its controller called once a sample, or once a step."""
+    slow = isinstance(method, TimeStepping) and method.step >= SAMPLE
+    return replace(trial, method=method, control_period=None if slow else SAMPLE)

@@ -24,8 +24,8 @@ from heelstrike.analysis.stability.largest import (
 )
 from heelstrike.analysis.stability.trial import Trial
 from heelstrike.contact.ground import Ground
+from heelstrike.experiments.laws import BRAVO7_STEP, BRAVO7_WEIGHT
 from heelstrike.experiments.walk import typical_step
-from heelstrike.experiments.zoo.controllers import BRAVO7_STEP, BRAVO7_WEIGHT
 from heelstrike.robot import Robot
 
 PUSH, SLOPE, STEP, ROUGH, MASS = 150.0, 15.0, 0.10, 0.05, 50.0

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import comb
 
 from heelstrike import dynamics
+from heelstrike.arguments import check_fields
 from heelstrike.errors import GaitError
 from heelstrike.gait.gait import Gait
 from heelstrike.gait.phased.series import fitted, interpolated
@@ -61,6 +62,7 @@ class PhasedGait:
     coefficients: Floats
 
     def __post_init__(self) -> None:
+        check_fields(self, GaitError)
         check_robot(self.robot)
         _check_foot(self.stance_foot)
         phase = np.array(self.phase, dtype=np.float64)

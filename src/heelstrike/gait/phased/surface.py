@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from heelstrike import dynamics
+from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import GaitError
 from heelstrike.gait.phased.phased_gait import PhasedGait
@@ -205,6 +206,7 @@ class Surface:
         )
 
 
+@takes(GaitError)
 def make_invariant(gait: PhasedGait, ground: Ground | None = None) -> PhasedGait:
     """Change the beginning of a gait so that its own impact leads there, with the right slopes.
 

@@ -30,7 +30,7 @@ from heelstrike.robot.files.posture import (
     turn,
 )
 from heelstrike.robot.files.snapping import IN_PLANE, snap
-from heelstrike.robot.files.spatial import asymmetry, refuse_spatial_joints
+from heelstrike.robot.files.spatial import asymmetry, nothing_to_keep, refuse_spatial_joints
 from heelstrike.robot.robot import LockedJoint
 
 Floats = NDArray[np.float64]
@@ -170,14 +170,14 @@ def _seen(model: Any, forward: str, options: Options, label: str, hanging: bool)
                 keeps[follower] = False
                 why[follower] = f"follows {joint_name(model, leader)}" if leader >= 0 else "is held"
     if not options.projected:
-        refuse_spatial_joints(model, pose, spatial, label)
+        refuse_spatial_joints(model, pose, spatial, bool(keeps.any()), label)
     found = tuple(_coordinates(model, pose, keeps, floating))
     coordinates = _in_order(found, model)
     if options.projected and (spatial or any(_is_free(model, body) for body in floating)):
         if spatial and not any(one.joint >= 0 for one in coordinates):
             raise RobotError(
                 f"{label}: no joint of this robot moves in the x–z plane, so there is nothing to "
-                "project. Turn it so that it walks along x, with its pitch joints about y."
+                f"project. {nothing_to_keep(model, pose)}"
             )
         # The joints that stay mark the middle: those of one side have twins on the other.
         joints = [one for one in coordinates if one.joint >= 0] or coordinates

@@ -21,7 +21,11 @@ from heelstrike.robot.files.options import Options
 from heelstrike.robot.files.ros.xacro import expanded
 from heelstrike.robot.files.screening.screening import Screened, screen
 from heelstrike.robot.files.screening.trial import lift_sizes, try_apart
-from heelstrike.robot.files.screening.urdf_check import check_urdf, check_urdf_tree
+from heelstrike.robot.files.screening.urdf_check import (
+    check_urdf,
+    check_urdf_tree,
+    refuse_macros,
+)
 from heelstrike.robot.files.screening.xml_tree import xml_text
 from heelstrike.robot.files.sdf.translation import as_mjcf
 from heelstrike.robot.files.urdf import (
@@ -31,6 +35,7 @@ from heelstrike.robot.files.urdf import (
     missing_moments,
     translate_dialects,
     urdf_text,
+    weigh_no_shapes,
 )
 from heelstrike.robot.plausibility import is_possible
 from heelstrike.robot.robot import LockedJoint
@@ -137,6 +142,7 @@ def parse(source: Path | str, options: Options | None = None) -> MujocoFile:
         with _warnings_into(remarks):
             urdf = xml.tag == "robot"
             if urdf:
+                refuse_macros(xml, label)
                 translate_dialects(xml)
             if urdf and not options.lenient:
                 check_urdf(xml, label)
@@ -251,6 +257,8 @@ def _parsed(source: Path | str, file: Screened, label: str, packages: tuple[Path
     spec = mujoco.MjSpec.from_string(text, include=file.models)
     # Welded bodies are joined by our own reader, which needs to know where each of them is.
     spec.compiler.fusestatic = False
+    if urdf:
+        weigh_no_shapes(spec)
     if urdf or file.massless:
         let_massless_links_pass(spec)
         let_thin_meshes_pass(spec)

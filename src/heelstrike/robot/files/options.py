@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypedDict
 
+from heelstrike.arguments import check_fields, refusal
 from heelstrike.errors import RobotError
 
 FORWARD = {"x": 0, "y": 1, "-x": 2, "-y": 3}
@@ -85,6 +86,11 @@ class Options:
     lenient: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self, RobotError)
+        given = self.package_path
+        for folder in () if isinstance(given, str | os.PathLike) else given:
+            if not isinstance(folder, str | os.PathLike):
+                raise RobotError(refusal("a folder of package_path", folder, ["str", "Path"]))
         if self.forward is not None and self.forward not in FORWARD:
             raise RobotError(f"forward is one of {', '.join(FORWARD)}, not {self.forward!r}.")
         if self.mirror not in (None, AVERAGE):

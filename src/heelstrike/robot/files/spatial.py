@@ -22,10 +22,25 @@ MOST_ASIDE = 5e-2
 """Share of its size up to which the centre of mass of a projected robot may lie to one side."""
 
 
-def refuse_spatial_joints(model: Any, pose: Any, spatial: list[int], label: str) -> None:
-    """Raise an error that names the joints which leave the plane, if there are any."""
+def refuse_spatial_joints(
+    model: Any, pose: Any, spatial: list[int], stays: bool, label: str
+) -> None:
+    """Raise an error that names the joints which leave the plane, if there are any.
+
+    `stays` is whether any joint of the file moves in it.
+    """
     axes = pose.xaxis
+    free = [joint for joint in spatial if model.jnt_type[joint] == FREE]
     said = []
+    if len(free) == len(spatial):
+        mend = "or load it with floating=True, which does so."
+    elif stays:
+        mend = (
+            "or load it with projected=True, which does so and locks the joints that leave the "
+            "plane."
+        )
+    else:
+        mend = f"but none of its other joints moves in that plane. {nothing_to_keep(model, pose)}"
     for joint in spatial:
         kind = model.jnt_type[joint]
         name = model.joint(joint).name or f"joint {joint}"
@@ -35,9 +50,7 @@ def refuse_spatial_joints(model: Any, pose: Any, spatial: list[int], label: str)
             raise RobotError(
                 f"{label}: {name!r} of body {body!r} is a free joint, which moves in three "
                 "dimensions. For a robot in the x–z plane give the body three joints instead: "
-                "slide along x, slide along z, hinge about y, in this order; or load it with "
-                "floating=True, which does so, or with projected=True, which also locks all joints "
-                "that leave the plane."
+                f"slide along x, slide along z, hinge about y, in this order; {mend}"
             )
         if kind == BALL:
             said.append(f"{name!r} of body {body!r} is a ball joint")
@@ -49,22 +62,49 @@ def refuse_spatial_joints(model: Any, pose: Any, spatial: list[int], label: str)
         return
     shown = "; ".join(f"joint {one}" for one in said[:SHOWN])
     more = f"; and {len(said) - SHOWN} more" if len(said) > SHOWN else ""
-    hinges = axes[model.jnt_type == HINGE]
-    parallel = (
-        len(hinges) > 0
-        and BALL not in model.jnt_type
-        and np.abs(np.cross(hinges, hinges[0])).max() < IN_PLANE
-    )
     mend = (
-        "All its hinges are parallel: turn the robot so that they point along y."
-        if parallel
-        else "Remove these joints (or weld them) to keep the motion in the plane, or load the "
-        "robot with projected=True, which locks them."
+        "Remove these joints (or weld them) to keep the motion in the plane, or load the robot "
+        "with projected=True, which locks them."
+        if stays or BALL in model.jnt_type
+        else nothing_to_keep(model, pose)
     )
     raise RobotError(
         f"{label}: this robot leaves the x–z plane; heelstrike simulates planar robots, whose "
         "hinges turn about y and whose slides stay in x–z. In its reference configuration, "
         f"{shown}{more}. {mend}"
+    )
+
+
+def nothing_to_keep(model: Any, pose: Any) -> str:
+    """Say why no joint of a robot moves in the plane, and what can be done about that."""
+    axes = pose.xaxis[model.jnt_type == HINGE]
+    level = axes[np.abs(axes[:, 2]) <= IN_PLANE]
+    # How far from y they are, about z: 0 to 180 degrees, of which both ends are the same.
+    turns = np.degrees(np.arctan2(-level[:, 0], level[:, 1])) % 180.0
+    several = sorted({round(float(turn), 1) % 180.0 for turn in turns})
+    if not several:
+        return (
+            "None of its joints turns about a level axis, as those must that carry a walking robot "
+            "in one plane."
+        )
+    if len(several) == 1:
+        return (
+            "All its level hinges are parallel: turn the robot in its file by "
+            f"{-several[0]:g} degrees about z, so that they point along y."
+        )
+    words = ", ".join(f"{turn:g}" for turn in several[:SHOWN])
+    more = "" if len(several) <= SHOWN else f" and {len(several) - SHOWN} more"
+    upright = np.flatnonzero((model.jnt_type == HINGE) & (np.abs(pose.xaxis[:, 2]) > 0.9))
+    pose_words = (
+        f" Joints about z, as {model.joint(upright[0]).name!r}, can turn its legs until they "
+        "do: give their angles as the pose."
+        if len(upright)
+        else ""
+    )
+    return (
+        f"Its hinges lie at angles of {words}{more} degrees to y: its legs move in upright planes "
+        "that differ, and no turn of the whole robot makes one of them. heelstrike simulates "
+        f"robots whose legs move in parallel planes.{pose_words}"
     )
 
 

@@ -38,7 +38,7 @@ def urdf_text(root: Node, directory: Path, packages: Sequence[Path], label: str)
     Raises
     ------
     RobotError
-        If a mesh that a link is weighed by is not there, or meshes are too large.
+        If meshes are too large, or one is not there that the file wants a link weighed by.
 
     Warns
     -----
@@ -57,11 +57,25 @@ def urdf_text(root: Node, directory: Path, packages: Sequence[Path], label: str)
     return xml_text(root)
 
 
+def weigh_no_shapes(spec: Any) -> None:
+    """Let links without ``<inertial>`` weigh nothing, as URDF says; MuJoCo takes 1000 kg/m³.
+
+    A file that asks MuJoCo for inertia from its shapes keeps that.
+    """
+    import mujoco
+
+    if spec.compiler.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        for geom in spec.geoms:
+            geom.density = 0.0
+
+
 def let_thin_meshes_pass(spec: Any) -> None:
     """Let meshes without volume pass, such as plates, where nothing is weighed by them."""
     import mujoco
 
-    weighing = {geom.meshname for geom in spec.geoms if not geom.parent.explicitinertial}
+    weighing = {
+        geom.meshname for geom in spec.geoms if geom.density and not geom.parent.explicitinertial
+    }
     for mesh in spec.meshes:
         if mesh.name not in weighing:
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
@@ -183,9 +197,12 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
     Visual shapes play no part in mechanics, and their files are often missing.
     """
     missing: dict[str, str] = {}
-    weighed: list[str] = []
+    weightless: list[str] = []
     strange: list[str] = []
     size = 0
+    from_shapes = any(
+        compiler.get("inertiafromgeom") == "true" for compiler in root.iterfind("mujoco/compiler")
+    )
     ornaments = {
         child.get("link", "")
         for joint in root.iterfind("joint")
@@ -197,8 +214,10 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
         for visual in link.findall("visual"):
             link.remove(visual)
         has_inertia = link.find("inertial") is not None
-        if not has_inertia and any(not _is_point(shape) for shape in link.findall("collision")):
-            weighed.append(name)
+        if not (has_inertia or from_shapes or name == WORLD) and any(
+            not _is_point(shape) for shape in link.findall("collision")
+        ):
+            weightless.append(name)
         for collision in link.findall("collision"):
             mesh = collision.find("geometry/mesh")
             if mesh is None:
@@ -211,7 +230,7 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
             if file is not None and is_mesh(file):
                 mesh.set("filename", str(file))
                 size += file.stat().st_size
-            elif has_inertia or name in ornaments:
+            elif has_inertia or not from_shapes or name in ornaments:
                 link.remove(collision)
                 missing.setdefault(name, address)
             else:
@@ -219,8 +238,9 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
                 raise RobotError(
                     f"{label}: line {line}: the collision mesh of link {name!r}, "
                     f"{address[:200]!r}, is not where the file says or no mesh that MuJoCo reads "
-                    "(binary .stl, .obj), and the link has no <inertial>. Give it one, or the mesh "
-                    "file beside the URDF."
+                    "(binary .stl, .obj), and the link has no <inertial>: the file wants it "
+                    'weighed by this mesh (inertiafromgeom="true"). Give it an <inertial>, or the '
+                    "mesh file beside the URDF."
                 )
     refuse_large_meshes(size, label)
     if missing:
@@ -236,11 +256,13 @@ def _find_meshes(root: Node, directory: Path, packages: Sequence[Path], label: s
             f"{label}: {', '.join(strange)} have collision shapes that are none, or of a kind that "
             "heelstrike does not know; they are left out."
         )
-    weighed = [name for name in weighed if name not in missing]
-    if weighed:
+    # An ornament whose mesh is not there is told of already.
+    weightless = [name for name in weightless if name not in missing or name not in ornaments]
+    if weightless:
+        have, weigh = ("has", "it weighs") if len(weightless) == 1 else ("have", "they weigh")
         warn(
-            f"{label}: {', '.join(weighed)} have no <inertial>; their masses are those of their "
-            "collision shapes at 1000 kg/m³. Give them an <inertial>."
+            f"{label}: {', '.join(weightless)} {have} a <collision> and no <inertial>: {weigh} "
+            "nothing, for a URDF has no other masses. If that is not meant, write an <inertial>."
         )
 
 

@@ -8,6 +8,7 @@ import reprlib
 from pathlib import Path
 from typing import Unpack
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.robot.files.mjcf import read_mjcf
 from heelstrike.robot.files.options import LoadOptions
@@ -34,6 +35,7 @@ def builtin_robots() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in _HERE.glob("*.xml")))
 
 
+@takes(RobotError)
 def load_robot(name_or_path: str | os.PathLike[str], **how: Unpack[LoadOptions]) -> Robot:
     """Load a built-in robot by its name, or a planar robot from an MJCF, URDF or SDF file.
 

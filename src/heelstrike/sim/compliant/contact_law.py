@@ -18,6 +18,7 @@ from math import acos, acosh, exp, log1p, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.errors import SimulationError
 from heelstrike.sim.compliant.law import FrictionLaw, NormalLaw
@@ -68,6 +69,7 @@ class HuntCrossley(NormalLaw):
     exponent: float = 1.5
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         _positive("Hunt-Crossley stiffness", self.stiffness, "N/mⁿ")
         _not_negative("Hunt-Crossley dissipation", self.dissipation, "s/m")
         if not 1.0 <= self.exponent < np.inf:
@@ -223,6 +225,7 @@ class KelvinVoigt(NormalLaw):
     damping: float = 3e4
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         _positive("Kelvin-Voigt stiffness", self.stiffness, "N/m")
         _not_negative("Kelvin-Voigt damping", self.damping, "N s/m")
 

@@ -64,6 +64,9 @@ from heelstrike.sim.push import add_pushes
 # Perturbation of a position (m, rad) or velocity (m/s, rad/s) that finds a controller's gains.
 # They only steer the linear systems: their error costs steps, not accuracy.
 PERTURBATION = 1e-6
+# A torque that changes so much (of itself, and N m) is asked for again nearer by: as far away as
+# this part of the perturbation it is a jump if it changes by more than half of that, and no gain.
+STEEP, NEARER = 1e-2, 0.1
 
 # Steps for which the gains of a controller are taken to last, as long as none fails.
 GAINS_LAST = 20
@@ -189,6 +192,12 @@ class CompliantWorkspace(Bundle):
         Seconds between two samples; tolerated errors of a step, relative and absolute.
     proposed : float
         Length of the next step as far as accuracy allows (s).
+    patience : int
+        Tries of the steps of a sample after which torques of a law that switches are held.
+    held_since, held_for, held_wrong : float
+        When that began within the sample (s), for how long in all (s), and the most that the
+        torques' next jump would have changed an acceleration by, times how long they were held
+        (m/s, rad/s).
     row : int
         Row of the record for this sample, -1 for none.
     """
@@ -233,6 +242,10 @@ class CompliantWorkspace(Bundle):
     rtol: float = number(float)
     atol: float = number(float)
     proposed: float = cell(float)
+    patience: int = cell(int)
+    held_since: float = cell(float)
+    held_for: float = cell(float)
+    held_wrong: float = cell(float)
     row: int = cell(int)
 
 
@@ -279,6 +292,15 @@ def try_command(
 
 
 @kernel
+def is_steep(gains: Floats, j: int, torque: Floats) -> bool:
+    """Whether a torque changes so much with coordinate j that it may have jumped."""
+    for i in range(torque.shape[0]):
+        if PERTURBATION * abs(gains[i, j]) > STEEP * (1.0 + abs(torque[i])):
+            return True
+    return False
+
+
+@kernel
 def find_gains(
     controller: Any, control: Control, time: float, model: Model, memory: Memory,
     work: CompliantWorkspace,
@@ -286,7 +308,8 @@ def find_gains(
     """Derivatives of the controller's torques at the start of the step, by differences.
 
     The smaller of the differences to either side: where the torque jumps, as when a controller
-    changes its mind, the other would be the jump over the perturbation.
+    changes its mind, the other would be the jump over the perturbation. Where it jumps to both
+    sides, as ``sign`` at zero, it has no gain.
     """
     for j in range(model.parent.shape[0]):
         memory.q[j] = work.base_q[j]
@@ -310,6 +333,15 @@ def find_gains(
                     slope = (torque[i] - memory.torque[i]) / change
                     if side == 0 or abs(slope) < abs(gains[i, j]):
                         gains[i, j] = slope
+            if is_steep(gains, j, memory.torque):
+                varied[j] = kept + NEARER * PERTURBATION
+                forward_kinematics(model, memory.q, memory.equations.tree)
+                link_velocities(model, memory.v, memory.equations.tree)
+                command, torque = work.trial_command, work.trial_torque
+                try_command(controller, control, time, model, memory, command, torque)
+                for i in range(gains.shape[0]):
+                    if abs(torque[i] - memory.torque[i]) > 0.5 * PERTURBATION * abs(gains[i, j]):
+                        gains[i, j] = 0.0
             varied[j] = kept
     work.age = 0
 
@@ -506,7 +538,7 @@ def tangent_gains(friction: FrictionForces, contact: int, g: float) -> tuple[flo
 
 @kernel
 def factorize_step(
-    model: Model, control: Control, g: float, command: Floats, work: CompliantWorkspace
+    model: Model, control: Control, g: float, held: bool, command: Floats, work: CompliantWorkspace
 ) -> None:
     """Factorise the linear system of all stages of a step of length g / γ."""
     nv = model.parent.shape[0]
@@ -517,7 +549,7 @@ def factorize_step(
             by_q[i, j] = 0.0
         system[i, i] += g * (model.damping[i] - (base.stop.by_speed[i] + base.dry_by_speed[i]))
         by_q[i, i] = base.stop.by_gap[i] - model.stiffness[i]
-    if control.continuous == 1:
+    if control.continuous == 1 and not held:
         for i in range(model.actuator_joint.shape[0]):
             joint = model.actuator_joint[i]
             for j in range(nv):
@@ -660,16 +692,22 @@ def attempt_step(
     ground: GroundModel,
     time: float,
     h: float,
+    held: bool,
     memory: Memory,
     work: CompliantWorkspace,
 ) -> float:
-    """Go from the start of the step, at `time`, to its end; return the error over the tolerance."""
+    """Go from the start of the step, at `time`, to its end; return the error over the tolerance.
+
+    A controller that acts continuously is asked within it, unless its torques are `held`.
+    """
     rtol, atol, now, base = work.rtol, work.atol, work.now, work.base
     how = DECIDED if h <= DECISIVE else TRIED
+    if held:
+        how = HELD
     nv = model.parent.shape[0]
     nc = work.corners.sides
     g = GAMMA * h
-    factorize_step(model, control, g, memory.command, work)
+    factorize_step(model, control, g, held, memory.command, work)
     for stage in range(STAGES):
         if stage > 0:
             for i in range(nv):

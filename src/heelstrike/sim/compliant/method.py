@@ -16,12 +16,15 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
+from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Model
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.clock import Clock
+from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.compliant.contact_law import BristleFriction, HuntCrossley, KelvinVoigt
 from heelstrike.sim.compliant.corners import (
     begin_joining,
@@ -34,6 +37,7 @@ from heelstrike.sim.compliant.corners import (
 )
 from heelstrike.sim.compliant.dynamics import (
     ACCEPTED,
+    DECIDED,
     GAINS_LAST,
     HELD,
     TRIED,
@@ -72,9 +76,16 @@ from heelstrike.sim.record.recording import (
 )
 from heelstrike.sim.setting import Setting
 
+BRIDGE = int(EventKind.BRIDGE)
+
 # Shortest step in s. It is taken whatever its error: only a torque that jumps asks for less, and a
 # jump of 1000 rad/s² over so short a time is 1e-7 rad/s.
 SHORTEST = 1e-10
+# Under a controller that changes its mind to and fro such steps would not end (a sample with hard
+# impacts takes some hundreds). After so many tries within a sample its torques are held for this
+# part of it; in the next one after so many, and after twice as many in each that held none.
+PATIENCE, IMPATIENCE = 5000, 40
+HELD_PART = 0.01
 SAFETY = 0.9
 SHRINK = 0.2
 GROW = 5.0
@@ -109,7 +120,9 @@ class Compliant(Method):
     -----
     A compiled controller without a control period acts continuously: it is called within every
     step of the integration and remembers what it saw at its end, with the contact forces of that
-    very instant. Its gains are taken implicitly with the contact forces. A controller in Python,
+    very instant. Its gains are taken implicitly with the contact forces. One that switches to and
+    fro faster than steps can follow has its torques held for a hundredth of `step` each time; the
+    run has a ``BRIDGE`` event for each sample with such times. A controller in Python,
     and any with a control period, has its torques held from sample to sample, and sees the mean
     forces since the last. On compliant ground that is much harder for a light foot: stiff computed
     torque that walks when it acts continuously can fall when it is sampled at 1 ms.
@@ -133,6 +146,7 @@ class Compliant(Method):
     atol: float = 1e-7
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         for name in ("law", "stop"):
             law = getattr(self, name)
             if not isinstance(law, NormalLaw):
@@ -174,16 +188,27 @@ class Compliant(Method):
             friction=numbers["friction"], friction_code=code["friction"],
             stop=numbers["stop"], stop_code=code["stop"], joint_speed=self.friction.joint_speed,
         )  # fmt: skip
-        return compliant_workspace(robot, laws, self.step, self.rtol, self.atol)
+        work = compliant_workspace(robot, laws, self.step, self.rtol, self.atol)
+        work.patience = PATIENCE
+        return work
 
     def room(self, robot: Robot) -> tuple[int, int]:
         """Return how many rows and events a sample may add to the record."""
-        return 1, 4 * robot.nc + robot.nv + robot.model.latches + robot.model.brakes
+        return 1, 1 + 4 * robot.nc + robot.nv + robot.model.latches + robot.model.brakes
 
-    def forget_ground(self, robot: Robot, work: CompliantWorkspace, clock: Clock) -> None:  # noqa: ARG002
+    def forget_ground(
+        self,
+        robot: Robot,  # noqa: ARG002
+        work: CompliantWorkspace,
+        clock: Clock,
+        *,
+        stops: bool = False,
+    ) -> None:
         """Let no point be in a corner of it."""
         work.corners.first[:] = NO_FACE
         work.corners.second[:] = NO_FACE
+        if stops:
+            clock.begun = 0
 
     def check(self, setting: Setting) -> None:
         """Refuse ground with a restitution of its own."""
@@ -280,15 +305,26 @@ def sample(
     if control.continuous == 1 and work.age >= GAINS_LAST:
         find_gains(controller, control, start, model, memory, work)
     rejected = False
+    tries = 0
+    held_from, held_until = 0.0, 0.0
     while elapsed < span:
-        remaining = span - elapsed
+        held = elapsed < held_until
+        remaining = (held_until if held else span) - elapsed
         final = h >= remaining * (1.0 - 1e-9)
         taken = remaining if final else h
         error = attempt_step(
-            controller, control, model, ground, start + elapsed, taken, memory, work
+            controller, control, model, ground, start + elapsed, taken, held, memory, work
         )
+        tries += 1
         shortest = taken <= SHORTEST
         if not (error <= 1.0 or (shortest and error < np.inf)):
+            brief = not held and taken <= HELD_PART * span
+            if brief and control.continuous == 1 and tries > work.patience:
+                held_from = elapsed
+                held_until = min(elapsed + HELD_PART * span, span)
+                h = held_until - elapsed
+                make_up_mind(controller, control, model, ground, start + elapsed, memory, work)
+                continue
             if control.continuous == 1 and (work.age > 0 or shortest):
                 find_gains(controller, control, start + elapsed, model, memory, work)
             if shortest:
@@ -313,12 +349,20 @@ def sample(
             continue
         bend, forces = work.now.friction.bend, work.base_force
         choose_sides(model, ground, memory.contacts, corners, bend, forces)
+        reached = elapsed + taken
+        if final:
+            reached = held_until if held else span
         # At the sample itself the controller is called by the frame.
-        how = TRIED if final else ACCEPTED
+        how = TRIED if reached == span else ACCEPTED
+        if held and not final:
+            how = HELD
+        copy_words(work.now.acceleration, work.right_v)
         evaluate(controller, control, model, ground, how, start + elapsed + taken, memory, work)
+        if held and final:
+            note_held(held_from, held_until, work)
         account(model, start + elapsed, taken, memory, work)
         begin_step(model, memory, work)
-        elapsed = span if final else elapsed + taken
+        elapsed = reached
         factor = GROW if shortest else min(GROW, rescaled(error, GROW))
         if rejected and not shortest:
             factor = min(factor, 1.0)
@@ -326,8 +370,36 @@ def sample(
         # A step cut short by the sample says little about how long the next may be.
         h = max(h, taken * factor) if final else taken * factor
     work.proposed = min(h, span)
+    work.patience = IMPATIENCE if work.held_for > 0.0 else min(2 * work.patience, PATIENCE)
     finish_sample(model, memory, work)
     return DONE
+
+
+@kernel
+def make_up_mind(
+    controller: Any, control: Control, model: Model, ground: GroundModel, time: float,
+    memory: Memory, work: CompliantWorkspace,
+) -> None:  # fmt: skip
+    """Ask the controller for good at the start of the step, for torques that will be held."""
+    copy_words(work.base_q, memory.q)
+    copy_words(work.base_v, memory.v)
+    copy_words(work.base.friction.bend, work.now.friction.bend)
+    evaluate(controller, control, model, ground, DECIDED, time, memory, work)
+    begin_step(model, memory, work)
+
+
+@kernel
+def note_held(begin: float, end: float, work: CompliantWorkspace) -> None:
+    """Account for torques that were held within a sample.
+
+    The accelerations under them, at the end, are in ``work.right_v``.
+    """
+    if work.held_for == 0.0:
+        work.held_since = begin
+    work.held_for += end - begin
+    for j in range(work.right_v.shape[0]):
+        change = abs(work.now.acceleration[j] - work.right_v[j])
+        work.held_wrong = max(work.held_wrong, (end - begin) * change)
 
 
 @kernel
@@ -342,6 +414,7 @@ def rescaled(error: float, limit: float) -> float:
 def begin_sample(model: Model, memory: Memory, work: CompliantWorkspace) -> None:
     """Forget the impulses and crossings of the sample before."""
     begin_joining(model, memory.contacts, work.corners)
+    work.held_for, work.held_wrong = 0.0, 0.0
     for contact in range(work.corners.sides):
         work.impulse[contact, 0] = 0.0
         work.impulse[contact, 1] = 0.0
@@ -395,6 +468,9 @@ def note_events(
     Touchdown and lift-off are timed where the gap passes zero, stick and slip to the sample.
     """
     force = memory.contacts.force
+    if work.held_for > 0.0:
+        since = time - work.step + work.held_since
+        log_event(since, BRIDGE, 0, work.held_for, work.held_wrong, record)
     for contact in range(model.contact_link.shape[0]):
         touched = work.touched[contact]
         left = work.left[contact]

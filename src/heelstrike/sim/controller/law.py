@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, update_wrapper
 from typing import Any, ClassVar, overload
 
@@ -47,15 +47,19 @@ class ControllerFunction:
         Whether it runs inside the compiled loop.
     scope : mapping of str to object
         Where the names in its annotations are looked up first.
+    endings : sequence of str
+        Reasons for which it ends a run.
     """
 
     def __init__(
-        self, function: Callable[..., None], compiles: bool, scope: Mapping[str, Any]
-    ) -> None:
+        self, function: Callable[..., None], compiles: bool, scope: Mapping[str, Any],
+        endings: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         self.python: Callable[..., None] = getattr(function, "py_func", function)
         update_wrapper(self, self.python)
         self.function = function
         self.compiles = compiles
+        self.endings = tuple(endings)
         self.partner: Any = None
         self.is_ours = is_ours(self.python)
         self.arguments = list(inspect.signature(self.python).parameters)
@@ -106,7 +110,7 @@ class ControllerFunction:
     def begin(self) -> None:
         """Have another process compile it meanwhile, where that is worth it."""
         if self.is_ours and self.compiles:
-            self._separate.begin()
+            self.separate.begin()
 
     def finish(self) -> Any:
         """Compile it, or load its machine code, in the form that loops call.
@@ -117,7 +121,7 @@ class ControllerFunction:
             If it cannot be compiled.
         """
         try:
-            return self._separate.finish()
+            return self.separate.finish()
         except CompileError as error:
             raise ControllerError(
                 f"controller {self.name!r} cannot be compiled; @controller(compile=False) runs it "
@@ -125,7 +129,8 @@ class ControllerFunction:
             ) from error
 
     @cached_property
-    def _separate(self) -> SeparateKernel:
+    def separate(self) -> SeparateKernel:
+        """Its machine code, which loops find by its address."""
         # Stock controllers have tests that see to their indices.
         function = kernel(self.function) if self.is_ours else within_bounds(self.function)
         return SeparateKernel(
@@ -164,10 +169,15 @@ def controller(function: Callable[..., None], /) -> ControllerFunction: ...
 
 
 @overload
-def controller(*, compile: bool = True) -> Callable[[Callable[..., None]], ControllerFunction]: ...
+def controller(
+    *, compile: bool = True, endings: Sequence[str] = ()
+) -> Callable[[Callable[..., None]], ControllerFunction]: ...
 
 
-def controller(function: Callable[..., None] | None = None, /, *, compile: bool = True) -> Any:
+def controller(
+    function: Callable[..., None] | None = None, /, *, compile: bool = True,
+    endings: Sequence[str] = (),
+) -> Any:  # fmt: skip
     """Make a function a control law that runs inside the compiled loop.
 
     The function takes ``(t, state, contacts, robot, parameters, memory, log, torque)``, or those of
@@ -178,7 +188,8 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
 
     Its own indices are checked, those of the functions it calls are not: an index beyond an array
     raises IndexError, which like any exception ends the run; ``simulate(..., checked=True)`` names
-    the array and the index. To do without, hand over a function compiled with ``numba.njit``.
+    the array and the index. Of a function that ``numba.njit`` has compiled they are not checked
+    either; it runs as Numba compiled it.
 
     Parameters
     ----------
@@ -190,6 +201,9 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
         :class:`~heelstrike.control.ControlledRobot`.
     compile : bool
         False runs the function as it is, in Python, where a debugger can stop in it.
+    endings : sequence of str
+        Reasons for which it ends a run: ``robot.stop(0)`` ends it with this instant, with status
+        ``stopped`` and the first of these words in its message.
 
     Returns
     -------
@@ -221,7 +235,7 @@ def controller(function: Callable[..., None] | None = None, /, *, compile: bool 
     scope = sys._getframe(1).f_locals
 
     def make(function: Callable[..., None]) -> ControllerFunction:
-        return ControllerFunction(function, compile, scope)
+        return ControllerFunction(function, compile, scope, endings)
 
     return make if function is None else make(function)
 

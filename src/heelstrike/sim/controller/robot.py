@@ -41,6 +41,9 @@ from heelstrike.sim.controller import stance
 from heelstrike.sim.controller import tied as following
 from heelstrike.sim.controller.interface import Contacts
 
+NO_ENDING = -1
+"""What `ControlledRobot.ending` is while the law lets the run go on."""
+
 
 class ControlState(Bundle):
     """Where the robot is and how it moves, copied for its controller.
@@ -80,6 +83,8 @@ class ControlledRobot(Bundle):
     trial : int
         Whether the method only tries a state within a step: what is written to memory and log in
         such a call is forgotten, and a plan is best left as it is.
+    ending : int
+        Which ending of its own the law has come to, see :meth:`stop`; -1 for none.
     foot_link, foot_contact : (nf,) int
         Link of each foot, and the first of its contact points.
     foot_sole : (nf, 2, 2) float
@@ -111,6 +116,7 @@ class ControlledRobot(Bundle):
     mass: float = number(float)
     period: float = cell(float)
     trial: int = cell(int)
+    ending: int = cell(int)
     foot_link: Integers = array("nf", of=int)
     foot_contact: Integers = array("nf", of=int)
     foot_sole: Floats = array("nf", 2, 2)
@@ -129,6 +135,15 @@ class ControlledRobot(Bundle):
     tied: Floats = array("tied_rows", "nv + 1")
     tied_row: Integers = array("ties", of=int)
     shares: Floats = array("shared", "shared")
+
+    @kernel
+    def stop(self, ending: int) -> None:
+        """End the run with this instant, for the reason of that place among the law's `endings`.
+
+        What is only tried, within a step, ends nothing.
+        """
+        if self.trial == 0:
+            self.ending = ending
 
     @kernel
     def update(self, state: ControlState) -> None:
@@ -354,7 +369,27 @@ def extents_of(robot: Robot) -> dict[str, int]:
 
 
 def controlled_robot(robot: Robot) -> ControlledRobot:
-    """Make the view that a controller has of a robot."""
+    """Make the view that compiled laws have of a robot, for a controller in Python.
+
+    It answers the same queries in the same words::
+
+        self.robot = controlled_robot(robot)
+        ...
+        at = self.robot.estimate
+        at.q[:], at.v[:] = state.q, state.v
+        self.robot.update(at)
+        self.robot.foot_jacobian(at, foot, jacobian)
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+
+    Returns
+    -------
+    ControlledRobot
+        Its sizes and queries, and a state to ask about.
+    """
     driven = set(robot.model.actuator_joint.tolist())
     legs, rows = leg_joints(robot), count_rows(robot.model)
     view = ControlledRobot.allocate(
@@ -366,6 +401,7 @@ def controlled_robot(robot: Robot) -> ControlledRobot:
     if rows:
         view.motor[:] = -1
         view.motor[robot.model.actuator_joint] = np.arange(robot.nu)
+    view.ending = NO_ENDING
     view.contact_foot[:] = -1
     view.leg_joint[:] = -1
     for index, foot in enumerate(robot.feet):

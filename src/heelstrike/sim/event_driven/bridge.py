@@ -8,11 +8,12 @@ does not ask for modes. At its end, contacts that touch must not approach, other
 
 with a_f the acceleration that the known forces lead to. The rows turn on the way, by more than J̇ v
 tells: what velocities at the end differ by from w is added to b, and the problem solved again. What
-is pressed then is put on the ground by as little as the masses allow. A bridge is kept as short as
-suffices: each further one without progress is longer. The impulses act at its beginning, as those
-of an impact; then the robot moves on freely to its end, where a smooth phase begins again. Impulses
-that make energy are refused, with restitution first and then without. Bridges of a half and of a
-quarter of the length tell how far a bridge may be wrong: its order is one.
+is pressed then is put on the ground, and loops are closed, by as little as the masses allow. A
+bridge is kept as short as suffices: each further one without progress is longer. The impulses act
+at its beginning, as those of an impact; then the robot moves on freely to its end, where a smooth
+phase begins again. Impulses that make energy are refused, with restitution first and then without.
+Bridges of a half and of a quarter of the length tell how far a bridge may be wrong: its order is
+one.
 """
 
 from __future__ import annotations
@@ -32,7 +33,13 @@ from heelstrike.sim.contacts.geometry import (
     evaluate_equations,
     row_product,
 )
-from heelstrike.sim.contacts.loops import append_loops, free_loops, rows_of
+from heelstrike.sim.contacts.loops import (
+    append_loops,
+    find_loops,
+    free_loops,
+    rows_of,
+    speed_along,
+)
 from heelstrike.sim.controller.control import Control
 from heelstrike.sim.controller.interface import Contacts
 from heelstrike.sim.event_driven.candidates import free_acceleration, solve_candidates
@@ -233,18 +240,30 @@ def reach_end(
 
 
 @kernel
-def put_on_ground(count: int, scene: Scene, memory: Memory, phase: Phase) -> None:
-    """Put what the bridge presses to the ground there at its end."""
+def observe_rows(state: Floats, scene: Scene, memory: Memory, phase: Phase) -> None:
+    """Kinematics, contact points, and loops of a state (q, v)."""
+    model, tree = scene.model, memory.equations.tree
+    observe_faces(model, scene.ground, state, phase, memory)
+    if rows_of(memory.loops) > 0:
+        find_loops(model, state[: model.nq], state[model.nq :], tree, memory.loops)
+
+
+@kernel
+def put_in_place(count: int, total: int, scene: Scene, memory: Memory, phase: Phase) -> None:
+    """Put on the ground what the bridge presses there at its end, and close the loops.
+
+    The `count` contacts among the `total` candidates come before the loops.
+    """
     model, assembly, end = scene.model, memory.assembly, phase.end
     impulse, velocity, kept = (
         assembly.answer.impulse,
         assembly.answer.velocity,
         phase.saddle.impulse,
     )
-    for row in range(2 * count):
+    for row in range(2 * total):
         kept[row] = impulse[row]
     for _ in range(2):
-        observe_faces(model, scene.ground, end, phase, memory)
+        observe_rows(end, scene, memory, phase)
         size = 0
         for place in range(count):
             contact = assembly.candidate[place]
@@ -256,26 +275,35 @@ def put_on_ground(count: int, scene: Scene, memory: Memory, phase: Phase) -> Non
             ):
                 phase.row[size] = 2 * place
                 size += 1
-        for i in range(size):
+        pressed = size
+        for place in range(count, total):
+            phase.row[size] = 2 * place
+            size += 1
+        for i in range(pressed):
             contact = assembly.candidate[phase.row[i] // 2]
             phase.system[i, size] = -gap_now(contact, memory.contacts, phase, end)
-        observe_faces(model, scene.ground, phase.begin, phase, memory)
+        for i in range(pressed, size):
+            phase.system[i, size] = -memory.loops.rows.displacement[i - pressed]
+        observe_rows(phase.begin, scene, memory, phase)
         solve_constraints(size, 0.0, assembly.problem.delassus, phase)
-        for row in range(2 * count):
+        for row in range(2 * total):
             impulse[row] = 0.0
         for i in range(size):
             impulse[phase.row[i]] = phase.unknown[i]
-        add_impulse(model, assembly, count, memory.equations, end[: model.nq])
-    for row in range(2 * count):
+        add_impulse(model, assembly, total, memory.equations, end[: model.nq])
+    for row in range(2 * total):
         impulse[row] = kept[row]
 
 
 @kernel
-def turn_rows(count: int, scene: Scene, memory: Memory, phase: Phase) -> None:
+def turn_rows(count: int, total: int, scene: Scene, memory: Memory, phase: Phase) -> None:
     """Let the free terms be those with which velocities at the end are what the problem says."""
     model, assembly = scene.model, memory.assembly
     free, velocity = assembly.problem.free, assembly.answer.velocity
-    observe_faces(model, scene.ground, phase.end, phase, memory)
+    observe_rows(phase.end, scene, memory, phase)
+    for place in range(count, total):
+        along = speed_along(place - count, memory.loops, phase.end[model.nq :])
+        free[2 * place] += along - velocity[2 * place]
     for place in range(count):
         contact = assembly.candidate[place]
         if not keeps_face(contact, model, scene.ground, phase):
@@ -286,7 +314,7 @@ def turn_rows(count: int, scene: Scene, memory: Memory, phase: Phase) -> None:
         free[2 * place] += normal - (velocity[2 * place] - phase.lean[place])
         if not model.nc <= contact < phase.first_dry:
             free[2 * place + 1] += tangent - velocity[2 * place + 1]
-    observe_faces(model, scene.ground, phase.begin, phase, memory)
+    observe_rows(phase.begin, scene, memory, phase)
 
 
 @kernel
@@ -302,11 +330,9 @@ def solve_bridge(
         if status != SOLVED or made_energy(total, assembly, phase):
             return False
         reach_end(total, length, free_end, scene, memory, phase)
-        if rows_of(memory.loops) > 0:  # they turn, too, and are closed when the next phase begins
-            return True
-        put_on_ground(count, scene, memory, phase)
+        put_in_place(count, total, scene, memory, phase)
         if attempt == 0:
-            turn_rows(count, scene, memory, phase)
+            turn_rows(count, total, scene, memory, phase)
     return True
 
 

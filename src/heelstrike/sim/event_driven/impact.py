@@ -72,7 +72,7 @@ def clear_rounding(first: int, end: int, free: Floats) -> None:
 @kernel
 def collide(
     model: Model, nudge: float, memory: Memory, phase: Phase, state: Floats
-) -> tuple[bool, float]:
+) -> tuple[bool, float, float]:
     """Let the points on the ground, and those that reach it now, change the velocities of `state`.
 
     The equations of `state` have been evaluated. Normal velocities w and impulses p obey
@@ -80,8 +80,8 @@ def collide(
     ground faster by `nudge`: where zero impulse is one solution of several, that singles out
     another. Dry friction of the joints is a finite force, and takes no part.
 
-    Returns whether it was solved, and the energy it made relative to what went through the
-    contacts. The impulses go to ``phase.impulse``; ``phase.closed`` and ``phase.slide`` become
+    Returns whether it was solved, the energy it made (J), and what went through the contacts. The
+    impulses go to ``phase.impulse``; ``phase.closed`` and ``phase.slide`` become
     those after the impact.
     """
     v = state[model.nq :]
@@ -104,7 +104,7 @@ def collide(
         assembly.candidate[count] = contact
         count += 1
     if count + rows_of(memory.loops) == 0:
-        return True, 0.0
+        return True, 0.0, 0.0
     find_loops(model, state[: model.nq], v, equations.tree, memory.loops)
     total = append_loops(phase.closed.shape[0], count, memory.loops, assembly)
     free_loops(total, memory.loops, v, 0.0, assembly)
@@ -139,7 +139,7 @@ def collide(
     for dry in range(phase.dry_joint.shape[0]):
         contact = phase.first_dry + dry
         phase.slide[contact] = phase.closed[contact] * heading(v[phase.dry_joint[dry]])
-    return status == SOLVED, made / through if through > 0.0 else 0.0
+    return status == SOLVED, 0.5 * made, 0.5 * through
 
 
 @kernel
@@ -225,9 +225,9 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
     time, contacts = phase.time, memory.contacts
     for i in range(state.shape[0]):
         before[i] = state[i]
-    made = 0.0
+    made = through = 0.0
     for attempt in range(2):
-        solved, made = collide(model, 0.0, memory, phase, state)
+        solved, made, through = collide(model, 0.0, memory, phase, state)
         if not solved:
             restore(before, reported, phase)
             return False
@@ -243,7 +243,8 @@ def strike(model: Model, ground: GroundModel, memory: Memory, phase: Phase, reco
         if phase.hit[contact] == 1:
             phase.last_impact[contact] = time
     made_at = report_impacts(model, time, contacts, phase, reported, record)
-    if made > NOTICEABLE:
+    if made > NOTICEABLE * through:
+        memory.tally.energy_gain += made
         log_impulse(ENERGY_GAIN, made_at, contacts, phase, record)
     return True
 

@@ -14,6 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.compilation import kernel
 from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import OPEN, SOLVED
@@ -142,9 +143,9 @@ class EventDriven(Method):
         Longest step in seconds; an open contact point that would touch the ground and leave it
         again within a quarter of this may only be seen thanks to its velocity.
     output_period : float or None
-        Seconds between two rows of the record, which come from the dense output and cost no
-        accuracy; None for a row at every step. Events have rows of their own: one, or two if
-        velocities jump.
+        Seconds between two rows of the record, which come from the dense output: they change no
+        step, and are up to some ten times as wrong as the ends of steps. None for a row at every
+        step. Events have rows of their own: one, or two if velocities jump.
     solver : str
         Contact solver tried first: ``"lemke"``, ``"fischer_burmeister"`` or ``"gauss_seidel"``.
     swing_feet_pass : bool
@@ -177,6 +178,7 @@ class EventDriven(Method):
     python_period: ClassVar[float | None] = 1e-3
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         for name in ("rtol", "atol", "max_step", "output_period"):
             value = getattr(self, name)
             if not (value is None and name == "output_period") and not 0.0 < value < np.inf:
@@ -258,14 +260,19 @@ class EventDriven(Method):
             check_steps(setting, duration, *self.row_period)
         check_room(setting, duration, *self.row_period)
 
-    def forget_ground(self, robot: Robot, work: Phase, clock: Clock) -> None:
+    def forget_ground(
+        self, robot: Robot, work: Phase, clock: Clock, *, stops: bool = False
+    ) -> None:
         """Look for what touches the ground as at the beginning."""
-        for told in (work.closed, work.slide, work.stuck, work.passing):
-            told[: robot.nc] = 0
-            told[work.first_second :] = 0
+        kept = slice(0, 0) if stops else slice(robot.nc, work.first_second)
+        for told, nothing in (
+            *((each, 0) for each in (work.closed, work.slide, work.stuck, work.passing)),
+            (work.accumulation, np.inf),
+        ):
+            before = told[kept].copy()
+            told[:] = nothing
+            told[kept] = before
         work.face[:] = NO_FACE
-        work.accumulation[: robot.nc] = np.inf
-        work.accumulation[work.first_second :] = np.inf
         work.fired[:] = 0
         clock.begun = 0
 
@@ -320,7 +327,7 @@ def jump(model: Model, nudge: float, memory: Memory, phase: Phase, record: Recor
     for contact in range(phase.watched):
         phase.hit[contact] = 0
         phase.plastic[contact] = phase.closed[contact]
-    solved, _ = collide(model, nudge, memory, phase, phase.begin)
+    solved, _, _ = collide(model, nudge, memory, phase, phase.begin)
     for contact in range(phase.watched):
         phase.plastic[contact] = 0
     for contact in range(phase.first_dry):
@@ -689,6 +696,7 @@ def begin(model: Model, ground: GroundModel, memory: Memory, phase: Phase, recor
     # Modes that are guessed here are those of another instant: where forces or accelerations are
     # not unique, what comes of amending them need not be what the solvers would say.
     memory.assembly.solver.settings.amendments = 0
+    memory.assembly.solver.settings.patient = 1
     if rows_of(memory.loops) > 0:
         if not close_loops(model, equations, memory.loops, q):
             return DIVERGED

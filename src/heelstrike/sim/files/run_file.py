@@ -13,6 +13,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from heelstrike.arguments import takes
 from heelstrike.errors import RunFileError, WriteError
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.files.dataset import ROBOT_GROUP, to_dataset
@@ -25,19 +26,28 @@ from heelstrike.sim.files.robot_dataset import robot_to_dataset
 from heelstrike.sim.files.seal import seal, seal_holds
 from heelstrike.sim.files.settings import unreadable
 from heelstrike.sim.files.stored_run import stored_run
+from heelstrike.sim.files.table import to_csv
 from heelstrike.sim.run import Run
-from heelstrike.whole_file import write_whole
+from heelstrike.whole_file import check_target, write_whole
+
+NETCDF, TABLE = ".nc", ".csv"
+KEPT = "the run is still in memory, to be saved elsewhere"
+ENDINGS = {
+    NETCDF: "NetCDF, which load_run reads",
+    TABLE: "a table of text, for other programs",
+}
+"""Endings of the names of files that runs are written to, and what these are."""
 
 
 def save(run: Run, path: str | os.PathLike[str]) -> Path:
-    """Write a run as NetCDF. The file appears whole or not at all.
+    """Write a run as NetCDF, or as a table of text. The file appears whole or not at all.
 
     Parameters
     ----------
     run : Run
         The run.
     path : str or path
-        File to write, by custom ``.nc``; an existing one is replaced.
+        File to write, ``.nc`` or ``.csv``; an existing one is replaced.
 
     Returns
     -------
@@ -47,30 +57,64 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
     Raises
     ------
     RunFileError
-        If the folder does not exist, cannot be written to or is full, or the method is one that
-        could not be read again. The run is as it was, and so is an older file.
+        If the name ends otherwise, the folder does not exist, cannot be written to or is full, or
+        the method is one that could not be read again. The run is as it was, and so is an older
+        file.
     """
-    kept = "the run is still in memory, to be saved elsewhere"
+    if check_run_file(path) == TABLE:
+        return _written(path, to_csv(run))
     if reason := unreadable(run.method):
         raise RunFileError(
             f"cannot write {path}: a run by {type(run.method).__name__} could not be read again: "
-            f"{reason}; {kept}, as run.to_dataset() or array by array"
+            f"{reason}; {KEPT}, as run.to_dataset() or array by array"
         )
     try:
         # HDF5 crashes on a disk that is full. In memory it never meets one.
         image = _image(run)
     except MemoryError as error:
         raise RunFileError(
-            f"cannot write {path}: no memory left to make the file in; {kept}"
+            f"cannot write {path}: no memory left to make the file in; {KEPT}"
         ) from error
     except Exception as error:  # names that NetCDF cannot hold, arrays of other shapes
         raise RunFileError(
-            f"cannot write {path}: {type(error).__name__}: {error}; {kept}"
+            f"cannot write {path}: {type(error).__name__}: {error}; {KEPT}"
         ) from error
+    return _written(path, image.getbuffer())
+
+
+def check_run_file(path: str | os.PathLike[str], *endings: str) -> str:
+    """Return the ending of the name of a file for a run; refuse it if nothing is written so.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    *endings : str
+        Those that it may have, by default all that there are.
+
+    Raises
+    ------
+    RunFileError
+        With the endings that it may have, or why there can be no such file.
+    """
+    if not isinstance(path, str | os.PathLike):
+        raise RunFileError(f"a run is written to a file, as 'walk.nc'; this is {path!r}")
     try:
-        return write_whole(path, image.getbuffer())
+        check_target(path)
     except WriteError as error:
-        raise RunFileError(f"{error}; {kept}") from error
+        raise RunFileError(f"{error}; {KEPT}") from error
+    ending = Path(path).suffix.lower()
+    if ending not in (endings or ENDINGS):
+        known = " or ".join(f"{each} ({ENDINGS[each]})" for each in endings or ENDINGS)
+        raise RunFileError(f"cannot write {path}: the name of a run ends in {known}")
+    return ending
+
+
+def _written(path: str | os.PathLike[str], content: str | memoryview) -> Path:
+    try:
+        return write_whole(path, content)
+    except WriteError as error:
+        raise RunFileError(f"{error}; {KEPT}") from error
 
 
 def _image(run: Run) -> io.BytesIO:
@@ -95,6 +139,7 @@ def _image(run: Run) -> io.BytesIO:
     return image
 
 
+@takes(RunFileError)
 def load_run(
     path: str | os.PathLike[str], robot: Robot | None = None, classes: Sequence[type] = ()
 ) -> Run:
@@ -135,6 +180,10 @@ def load_run(
             raise RunFileError(f"there is no file {source}")
         if not source.is_file():
             raise RunFileError(f"{source}: not a run of heelstrike: it is not a regular file")
+        if source.suffix.lower() == TABLE:
+            raise RunFileError(
+                f"{source} is a table, which does not hold robot and ground; load the {NETCDF} file"
+            )
         sealed = seal_holds(source)
     except RunFileError:
         raise

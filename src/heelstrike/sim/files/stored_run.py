@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -38,8 +39,15 @@ from heelstrike.sim.run import (
     events_of,
 )
 
-_ENDED_WELL = (RunStatus.COMPLETED, RunStatus.FELL, RunStatus.INTERRUPTED)
+_ENDED_WELL = (
+    RunStatus.COMPLETED, RunStatus.FELL, RunStatus.STOPPED, RunStatus.INTERRUPTED,
+)  # fmt: skip
 """Ends of runs of which every number is finite."""
+
+_DEFAULTS = {
+    each.name: each.default for kind in (Certificates, SolverCount) for each in fields(kind)
+}
+"""What older files do not tell has one."""
 
 
 def stored_run(
@@ -125,10 +133,12 @@ def _run(stored: Stored, robot: Robot, classes: Sequence[type]) -> Run:
         time=time,
         **stored.arrays(rows, sizes),
         events=_events(stored, robot, sizes),
-        certificates=Certificates(*(stored.number(f"worst_{name}") for name in WORST)),
+        certificates=Certificates(
+            *(stored.number(f"worst_{name}", _DEFAULTS[name]) for name in WORST)
+        ),
         solver=SolverCount(
             stored.text("solver_name"),
-            *(stored.count(f"solver_{name}") for name in SOLVED),
+            *(stored.count(f"solver_{name}", _DEFAULTS[name]) for name in SOLVED),
         ),
         steps=stored.count("steps"),
         saturations=stored.count("saturations"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import MISSING
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,8 +100,10 @@ class Stored:
             raise DamageError(f"the attribute {name!r} is missing, or neither number nor text")
         return self.contents[f"@{name}"]
 
-    def number(self, name: str) -> float:
-        """Return an attribute that is a number."""
+    def number(self, name: str, default: Any = MISSING) -> float:
+        """Return an attribute that is a number, or the default that older files leave it at."""
+        if default is not MISSING and f"@{name}" not in self.contents:
+            return float(default)
         value = self._attribute(name)
         if value.dtype.kind not in "fi":
             raise DamageError(f"attribute {name!r} is not a number")
@@ -108,12 +111,12 @@ class Stored:
             raise DamageError(f"attribute {name!r} is NaN")
         return float(value)
 
-    def count(self, name: str) -> int:
-        """Return an attribute that counts something."""
-        value = self.number(name)
+    def count(self, name: str, default: Any = MISSING) -> int:
+        """Return an attribute that counts something, or the default."""
+        value = self.number(name, default)
         if not (0.0 <= value < math.inf and value == round(value)):
             raise DamageError(f"attribute {name!r} is {value:g}, not a count")
-        return int(self._attribute(name))
+        return int(value)
 
     def text(self, name: str) -> str:
         """Return an attribute that is text."""

@@ -73,19 +73,23 @@ def note_event(
 
 
 @dissolved_kernel
-def note_events(model: Model, time: float, step: float, memory: Memory, record: Record) -> None:
+def note_events(
+    model: Model, time: float, end: float, step: float, memory: Memory, record: Record
+) -> None:
     """Find touchdowns, lift-offs and changes between stick and slip of this step.
 
-    An impulse closes a contact by the end of the step; a gap opens it at the start of a step.
-    Points that already stand on the ground when the run begins do not touch down, and joints that
-    rest at a stop do not reach it. Joints with dry friction come to rest, or begin to move.
+    It ends at `end`, which is the `time` of the next step to the last bit: what a step ends with
+    comes before what the next begins with. An impulse closes a contact by the end of the step; a
+    gap opens it at the start of a step. Points that already stand on the ground when the run begins
+    do not touch down, and joints that rest at a stop do not reach it. Joints with dry friction come
+    to rest, or begin to move.
     """
     first = record.events
     for contact in range(model.contact_link.shape[0]):
-        note_events_of_contact(model, time, step, contact, memory, record)
+        note_events_of_contact(model, time, end, step, contact, memory, record)
     for joint in range(model.parent.shape[0]):
         if memory.reaction.stop_torque[joint] != 0.0 or memory.reported.stopped[joint] != 0:
-            note_stop(model, time, step, joint, memory, record)
+            note_stop(model, end, step, joint, memory, record)
     for dry in range(memory.dry_joint.shape[0]):
         joint = memory.dry_joint[dry]
         if memory.breakaway[joint] == 0.0:
@@ -94,7 +98,7 @@ def note_events(model: Model, time: float, step: float, memory: Memory, record: 
         if memory.reported.resting[dry] == -1:
             memory.reported.resting[dry] = 1 if abs(memory.v[joint]) <= SLIP_SPEED else 0
         if rests != (memory.reported.resting[dry] == 1):
-            log_event(time + step, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
+            log_event(end, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
             memory.reported.resting[dry] = 1 if rests else 0
     if record.events > first + 1:
         order_events(first, record)
@@ -119,8 +123,9 @@ def order_events(first: int, record: Record) -> None:
 
 @dissolved_kernel
 def note_events_of_contact(
-    model: Model, time: float, step: float, contact: int, memory: Memory, record: Record
-) -> None:
+    model: Model, time: float, end: float, step: float, contact: int, memory: Memory,
+    record: Record,
+) -> None:  # fmt: skip
     """Find what happened to a contact point in this step."""
     force, gap = memory.contacts.force, memory.contacts.gap[contact]
     closed, slipping = memory.reported.closed, memory.reported.slipping
@@ -133,7 +138,7 @@ def note_events_of_contact(
             normal, _ = contact_velocity(model, memory.equations.tree, memory.contacts, contact)
             stood = normal >= -STANDING_SPEED
         if not stood:
-            note_event(time + step, TOUCHDOWN, contact, step, force, record)
+            note_event(end, TOUCHDOWN, contact, step, force, record)
     elif closed[contact] == 1 and not pushed and gap > LIFTOFF_GAP:
         closed[contact] = 0
         slipping[contact] = 0
@@ -142,12 +147,12 @@ def note_events_of_contact(
         slips = abs(memory.reaction.slip[contact]) > SLIP_SPEED
         if slips != (slipping[contact] == 1):
             slipping[contact] = 1 if slips else 0
-            note_event(time + step, SLIP if slips else STICK, contact, step, force, record)
+            note_event(end, SLIP if slips else STICK, contact, step, force, record)
 
 
 @kernel
 def note_stop(
-    model: Model, time: float, step: float, joint: int, memory: Memory, record: Record
+    model: Model, end: float, step: float, joint: int, memory: Memory, record: Record
 ) -> None:
     """Find whether a joint reached a stop in this step, or left it."""
     pushed = memory.reaction.stop_torque[joint] != 0.0
@@ -157,7 +162,7 @@ def note_stop(
     )
     if pushed and memory.reported.stopped[joint] == 0 and not stood:
         impulse = abs(memory.reaction.stop_torque[joint]) * step
-        log_event(time + step, JOINT_STOP, joint, impulse, 0.0, record)
+        log_event(end, JOINT_STOP, joint, impulse, 0.0, record)
     if pushed:
         memory.reported.stopped[joint] = 1
     elif way > LIFTOFF_GAP:

@@ -14,12 +14,20 @@ free velocity v_f and Delassus matrix::
 The contacts of the impact are those that touch now and touched before or would close if they were
 free. It is for the contact that is *new* to say that there is an impact at all: one that touches at
 the end of this step, did not at the end of the last one, and is not there already. A contact that
-is in the ground makes two problems of it, too: positions are pushed out, velocities are not, so
-that no solve makes kinetic energy. Elsewhere the two velocities are the same.
+is in the ground makes two problems of it, too: positions are pushed out, velocities are not.
+Elsewhere the two velocities are the same. So no solve makes kinetic energy, but restitution with
+friction (Kane's paradox): that is measured, and told by an event::
+
+    Δ(½ vᵀ M v) = ½ p (w⁻ + w⁺),   w⁻ = J v_f,  w⁺ = w⁻ + G p
+
+Asked for it, a step scales restitution back in such an impact until it makes none. There is such a
+share of e: an impact without restitution never makes energy.
 
 Between a stop and the ground, or two walls, there may be no way out of a penetration. If it is no
 more than rounding and turning explain, the problem is asked again with negative gaps counted as
-zero, and an event tells of it.
+zero, and an event tells of it. While such a wedge lasts, and nothing in it opens, closes or slides,
+that is asked at once: the strict problem is only asked again when the wedge is twice as old.
+Positions are pushed out without friction, where that leads out.
 """
 
 from __future__ import annotations
@@ -29,9 +37,10 @@ from numpy.typing import NDArray
 
 from heelstrike.compiler.bundle import Bundle, array, cell, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
-from heelstrike.contact.modes import OPEN, SOLVED
+from heelstrike.contact.modes import OPEN, SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
-from heelstrike.contact.workspace import ContactAnswer, ContactProblem
+from heelstrike.contact.sets import HALF_LINE, INTERVAL, LINE
+from heelstrike.contact.workspace import ContactAnswer, ContactProblem, ContactWorkspace
 from heelstrike.dynamics.loops import most_rows
 from heelstrike.robot.model import Integers, Model
 from heelstrike.robot.robot import Robot
@@ -39,7 +48,7 @@ from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.contacts.geometry import contact_velocity
 from heelstrike.sim.memory import Assembly, Memory, contact_capacity
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import log_event
+from heelstrike.sim.record.recording import log_event, note_event
 from heelstrike.sim.time_stepping.corners import Corner, allocate_corner
 
 Floats = NDArray[np.float64]
@@ -53,6 +62,12 @@ NEVER = -2
 # no way out: what turning makes of a gap that is closed, h² ω² l / 2, at 20 rad/s and 1 ms.
 WEDGED_BY = 1e-4
 WEDGED = int(EventKind.WEDGED)
+ENERGY_GAIN = int(EventKind.ENERGY_GAIN)
+
+# Energy counts as made when it exceeds this part of the energy that went through the contacts.
+NOTICEABLE = 1e-9
+# How often the share of restitution that makes no energy is halved in: to a thousandth.
+HALVINGS = 10
 
 
 class Impact(Bundle):
@@ -68,9 +83,19 @@ class Impact(Bundle):
     called : (places,) int
         What takes part although it seemed too far away; `calls` tells whether there is any.
     calls : int
-    relaxed, wedged : int
+    relaxed, wedged, since : int
         Whether this step is asked for less than to come out of the ground and to bounce; the last
-        step that was.
+        step that was; the first of those without a break.
+    bounded : int
+        Whether restitution that would make energy is scaled back.
+    gains : int
+        Whether restitution made energy in this step, or would have.
+    gain : float
+        The energy it made (J).
+    bounce : (capacity,) float
+        What restitution asks of each member (m/s, rad/s).
+    kept : (capacity,) int
+        Modes of the members in the last answer that made no energy.
     arriving : (nv,) float
         Where there is an impact, the velocity that positions move with.
     member : (capacity,) int
@@ -87,6 +112,12 @@ class Impact(Bundle):
     calls: int = cell(int)
     relaxed: int = cell(int)
     wedged: int = cell(int)
+    since: int = cell(int)
+    bounded: int = cell(int)
+    gains: int = cell(int)
+    gain: float = cell(float)
+    bounce: Floats = array("capacity")
+    kept: Integers = array("capacity", of=int)
     arriving: Floats = array("nv")
     member: Integers = array("capacity", of=int)
     problem: ContactProblem = part(ContactProblem)
@@ -94,7 +125,7 @@ class Impact(Bundle):
     corner: Corner = part(Corner)
 
 
-def allocate_impact(robot: Robot) -> Impact:
+def allocate_impact(robot: Robot, *, bounded: bool = False) -> Impact:
     """Allocate what the steps of a robot need, with nothing known yet."""
     capacity = contact_capacity(robot) + robot.nc + most_rows(robot.model)
     places = 2 * (robot.nc + robot.nv)
@@ -104,6 +135,7 @@ def allocate_impact(robot: Robot) -> Impact:
         places=places,
         touching=np.full(places, NEVER),
         wedged=NEVER,
+        bounded=int(bounded),
         problem=ContactProblem.allocate(nc=capacity),
         answer=ContactAnswer.allocate(nc=capacity),
         corner=allocate_corner(robot),
@@ -139,14 +171,8 @@ def call(place: int, impact: Impact) -> None:
 
 
 @kernel
-def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool:
-    """Ask a step without an answer for less: no way out, no bounce; return if it asked for any.
-
-    Without these the velocity that the step would have without contact is all that is in the way,
-    and there is an answer. What is beyond stops or in the ground is left there, where the gap is
-    bounded and none is deeper than rounding and turning explain. In a wedge that goes on all of it
-    is explained: the step before has let nothing sink but by turning.
-    """
+def left_alone(model: Model, count: int, memory: Memory, impact: Impact) -> tuple[float, bool]:
+    """What a relaxed step does not ask for: the deepest negative gap, and whether any bounces."""
     deepest, bounces = 0.0, False
     surface, corner = memory.surface, impact.corner
     for place in range(count):
@@ -158,12 +184,54 @@ def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: I
             bounces = bounces or surface.restitution[candidate] > 0.0
         elif 0 <= second < model.nc:
             bounces = bounces or corner.restitution[second] > 0.0
+    return deepest, bounces
+
+
+@kernel
+def relax(model: Model, bounds_gaps: bool, count: int, memory: Memory, impact: Impact) -> bool:
+    """Ask a step without an answer for less: no way out, no bounce; return if it asked for any.
+
+    Without these the velocity that the step would have without contact is all that is in the way,
+    and there is an answer. What is beyond stops or in the ground is left there, where the gap is
+    bounded and none is deeper than rounding and turning explain. In a wedge that goes on all of it
+    is explained: the step before has let nothing sink but by turning.
+    """
+    deepest, bounces = left_alone(model, count, memory, impact)
     leaves = impact.relaxed == 0 and bounces
     if bounds_gaps and impact.relaxed == 0 and deepest < 0.0:
         leaves = impact.wedged == memory.tally.steps - 1 or deepest >= -WEDGED_BY
     if leaves:
         impact.relaxed = 1
     return leaves
+
+
+@kernel
+def stays_wedged(steps: int, impact: Impact) -> bool:
+    """Whether a wedge lasts, and is not as old as when it is asked again: 1, 2, 4, 8, ... steps."""
+    age = steps - impact.since
+    return impact.wedged == steps - 1 and age & (age - 1) != 0
+
+
+@kernel
+def modes_change(model: Model, count: int, memory: Memory, impact: Impact) -> bool:
+    """Whether a point or stop opens, closes or slides otherwise than in the step before."""
+    reaction, mode = memory.reaction, memory.assembly.answer.mode
+    for place in range(count):
+        candidate = memory.assembly.candidate[place]
+        stop = candidate - model.nc
+        now = mode[place]
+        if stop < 0:
+            before = reaction.mode[candidate]
+        elif stop < 2 * model.nv:
+            before = reaction.stop_mode[stop // 2, stop % 2]
+            now = int(now != OPEN)
+        elif stop < 2 * model.nv + model.nc:
+            before = impact.corner.mode[stop - 2 * model.nv]
+        else:  # dry friction and loops
+            break
+        if now != before:
+            return True
+    return False
 
 
 @kernel
@@ -180,11 +248,13 @@ def close_gaps(model: Model, step: float, count: int, impact: Impact, memory: Me
 def note_wedge(model: Model, time: float, memory: Memory, impact: Impact, record: Record) -> None:
     """Tell of a wedge that begins, by the contact point that is deepest in the ground."""
     steps, gap = memory.tally.steps, memory.contacts.gap
+    memory.assembly.solver.tally.relaxed += 1
     if impact.wedged != steps - 1:
         deepest = 0
         for contact in range(model.nc):
             deepest = contact if gap[contact] < gap[deepest] else deepest
         log_event(time, WEDGED, deepest, 0.0, 0.0, record)
+        impact.since = steps
     impact.wedged = steps
 
 
@@ -266,15 +336,16 @@ def pose_impact(
         if candidate < 2 * (model.nc + model.nv):
             gap = gap_of(model, memory, impact.corner, candidate)
             normal -= (max(gap, 0.0) if impact.relaxed == 1 else gap) / step
+        impact.bounce[place] = 0.0
         bounces = impact.relaxed == 0
         if bounces and candidate < model.nc:
             before, _ = contact_velocity(model, memory.equations.tree, contacts, candidate)
-            normal += memory.surface.restitution[candidate] * before
+            impact.bounce[place] = memory.surface.restitution[candidate] * before
         elif bounces and model.nc + 2 * model.nv <= candidate < 2 * (model.nc + model.nv):
             contact, corner = candidate - model.nc - 2 * model.nv, impact.corner
             before, _ = contact_velocity(model, memory.equations.tree, corner.contacts, contact)
-            normal += corner.restitution[contact] * before
-        its.free[2 * place] = normal
+            impact.bounce[place] = corner.restitution[contact] * before
+        its.free[2 * place] = normal + impact.bounce[place]
         its.free[2 * place + 1] = problem.free[2 * source + 1]
         its.friction[place] = problem.friction[source]
         its.set[place] = problem.set[source]
@@ -284,11 +355,116 @@ def pose_impact(
 
 
 @kernel
+def energy_made(
+    problem: ContactProblem, bounce: Floats, share: float, answer: ContactAnswer
+) -> float:
+    """Kinetic energy that impulses make (J), or zero if it is no more than rounding explains.
+
+    A share of ``bounce`` is in the free velocities. What moves a loop as it turns does work by its
+    own velocity, which is left out.
+    """
+    impulse, made, through = answer.impulse, 0.0, 0.0
+    for row in range(2 * problem.count):
+        place = row // 2
+        normal = row % 2 == 0
+        if normal and problem.set[place] == INTERVAL:
+            continue
+        before = problem.free[row] - (share * bounce[place] if normal else 0.0)
+        after = before
+        for column in range(2 * problem.count):
+            after += problem.delassus[row, column] * impulse[column]
+        if normal and problem.set[place] == LINE:
+            before, after = before - after, 0.0
+        made += 0.5 * impulse[row] * (before + after)
+        through += abs(impulse[row] * before) + abs(impulse[row] * after)
+    return made if made > NOTICEABLE * through else 0.0
+
+
+@kernel
+def solve_restitution(
+    order: Integers, problem: ContactProblem, solver: ContactWorkspace, impact: Impact,
+    answer: ContactAnswer,
+) -> int:  # fmt: skip
+    """Solve a problem with restitution, and measure the energy it makes; return how that ended.
+
+    If restitution is bounded, the largest share of it is sought that makes none.
+    """
+    bounce, kept, asked = impact.bounce, impact.kept, 0.0
+    for place in range(problem.count):
+        asked = max(asked, abs(bounce[place]))
+        kept[place] = answer.mode[place]
+    least, most, share = 0.0, 1.0, 1.0
+    status = SOLVED
+    for attempt in range(-1, HALVINGS + 1):
+        if attempt >= 0:
+            another = 0.5 * (least + most) if attempt < HALVINGS else least
+            for place in range(problem.count):
+                problem.free[2 * place] += (another - share) * bounce[place]
+                answer.mode[place] = kept[place]
+            share = another
+        status = solve_contact_kernel(order, problem, solver, answer)
+        if asked == 0.0:
+            break
+        impact.gain = energy_made(problem, bounce, share, answer) if status == SOLVED else 0.0
+        if attempt < 0:
+            impact.gains = int(impact.gain > 0.0)
+            if impact.gains == 0 or impact.bounded == 0:
+                break
+        elif status == SOLVED and impact.gain == 0.0:
+            least = share
+            for place in range(problem.count):
+                kept[place] = answer.mode[place]
+        else:
+            most = share
+    return int(status)
+
+
+@kernel
+def note_gain(
+    model: Model, time: float, step: float, impact: Impact, memory: Memory, record: Record
+) -> None:
+    """Tell of energy that restitution made, by the contact point with the largest impulse."""
+    force = memory.contacts.force
+    hardest = 0
+    for contact in range(model.nc):
+        hardest = contact if force[contact, 0] > force[hardest, 0] else hardest
+    note_event(time + step, ENERGY_GAIN, hardest, step, force, record)
+    memory.tally.energy_gain += impact.gain
+
+
+@kernel
+def pose_way_out(
+    model: Model, step: float, problem: ContactProblem, memory: Memory, impact: Impact
+) -> None:
+    """Write the problem of what is to be added to the velocity of a wedge to push it out.
+
+    Without friction; `problem` is that of the positions, solved with negative gaps counted as zero.
+    """
+    assembly, its = memory.assembly, impact.problem
+    rows = 2 * problem.count
+    for row in range(rows):
+        its.free[row] = 0.0
+        for column in range(rows):
+            its.delassus[row, column] = problem.delassus[row, column]
+    for place in range(problem.count):
+        candidate = assembly.candidate[place]
+        its.friction[place] = its.bound[place] = 0.0
+        its.set[place] = LINE if problem.set[place] == LINE else HALF_LINE
+        impact.answer.mode[place] = STICK if problem.set[place] == LINE else OPEN
+        if candidate < 2 * (model.nc + model.nv) and problem.set[place] != LINE:
+            gap = min(gap_of(model, memory, impact.corner, candidate), 0.0)
+            its.free[2 * place] = assembly.answer.velocity[2 * place] + gap / step
+            if gap < 0.0:
+                impact.answer.mode[place] = STICK
+    its.count = problem.count
+
+
+@kernel
 def solve_impact(
     order: Integers, members: int, problem: ContactProblem, impact: Impact, assembly: Assembly
 ) -> bool:
     """Put the answer of the impact in the place of that of the positions; return success."""
-    status = solve_contact_kernel(order, impact.problem, assembly.solver, impact.answer)
+    status = solve_restitution(order, impact.problem, assembly.solver, impact, impact.answer)
     answer, its = assembly.answer, impact.answer
     for place in range(problem.count):
         answer.mode[place] = OPEN

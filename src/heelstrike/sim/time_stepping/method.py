@@ -31,6 +31,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from heelstrike.arguments import check_fields
 from heelstrike.compiler.bundle import Bundle, array, number, part
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.straight_line import play
@@ -38,11 +39,13 @@ from heelstrike.contact.ground import GroundModel
 from heelstrike.contact.modes import SOLVED, STICK
 from heelstrike.contact.problem import solve_contact_kernel
 from heelstrike.contact.sets import CONE, HALF_LINE
+from heelstrike.contact.workspace import ContactProblem
 from heelstrike.dynamics.kernels import integrate, passive_force
 from heelstrike.dynamics.workspace import Workspace
 from heelstrike.errors import SimulationError
 from heelstrike.robot.model import Floats, Integers, Model
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.warning import warn
 from heelstrike.sim.clock import Clock
 from heelstrike.sim.closed_sets import Scheme
 from heelstrike.sim.contacts.brakes import note_brakes, share_friction, take_hold
@@ -82,6 +85,7 @@ from heelstrike.sim.record.record import Record
 from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
+from heelstrike.sim.time_stepping.doubts import SimulationWarning, too_light, too_stiff
 from heelstrike.sim.time_stepping.impact import (
     NEVER,
     TOUCHING,
@@ -92,11 +96,17 @@ from heelstrike.sim.time_stepping.impact import (
     dismiss,
     falls_into,
     find_members,
+    left_alone,
+    modes_change,
+    note_gain,
     note_touching,
     note_wedge,
     pose_impact,
+    pose_way_out,
     relax,
     solve_impact,
+    solve_restitution,
+    stays_wedged,
 )
 
 GAP_LINEARISED = int(Scheme.GAP_LINEARISED)
@@ -113,6 +123,8 @@ CLOSING_SPEED = 5.0
 FAR_STEPS = 20.0
 # The same for joint stops (rad/s or m/s).
 CLOSING_RATE = 20.0
+# Contact points deeper in the ground (m) than this, and than the run began, put it in doubt.
+SUNK = 1e-2
 
 
 class Stepping(Bundle):
@@ -155,6 +167,10 @@ class TimeStepping(Method):
         Gap in metres up to which a contact point takes part, for the schemes that decide by the
         gap alone (the paper's two and Moreau-Jean). With the literal zero, a foot at rest loses
         and regains the ground through round-off.
+    bounded_restitution : bool
+        Whether restitution is scaled back in an impact in which it would make energy (with
+        friction it may, Kane's paradox). Such impacts are told of either way, by events
+        ``ENERGY_GAIN``.
 
     Raises
     ------
@@ -171,8 +187,10 @@ class TimeStepping(Method):
     scheme: Scheme = Scheme.IMPACT_RESOLVED
     solver: str = "lemke"
     activation: float = 0.0
+    bounded_restitution: bool = False
 
     def __post_init__(self) -> None:
+        check_fields(self, SimulationError)
         if not 0.0 < self.step < float("inf"):
             raise SimulationError(f"the time step must be a positive number, got {self.step}")
         if not 0.0 <= self.activation < float("inf"):
@@ -208,7 +226,7 @@ class TimeStepping(Method):
             scheme=int(self.scheme),
             activation=self.activation,
             order=solver_order(self.solver),
-            impact=allocate_impact(robot),
+            impact=allocate_impact(robot, bounded=self.bounded_restitution),
         )
 
     def room(self, robot: Robot) -> tuple[int, int]:
@@ -218,14 +236,19 @@ class TimeStepping(Method):
             + len(robot.joint_names)
             + robot.model.latches
             + robot.model.brakes
-            + 1
+            + 2
         )
         return 1, events
 
-    def forget_ground(self, robot: Robot, work: Stepping, clock: Clock) -> None:  # noqa: ARG002
+    def forget_ground(
+        self, robot: Robot, work: Stepping, clock: Clock, *, stops: bool = False
+    ) -> None:
         """What touched other ground says nothing of this one."""
         work.impact.touching[: robot.nc] = NEVER
         work.impact.touching[robot.nc + 2 * robot.nv :] = NEVER
+        if stops:
+            work.impact.touching[:] = NEVER
+            clock.begun = 0  # loops are closed again
         work.impact.corner.near = 0
 
     def check(self, setting: Setting) -> None:
@@ -236,6 +259,22 @@ class TimeStepping(Method):
                 f"{self.scheme.name} knows plastic impacts only, and this ground has "
                 f"restitution; use Scheme.IMPACT_RESOLVED or Scheme.MOREAU_JEAN"
             )
+        stiff = self._too_stiff(setting.robot, setting.state.q)
+        if stiff:
+            warn(stiff, SimulationWarning)
+
+    def doubts(self, robot: Robot, q: Floats, sunk: float = 0.0) -> list[str]:
+        """Say what is too stiff or too light, and how deep a step ended in the ground."""
+        deep = (
+            f"a step ended with a contact point {sunk:.2g} m in the ground: it turned too far in a "
+            f"step of {self.step:g} s, which has to be shorter"
+        )
+        found = (self._too_stiff(robot, q), too_light(robot, q), deep if sunk > SUNK else "")
+        return [doubt for doubt in found if doubt]
+
+    def _too_stiff(self, robot: Robot, q: Floats) -> str:
+        implicit = self.scheme in (Scheme.MOREAU_JEAN, Scheme.LINEARLY_IMPLICIT)
+        return "" if implicit else too_stiff(robot, q, self.step)
 
 
 @dissolved_kernel
@@ -387,7 +426,8 @@ def select_candidates(model: Model, work: Stepping, memory: Memory) -> int:
             if gap + 0.5 * step * before > work.activation:
                 continue
             if work.impact.relaxed == 0:
-                normal += memory.surface.restitution[contact] * before
+                work.impact.bounce[count] = memory.surface.restitution[contact] * before
+                normal += work.impact.bounce[count]
         problem.free[2 * count] = normal
         problem.free[2 * count + 1] = velocity[contact, 1]
         problem.set[count] = CONE
@@ -484,7 +524,8 @@ def select_corners(model: Model, count: int, work: Stepping, memory: Memory) -> 
             if gap + 0.5 * step * before > work.activation:
                 continue
             if work.impact.relaxed == 0:
-                normal += corner.restitution[contact] * before
+                work.impact.bounce[count] = corner.restitution[contact] * before
+                normal += work.impact.bounce[count]
         elif gap > work.activation:
             continue
         problem.free[2 * count] = normal
@@ -696,7 +737,12 @@ def solve_candidates(
         write_rows(model, equations.tree, contacts, joints, assembly)
         assemble_delassus(model, count, equations, assembly)
     problem.count = count
-    solved = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer) == SOLVED
+    if work.scheme == MOREAU_JEAN:
+        status = solve_restitution(work.order, problem, assembly.solver, impact, assembly.answer)
+        solved = status == SOLVED
+    else:
+        status = solve_contact_kernel(work.order, problem, assembly.solver, assembly.answer)
+        solved = status == SOLVED
     resolves = solved and work.scheme == IMPACT_RESOLVED
     if resolves and falls_into(model, step, problem, memory, impact):
         impact.happens = 1
@@ -704,11 +750,28 @@ def solve_candidates(
         for j in range(model.nv):
             arriving[j] = memory.next_v[j]
         push_all(model, near, count, straight, memory, arriving)
+        if impact.relaxed == 1:
+            push_out(model, near, count, straight, problem, work, memory)
         members = find_members(model, step, problem, memory, impact)
         pose_impact(model, step, members, problem, memory, impact)
         solved = solve_impact(work.order, members, problem, impact, assembly)
     push_all(model, near, count, straight, memory, memory.next_v)
     return solved
+
+
+@kernel
+def push_out(
+    model: Model, near: int, count: int, straight: bool, problem: ContactProblem, work: Stepping,
+    memory: Memory,
+) -> None:  # fmt: skip
+    """Let the positions of a wedge come out of the ground, where a way without friction leads."""
+    impact, answer = work.impact, memory.assembly.answer
+    pose_way_out(model, work.step, problem, memory, impact)
+    solver, its = memory.assembly.solver, impact.answer
+    if solve_contact_kernel(work.order, impact.problem, solver, its) == SOLVED:
+        for row in range(2 * count):
+            answer.impulse[row] = its.impulse[row]
+        push_all(model, near, count, straight, memory, impact.arriving)
 
 
 @dissolved_kernel
@@ -785,16 +848,20 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
 
     What an impulse elsewhere throws against the ground or a stop, though it was too far away to be
     a candidate, is called and the step solved again. So it is where nothing pushes all candidates
-    out of where they are already, or lets them bounce; they are left there, then.
+    out of where they are already, or lets them bounce; they are left there, then, and in a wedge
+    that lasts at once.
     """
     assembly, reaction, impact = memory.assembly, memory.reaction, work.impact
     again = True
     solved = True
     near = joints = count = 0
-    impact.relaxed = 0
+    impact.relaxed = int(stays_wedged(memory.tally.steps, impact))
+    at_once = impact.relaxed == 1
     while again:
         free_velocity(model, work, time, memory)
-        impact.happens = 0
+        impact.happens = impact.gains = 0
+        for place in range(impact.bounce.shape[0] if work.scheme == MOREAU_JEAN else 0):
+            impact.bounce[place] = 0.0
         for i in range(3):
             assembly.answer.residual[i] = 0.0
         near = select_candidates(model, work, memory)
@@ -810,6 +877,10 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         first_loop = 2 * (model.nc + model.nv) + memory.dry_joint.shape[0]
         count = append_loops(first_loop, count, memory.loops, assembly)
         free_loops(count, memory.loops, memory.next_v, 0.5 * work.step, assembly)
+        if at_once:
+            deepest, bounces = left_alone(model, count, memory, impact)
+            if deepest == 0.0 and not bounces:  # the wedge is over
+                impact.relaxed = 0
         if impact.relaxed == 1 and is_linearised(work.scheme):
             close_gaps(model, work.step, count, impact, memory)
         if count > 0:
@@ -817,6 +888,8 @@ def solve_step(model: Model, time: float, work: Stepping, memory: Memory) -> boo
         v = impact.arriving if impact.happens == 1 else memory.next_v
         if not solved:
             again = relax(model, is_linearised(work.scheme), count, memory, impact)
+        elif at_once and impact.relaxed == 1 and modes_change(model, count, memory, impact):
+            at_once, impact.relaxed = False, 0
         elif is_linearised(work.scheme):
             again = may_go_through(model, work, near, count, v, memory) and call_missed(
                 model, work.step, v, memory, impact
@@ -885,12 +958,15 @@ def decide(
     if work.impact.relaxed == 1:
         note_wedge(model, clock.time, memory, work.impact, record)
     first = record.events
-    note_events(model, clock.time, work.step, memory, record)
+    end = clock.start + (clock.index + 1) * work.step
+    note_events(model, clock.time, end, work.step, memory, record)
     react(model, first, memory.q, record, memory.loops)
     share_friction(
         model, memory.breakaway, memory.reaction.friction_torque, memory.loops.brake_force
     )
     note_brakes(model, clock.time, work.step, record, memory.loops)
+    if work.impact.gains == 1:
+        note_gain(model, clock.time, work.step, work.impact, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 

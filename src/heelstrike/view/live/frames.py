@@ -14,7 +14,11 @@ from heelstrike.analysis.intervals import event_impulse, mean_over_intervals
 from heelstrike.analysis.motion import Motion, in_world, run_motion
 from heelstrike.analysis.support import foot_sums
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
+from heelstrike.contact.ground import Ground
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.dynamics import center_of_mass, contact_positions, link_poses
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import QUANTITIES, Run
 from heelstrike.view.drawing import legs
@@ -28,6 +32,8 @@ MOST_PUSHES = 4
 """Pushes that are drawn at once."""
 DASHED, DOTTED = 1, 2
 SIDES = ("left", "right")
+FARTHEST = 1.0
+"""Metres that a slider moves a joint without ends at most, either way."""
 ROOM = 0.15
 """Share of a sole's length that its plot shows beyond either end."""
 
@@ -44,7 +50,7 @@ class Layout:
     def __init__(self, robot: Robot) -> None:
         nc, feet = robot.nc, len(robot.feet)
         self.robot = robot
-        self.joints = robot.model.actuator_joint if robot.nu else np.arange(robot.nq)
+        self.joints = movable(robot)
         self.widths = {
             "time": 1, "pose": 3 * robot.nl, "point": 2 * nc, "normal": 2 * nc, "force": 2 * nc,
             "friction": nc, "center": 2, "capture": 2, "pressure": 2, "support": 4,
@@ -64,6 +70,7 @@ class Layout:
             "width": self.width,
             "fields": {name: [self.begin[name], wide] for name, wide in self.widths.items()},
             "panels": self._panels(),
+            "joints": self._sliders(),
         }
 
     def frames(self, run: Run, rows: Sequence[int], pushes: Iterable[Push]) -> Floats:
@@ -109,6 +116,26 @@ class Layout:
             table[:, begin : begin + wide] = found[name].reshape(len(every), wide)
         return table
 
+    def still(self, state: State, ground: Ground) -> Floats:
+        """Return the frame of a robot of which nothing is known but where it is, (1, width)."""
+        robot, poses = self.robot, link_poses(self.robot, state.q)
+        seen = contact_kinematics(robot, state.q, state.v, ground)
+        known: dict[str, Any] = {
+            "time": 0.0,
+            "pose": np.column_stack((poses.origin, poses.angle)),
+            "point": contact_positions(robot, state.q),
+            "normal": seen.normal,
+            "force": 0.0,
+            "center": center_of_mass(robot, state.q),
+            "joint": state.q[self.joints],
+            "torque": 0.0,
+        }
+        frame = np.full(self.width, np.nan)
+        for name, numbers in known.items():
+            begin, wide = self.begin[name], self.widths[name]
+            frame[begin : begin + wide] = np.ravel(numbers)
+        return frame[None]
+
     def _pushes(
         self, since: Floats, until: Floats, motion: Motion, pushes: Iterable[Push]
     ) -> Floats:
@@ -129,9 +156,9 @@ class Layout:
     def _panels(self) -> list[dict[str, Any]]:
         """Plots beside the picture, each curve with its place in a frame."""
         robot = self.robot
-        found = [*self._of_joints("joint", "rad", "m", self.joints)]
-        if robot.nu:
-            found += self._of_joints("torque", "N m", "N", self.joints)
+        found = [*self._of_joints("joint", "rad", "m", self.joints, robot.joint_names)]
+        driven = robot.model.actuator_joint
+        found += self._of_joints("torque", "N m", "N", driven, robot.actuator_names)
         if robot.feet:
             heel, toe = zero_moment_point_limits(robot)
             room = ROOM * max(toe - heel, 1e-3)
@@ -144,12 +171,13 @@ class Layout:
                 },
                 {
                     "title": "normal force", "unit": "N", "group": "feet",
-                    "curves": self._of_feet("pressing"),
+                    "curves": self._of_feet("pressing"), "usual": [0.0, 1.5 * robot.weight],
                     "limits": [{"label": "weight", "level": robot.weight}],
                 },
                 {
                     "title": "tangential force", "unit": "N", "group": "feet",
                     "curves": self._of_feet("dragging"), "limits": [],
+                    "usual": [-0.5 * robot.weight, 0.5 * robot.weight],
                 },
                 {
                     "title": "friction, share of cone", "unit": "1", "group": "feet",
@@ -173,12 +201,35 @@ class Layout:
         ]
         return found
 
+    def _sliders(self) -> list[dict[str, Any]]:
+        """Joints that a viewer can move, with the ends of their ranges."""
+        robot, model = self.robot, self.robot.model
+        found = []
+        for i, joint in enumerate(self.joints.tolist()):
+            hinge = model.axis[joint, 0] != 0.0
+            ends = (float(model.lower[joint]), float(model.upper[joint]))
+            farthest = np.pi if hinge else FARTHEST
+            low, high = (float(np.clip(end, -farthest, farthest)) for end in ends)
+            found.append(
+                {
+                    "name": robot.joint_names[joint], "label": in_words(robot.joint_names[joint]),
+                    "unit": "rad" if hinge else "m", "low": low, "high": high,
+                    "at": self.begin["joint"] + i,
+                }
+            )  # fmt: skip
+        return found
+
     def _of_joints(
-        self, field: str, angular: str, linear: str, joints: Sequence[int] | NDArray[np.int64]
+        self,
+        field: str,
+        angular: str,
+        linear: str,
+        joints: NDArray[np.int64],
+        named: Sequence[str],
     ) -> list[dict[str, Any]]:
         """One panel for the joints that differ by their side only, such as both knees."""
         robot, model = self.robot, self.robot.model
-        names = robot.actuator_names if robot.nu else robot.joint_names
+        names = [named[j] for j in joints] if field == "joint" else named
         leg = legs(robot)
         panels: dict[tuple[str, str], dict[str, Any]] = {}
         for i, joint in enumerate(int(j) for j in joints):
@@ -218,17 +269,29 @@ class Layout:
         for panel in panels.values():
             if panel["limits"]:
                 ends = " … ".join(f"{limit['level']:g}" for limit in panel["limits"])
-                panel["title"] += f", limits {ends}".replace("-", "−")
+                panel["note"] = f"limits {ends}".replace("-", "−")
         return list(panels.values())
 
     def _of_feet(self, field: str) -> list[dict[str, Any]]:
         return [
             {
-                "label": in_words(foot.name), "foot": i, "dash": DASHED if i else 0,
-                "at": self.begin[field] + i,
+                "label": in_words(foot.name).removesuffix(" foot"), "foot": i,
+                "dash": DASHED if i else 0, "at": self.begin[field] + i,
             }
             for i, foot in enumerate(self.robot.feet)
         ]  # fmt: skip
+
+
+def movable(robot: Robot) -> NDArray[np.int64]:
+    """Joints of a robot but for those that carry all of it through the world."""
+    model = robot.model
+    slides = (model.axis[:, 0] == 0.0) & np.isneginf(model.lower) & np.isposinf(model.upper)
+    carries = np.zeros(robot.nq, dtype=bool)
+    for joint in np.flatnonzero(slides):
+        parent = int(model.parent[joint])
+        carries[joint] = parent < 0 or carries[parent]
+    carries[: 3 if robot.floating else 0] = True
+    return np.flatnonzero(~carries)
 
 
 def mean_forces(run: Run, rows: NDArray[np.int64]) -> Floats:

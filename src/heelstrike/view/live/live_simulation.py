@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from contextlib import suppress
+
+import numpy as np
 
 from heelstrike.contact.ground import Ground
-from heelstrike.errors import SimulationError
+from heelstrike.contact.queries.kinematics import contact_kinematics
+from heelstrike.errors import RobotError, SimulationError
 from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
+from heelstrike.sim.closed_sets import OnError
 from heelstrike.sim.push import Push, pushes_of_numbers
 from heelstrike.sim.run import Run
 from heelstrike.sim.simulation import CAN_GO_ON, Simulation
@@ -18,6 +24,9 @@ KEEP_EVERY = 0.25
 MOST_SNAPSHOTS = 400
 """Of some 0.2 MB each."""
 MOST_PUSHES = 2000
+
+STANDS = 1e-3
+"""Metres above the ground up to which a robot stands on it."""
 
 Hold = tuple[int, tuple[float, float], tuple[float, float]]
 
@@ -38,6 +47,8 @@ class LiveSimulation:
 
     def __init__(self, simulation: Simulation) -> None:
         self.simulation = simulation
+        if simulation.on_error is OnError.RAISE:  # nobody is there to catch it
+            simulation.on_error = OnError.WARN
         self.held: dict[str, Hold] = {}
         self._given: tuple[Push, ...] | None = None
         self._added: tuple[Push, ...] = ()
@@ -112,6 +123,32 @@ class LiveSimulation:
     def lay(self, ground: Ground) -> None:
         """Lay another ground."""
         self.simulation.ground = ground
+        self._keep()
+
+    def move(self, joint: str, position: float) -> None:
+        """Put a joint elsewhere (rad or m) while all else stays, velocities too.
+
+        A robot that stands, or would stand in the ground, is lifted or lowered on it.
+
+        Raises
+        ------
+        HeelstrikeError
+            If there is no such joint, or the robot cannot be like that.
+        """
+        robot, simulation = self.robot, self.simulation
+        moved = robot.joint_index(joint)
+        low, high = robot.model.lower[moved], robot.model.upper[moved]
+        now = simulation.state
+        q = now.q.copy()
+        q[moved] = np.clip(position, low, high)
+        state = robot.closed(State(q, now.v), keep=[moved])
+        if robot.nc:
+            stood = float(simulation.contacts.gap.min()) < STANDS
+            gap = contact_kinematics(robot, state.q, state.v, simulation.ground).gap
+            if stood or gap.min() < 0.0:
+                with suppress(RobotError):  # nothing lifts it
+                    state = robot.placed(state, simulation.ground)
+        simulation.state = state
         self._keep()
 
     def go_back(self, time: float) -> None:

@@ -15,7 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from heelstrike.contact.ground import Ground
 from heelstrike.errors import HeelstrikeError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind
 from heelstrike.sim.push import Push
 from heelstrike.sim.run import Event, Run
@@ -230,6 +233,7 @@ class Session:
 
     def _rate(self, _: str, command: Mapping[str, Any]) -> None:
         self.rate = min(max(_finite(command["value"]), RATES[0]), RATES[1])
+        self._goal = self.cursor  # what the machine owes the rate before is let go
 
     def _hold(self, viewer: str, command: Mapping[str, Any]) -> None:
         live = self._needs_live()
@@ -258,6 +262,21 @@ class Session:
         self._note = (
             f"{size:.3g} N on {in_words(robot.link_names[link])} for {RANDOM_PUSH_LASTS:g} s"
         )
+
+    def _pose(self, _: str, command: Mapping[str, Any]) -> None:
+        live = self._needs_live()
+        joint, position = str(command["joint"]), _finite(command["value"])
+        self.playing = False
+        if not self._at_end:
+            self._go_on_from_cursor()
+        if not live.can_go_on:
+            raise RefusedError(f"{live.message}. Begin anew, or move it at an earlier time")
+        live.move(joint, position)
+        self.history.take(_seen(live))
+        assert self._layout is not None
+        now = self.history.part(len(self.history) - 1, len(self.history) - 1)
+        self._board.look(self._layout.frames(now, [0, 0], self._pushes)[0])
+        self.cursor = self._goal = float(now.time[0])
 
     def _choose(self, _: str, command: Mapping[str, Any]) -> None:
         stage = self._needs_stage()
@@ -309,12 +328,12 @@ class Session:
             self._show_scene(self._run)
         else:
             try:
+                if self.live is None:
+                    self._show_outline(self._stage.outline(wanted))
                 simulation = self._stage.simulation(wanted, self._tell_busy)
-                self._tell_busy("compiling the simulator, once: about 20 s")
+                self._tell_busy("loading the simulator (compiling it, once: about 20 s)")
                 live = LiveSimulation(simulation)
-                run = live.record()
-                if not len(run.time):  # a controller that is not asked but for good
-                    run = live.advance(None) or run
+                run = _seen(live)
             except HeelstrikeError as error:
                 self._note = str(error)
                 return
@@ -326,19 +345,32 @@ class Session:
             self._show_scene(run)
         self._tell()
 
-    def _show_scene(self, run: Run) -> None:
-        """Show a course from its beginning on: of a simulation what has been of it."""
-        self._layout = Layout(run.robot)
-        times = self.history.time
+    def _begin_scene(self, robot: Robot, ground: Ground, method: str) -> None:
+        """Show a robot on its ground, of which frames are still to come."""
+        self._layout = Layout(robot)
         self._board.begin(
             {
-                "scene": scene(run.robot, run.ground),
+                "scene": scene(robot, ground),
                 "layout": self._layout.described(),
                 "events": [kind.name.lower() for kind in EventKind],
-                "method": str(run.method),
-                "live": self.live is not None,
+                "method": method,
+                "live": self._stage is not None,
             }
         )
+
+    def _show_outline(self, outline: tuple[Robot, State, Ground] | None) -> None:
+        """Show where the robot is to begin, while its simulation is being made."""
+        if outline is None:
+            return
+        robot, state, ground = outline
+        self._begin_scene(robot, ground, "")
+        assert self._layout is not None
+        self._board.add(self._layout.still(state, ground))
+
+    def _show_scene(self, run: Run) -> None:
+        """Show a course from its beginning on: of a simulation what has been of it."""
+        times = self.history.time
+        self._begin_scene(run.robot, run.ground, str(run.method))
         if not len(times):
             return
         shown = np.arange(times[0], times[-1], DENSEST)
@@ -509,6 +541,12 @@ class Session:
         return self._at_end and (self.live is None or not self.live.can_go_on)
 
 
+def _seen(live: LiveSimulation) -> Run:
+    """Return how a simulation is now, or a step later where its controller is asked for good."""
+    run = live.record()
+    return run if len(run.time) else live.advance(None) or run
+
+
 def _kind(event: Event) -> str:
     return event.kind.name.lower()
 
@@ -529,6 +567,7 @@ _COMMANDS: dict[str, Any] = {
     "hold": Session._hold,
     "release": Session._release,
     "random push": Session._random_push,
+    "pose": Session._pose,
     "choose": Session._choose,
     "reset": Session._reset,
     "resume": Session._resume,

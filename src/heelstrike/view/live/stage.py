@@ -11,6 +11,8 @@ import numpy as np
 
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import ControllerError, SimulationError
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.state import State
 from heelstrike.sim.simulation import Simulation
 from heelstrike.sim.snapshot import Snapshot
 
@@ -92,6 +94,13 @@ class Stage(ABC):
         HeelstrikeError
             If there is none of these values.
         """
+
+    def outline(self, values: Mapping[str, Any]) -> tuple[Robot, State, Ground] | None:  # noqa: ARG002
+        """Where the robot is to begin, to be shown until there is a simulation, and at once.
+
+        None where the simulation is there at once.
+        """
+        return None
 
     def found(self, values: Mapping[str, Any], simulation: Simulation) -> dict[str, Any]:
         """Values as they are in a simulation that has begun anew, or was taken back.

@@ -135,7 +135,8 @@ def watch(
 
     A simulation goes on as long as somebody looks: it can be halted, stepped, taken back, pushed
     with the mouse. The view has it to itself until it is closed, and begins its record anew again
-    and again. The server listens on 127.0.0.1 only, and lets in who has the token in the address.
+    and again. An error in its controller ends it with a warning. The server listens on 127.0.0.1
+    only, and lets in who has the token in the address.
 
     Parameters
     ----------

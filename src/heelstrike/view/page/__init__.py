@@ -2,6 +2,6 @@
 
 from heelstrike.view.page.page import save_html
 from heelstrike.view.page.scene import scene
-from heelstrike.view.page.verdict import Limit, Verdict, judge
+from heelstrike.view.page.verdict import Verdict, judge
 
-__all__ = ["Limit", "Verdict", "judge", "save_html", "scene"]
+__all__ = ["Verdict", "judge", "save_html", "scene"]

@@ -2,6 +2,7 @@
 
    HeelstrikeDrawing.draw(context, scene, frame, view) draws one instant.
    HeelstrikeDrawing.plot(context, panel, time, view) draws curves with a cursor.
+   HeelstrikeDrawing.strip(context, view) draws a bar of time with its events.
 
    scene: what does not change
      shapes     [{link, foot, width, corners: [x, z, …]}] back to front, corners in link axes (m);
@@ -22,28 +23,30 @@
      hide       {forces, cones, center, pressure, capture, support, traces}: true hides it
      trail      earlier frames, whose contact points are drawn as traces
      flashes    [{x, z, label, strength}] of events, strength from 1 to 0
+     steady     (name, text): the text to write; where it is live, one that can be read
 
    Everything is drawn by numbers: text from a scene is drawn as text, never as markup. */
 "use strict";
 
 var HeelstrikeDrawing = (() => {
-  const WEIGHT_LENGTH = 0.35, LONGEST = 1.3, HEAD_LENGTH = 0.035, HEAD_WIDTH = 0.022;
+  const WEIGHT_LENGTH = 0.35, LONGEST = 0.9, HEAD_LENGTH = 0.035, HEAD_WIDTH = 0.022;
   const HIGHEST_CONE = 0.45; // of the size of the robot
   const NEAR_EDGE = 0.9; // share of the friction cone from which it warns
   const POINT = 100 / 72 / 540; // of the height of the picture
+  const LETTERS = "13px system-ui, \"Segoe UI\", Roboto, sans-serif";
 
   // Okabe and Ito's palette, lighter on dark pages. Feet also differ by dashes in plots.
   const LIGHT = {
     paper: "#ffffff", ink: "#222222", grey: "#6b6b6b", soil: "#e8e8e4", grid: "#dededa",
     feet: ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"],
     force: "#00785A", pressure: "#A9447F", center: "#E69F00", cone: "rgba(0,120,90,0.14)",
-    warn: "#C23B00", push: "#B00020", rim: "#ffffff",
+    warn: "#C23B00", push: "#B00020", rim: "#ffffff", bar: "#efefec",
   };
   const DARK = {
     paper: "#15181b", ink: "#e8e8e6", grey: "#a3a9ae", soil: "#2c3136", grid: "#363c42",
     feet: ["#4FA9E2", "#F08B4B", "#35C79D", "#E3A3C6", "#9AD4F5", "#F2C14E"],
     force: "#35C79D", pressure: "#E3A3C6", center: "#F2C14E", cone: "rgba(53,199,157,0.18)",
-    warn: "#FF8A4C", push: "#FF7B8A", rim: "#15181b",
+    warn: "#FF8A4C", push: "#FF7B8A", rim: "#15181b", bar: "#23282d",
   };
   const DASHES = [[], [7, 4], [2, 3], [9, 3, 2, 3]];
 
@@ -62,8 +65,8 @@ var HeelstrikeDrawing = (() => {
   }
 
   /** Text with a rim of the page's colour, so that it is read over anything. */
-  function label({ context, colors }, text, x, y, { color, font = "12px", align = "center", base }) {
-    context.font = `${font} system-ui, sans-serif`;
+  function label({ context, colors }, text, x, y, { color, weight = "", align = "center", base }) {
+    context.font = `${weight} ${LETTERS}`;
     context.textAlign = align;
     context.textBaseline = base || "middle";
     context.lineWidth = 3;
@@ -84,7 +87,8 @@ var HeelstrikeDrawing = (() => {
     const colors = palette(view.dark), hide = view.hide || {};
     const toX = (x) => 0.5 * view.width + (x - view.x) * view.scale;
     const toY = (z) => 0.5 * view.height - (z - view.z) * view.scale;
-    const plane = { context, scene, frame, view, colors, toX, toY };
+    const steady = view.steady || ((_, text) => text);
+    const plane = { context, scene, frame, view, colors, toX, toY, steady };
     context.save();
     context.fillStyle = colors.paper;
     context.fillRect(0, 0, view.width, view.height);
@@ -122,7 +126,7 @@ var HeelstrikeDrawing = (() => {
     context.fill();
     context.stroke();
     context.fillStyle = colors.grey;
-    context.font = "12px system-ui, sans-serif";
+    context.font = LETTERS;
     context.textAlign = "center";
     context.textBaseline = "top";
     // Marks at whole multiples of a length of which some five are in the picture.
@@ -205,7 +209,7 @@ var HeelstrikeDrawing = (() => {
     return { nx, nz, normal, tangent, use: allowed > 0 ? Math.abs(tangent) / allowed : 0 };
   }
 
-  function drawCones({ context, scene, frame, view, colors, toX, toY }) {
+  function drawCones({ context, scene, frame, colors, toX, toY, steady }) {
     const scale = (WEIGHT_LENGTH * scene.size) / (scene.weight || Infinity);
     scene.contacts.forEach((_, i) => {
       const { nx, nz, normal, use } = pressed(frame, i);
@@ -229,35 +233,38 @@ var HeelstrikeDrawing = (() => {
       context.setLineDash([]);
       if (near) {
         const told = use > 1 - 1e-6 ? "edge of friction" : `${Math.floor(100 * use)} % of friction`;
-        label({ context, colors }, told, toX(x + height * nx), toY(z + height * nz) - 2,
-          { color: colors.warn, font: "600 12px", base: "bottom" });
+        label({ context, colors }, steady(`cone ${i}`, told), toX(x + height * nx), toY(z + height * nz) - 2,
+          { color: colors.warn, weight: "600", base: "bottom" });
       }
     });
   }
 
-  function drawForces({ context, scene, frame, colors, toX, toY, view }) {
+  function drawForces({ context, scene, frame, colors, toX, toY, view, steady }) {
     const size = scene.size, scale = (WEIGHT_LENGTH * size) / (scene.weight || Infinity);
-    const arrow = (x, z, fx, fz, color) => {
+    const arrow = (name, x, z, fx, fz, color) => {
       const newtons = Math.hypot(fx, fz), whole = newtons * scale;
       const length = Math.min(whole, LONGEST * size);
       if (!(length > 0.25 * HEAD_LENGTH * size)) return;
       drawArrow({ context, toX, toY }, { x, z, ax: fx / newtons, az: fz / newtons, length, size,
         color, cut: whole > length, width: Math.max(2, 2.5 * POINT * view.height) });
-      if (whole > length) {
-        label({ context, colors }, `${words(newtons)} N`, toX(x + (0.6 * length * fx) / newtons) + 8,
-          toY(z + (0.6 * length * fz) / newtons), { color, align: "left" });
+      if (name && whole > length) {
+        const told = steady(name, `${words(newtons)} N`);
+        const right = name.at(-1) % 2; // those of a heel and its toe stand apart
+        label({ context, colors }, told, toX(x + (0.6 * length * fx) / newtons) + (right ? 8 : -8),
+          toY(z + (0.6 * length * fz) / newtons), { color, align: right ? "left" : "right" });
       }
     };
     for (let i = 0; i < scene.contacts.length; i++)
-      arrow(...[0, 1].map((k) => frame.point[2 * i + k]),
+      arrow(`force ${i}`, ...[0, 1].map((k) => frame.point[2 * i + k]),
         ...[0, 1].map((k) => frame.force[2 * i + k]), colors.force);
     const push = frame.push || [];
     for (let k = 0; k + 3 < push.length; k += 4) {
       const newtons = Math.hypot(push[k + 2], push[k + 3]);
       if (!(newtons > 0)) continue;
-      arrow(push[k], push[k + 1], push[k + 2], push[k + 3], colors.push);
-      label({ context, colors }, ` ${words(newtons)} N `, toX(push[k]), toY(push[k + 1]),
-        { color: colors.push, font: "600 13px", align: push[k + 2] > 0 ? "right" : "left" });
+      arrow("", push[k], push[k + 1], push[k + 2], push[k + 3], colors.push);
+      const told = steady(`push ${k}`, ` ${words(newtons)} N `);
+      label({ context, colors }, told, toX(push[k]), toY(push[k + 1]),
+        { color: colors.push, weight: "600", align: push[k + 2] > 0 ? "right" : "left" });
     }
   }
 
@@ -290,7 +297,7 @@ var HeelstrikeDrawing = (() => {
     drawArrow({ context, toX, toY }, { x, z: 0, ax: 0, az: 1, length, size, color: colors.force,
       cut: false, width: Math.max(2, 2.5 * POINT * view.height) });
     context.fillStyle = colors.force;
-    context.font = "12px system-ui, sans-serif";
+    context.font = LETTERS;
     context.textAlign = "left";
     context.textBaseline = "top";
     context.fillText(`${words(scene.weight)} N`, 8, bottom + 4);
@@ -331,13 +338,14 @@ var HeelstrikeDrawing = (() => {
     context.stroke();
     if (told) {
       label({ context, colors }, told, toX(x), toY(z) + 30,
-        { color: colors.ink, font: "600 13px", base: "top" });
+        { color: colors.ink, weight: "600", base: "top" });
     }
     context.globalAlpha = 1;
   }
 
   /* panel: {title, unit, note, curves: [{label, foot, dash, values}], limits: [{label, level}],
-             span: [low, high], steps} of which limits are dashed lines; steps: held from row to row
+             span: [low, high], steps} of which limits are dashed lines; steps: held from row to row;
+             what leaves the span, as impacts do, is marked with its value where it does
      time:  of the values (s)
      view:  {width, height, from, to, cursor} in CSS pixels and s, and dark
      Returns the x pixels of the span, for pointers. */
@@ -376,8 +384,99 @@ var HeelstrikeDrawing = (() => {
     context.moveTo(toX(view.cursor), top);
     context.lineTo(toX(view.cursor), bottom);
     context.stroke();
+    drawPeaks(context, colors, panel, time, { low, high, left, right, top, bottom, toX });
     context.restore();
     return { left, right };
+  }
+
+  /** Where curves leave the axis: an arrow each time, and as many of the values as have room. */
+  function drawPeaks(context, colors, panel, time, { low, high, left, right, top, bottom, toX }) {
+    const found = [];
+    for (const curve of panel.curves) {
+      let peak = null;
+      curve.values.forEach((value, k) => {
+        const side = !known(value) ? 0 : value > high ? 1 : value < low ? -1 : 0;
+        if (peak && side !== peak.side) peak = null;
+        if (!side || toX(time[k]) < left || toX(time[k]) > right) return;
+        if (!peak) found.push(peak = { curve, side, value, x: toX(time[k]) });
+        else if (side * value > side * peak.value) Object.assign(peak, { value, x: toX(time[k]) });
+      });
+    }
+    found.sort((a, b) => Math.abs(b.value) - Math.abs(a.value));
+    const taken = [];
+    for (const { curve, side, value, x } of found) {
+      const y = side > 0 ? top : bottom;
+      context.fillStyle = curveColor(colors, curve);
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x - 5, y + 8 * side);
+      context.lineTo(x + 5, y + 8 * side);
+      context.fill();
+      const beyond = x > right - 50, begin = beyond ? x - 50 : x - 6, end = begin + 56;
+      if (taken.some((other) => other.side === side && other.begin < end && begin < other.end))
+        continue;
+      taken.push({ side, begin, end });
+      label({ context, colors }, words(value), x + (beyond ? -8 : 8), y + 6 * side,
+        { color: colors.ink, align: beyond ? "right" : "left" });
+    }
+  }
+
+  /* A bar of time.
+     view: {width, height, inset, from, to, now, dark, seconds: whether it names them,
+            phases: [[from, to, feet…]] in which feet press,
+            events: [{time, level, mark}] of level 2 (an impact), 1 (slip and stick) or 0}
+     All times in s; `inset` pixels at either end are left, for the thumb of a slider upon it. */
+  function strip(context, view) {
+    const { width, height, inset, from, to } = view, colors = palette(view.dark);
+    const toX = (t) => inset + ((t - from) / (to - from || 1)) * (width - 2 * inset);
+    const foot = view.seconds ? height - 19 : height, feet = view.feet || 0;
+    const tall = feet ? 12 / feet : 0, bars = foot - 1 - (feet ? 12 : 0);
+    context.clearRect(0, 0, width, height);
+    context.fillStyle = colors.bar;
+    context.fillRect(inset, 8, width - 2 * inset, bars - 8);
+    for (const [begin, end, ...pressing] of view.phases)
+      for (const each of pressing) {
+        context.fillStyle = footColor(colors, each);
+        context.fillRect(toX(begin), bars + each * tall, toX(end) - toX(begin), tall - 1);
+      }
+    context.font = LETTERS;
+    context.textAlign = "center";
+    context.textBaseline = "top";
+    let last = -20;
+    const drawn = new Set(); // no more than can be seen
+    for (const { time, level, mark } of view.events) {
+      const x = toX(time), place = 4 * Math.round(x) + level;
+      if (drawn.has(place)) continue;
+      drawn.add(place);
+      context.strokeStyle = context.fillStyle =
+        level === 2 ? colors.warn : level === 1 ? colors.pressure : colors.grey;
+      context.lineWidth = level === 2 ? 2 : 1;
+      context.beginPath();
+      context.moveTo(x, level === 2 ? 10 : 15);
+      context.lineTo(x, bars - 1);
+      context.stroke();
+      if (mark && x - last > 11) {
+        context.fillText(mark, x, -2);
+        last = x;
+      }
+    }
+    if (view.seconds) {
+      context.fillStyle = context.strokeStyle = colors.grey;
+      context.lineWidth = 1;
+      for (const value of ticks(from, to, Math.max(2, width / 110))) {
+        const told = `${Number(value.toPrecision(6))} s`, half = context.measureText(told).width / 2;
+        const x = Math.min(Math.max(toX(value), half), width - half);
+        context.fillText(told, x, foot + 4);
+        context.fillRect(Math.round(toX(value)), foot, 1, 4);
+      }
+    }
+    if (!known(view.now)) return;
+    const x = toX(view.now);
+    context.fillStyle = colors.ink;
+    context.fillRect(x - 1, 4, 2, foot - 4);
+    context.beginPath();
+    context.arc(x, 6, 6, 0, 2 * Math.PI);
+    context.fill();
   }
 
   const curveColor = (colors, curve) =>
@@ -415,7 +514,7 @@ var HeelstrikeDrawing = (() => {
 
   function drawAxes(context, colors, at) {
     const { left, right, top, bottom, low, high, toX, toY, view, panel } = at;
-    context.font = "11px system-ui, sans-serif";
+    context.font = LETTERS;
     context.fillStyle = colors.grey;
     context.strokeStyle = colors.grid;
     context.lineWidth = 1;
@@ -441,14 +540,14 @@ var HeelstrikeDrawing = (() => {
     context.textAlign = "left";
     context.textBaseline = "middle";
     context.fillStyle = colors.ink;
-    context.font = "600 12px system-ui, sans-serif";
-    const title = `${panel.title} (${panel.unit})`;
+    context.font = `600 ${LETTERS}`;
+    const title = panel.unit === "1" ? panel.title : `${panel.title} (${panel.unit})`;
     context.fillText(title, 4, 11);
     let x = 4 + context.measureText(title).width + 14;
-    context.font = "11px system-ui, sans-serif";
+    context.font = LETTERS;
     for (const curve of panel.curves) {
       if (!curve.label) continue;
-      const wide = context.measureText(curve.label).width + 34;
+      const wide = context.measureText(curve.label).width + 32;
       if (x + wide > view.width) break;
       context.strokeStyle = curveColor(colors, curve);
       context.setLineDash(DASHES[(curve.dash || 0) % DASHES.length]);
@@ -478,5 +577,16 @@ var HeelstrikeDrawing = (() => {
     return found;
   }
 
-  return { draw, plot, palette, footColor, words, heightOfGround, pressed };
+  /** Give a canvas the pixels of its screen; return its context and size in CSS pixels. */
+  function fit(canvas) {
+    const width = canvas.clientWidth, height = canvas.clientHeight;
+    const ratio = window.devicePixelRatio || 1;
+    const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
+    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
+    const context = canvas.getContext("2d");
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    return { context, width, height };
+  }
+
+  return { draw, plot, strip, fit, palette, footColor, words, heightOfGround, pressed };
 })();

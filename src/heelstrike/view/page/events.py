@@ -19,7 +19,7 @@ NOWHERE = (EventKind.BRIDGE,)
 
 def kind_in_words(event: Event) -> str:
     """Its kind as people write it."""
-    return event.kind.name.lower().replace("_", " ")
+    return event.kind_in_words
 
 
 def contact_of(event: Event) -> int:
@@ -29,10 +29,7 @@ def contact_of(event: Event) -> int:
 
 def place_of(event: Event, robot: Robot) -> str:
     """Name of the joint or contact point at which it happened; nothing if it was at none."""
-    if event.kind in NOWHERE:
-        return ""
-    names = robot.joint_names if event.kind.of_joint else robot.contact_names
-    return in_words(names[event.contact]) if 0 <= event.contact < len(names) else ""
+    return in_words(event.place(robot))
 
 
 def impulse_of(event: Event, robot: Robot) -> tuple[float, str]:

@@ -7,8 +7,8 @@
   const canvases = [...document.querySelectorAll(".films canvas")];
   const start = Math.min(...runs.map((run) => run.start));
   const end = Math.max(...runs.map((run) => run.end));
-  // The first picture, and the printed one, are of the middle: all of the robot is in motion.
-  const state = { now: start + 0.3 * (end - start), playing: false, last: 0 };
+  // The first picture, and the printed one: where the first of them went wrong, or mid-step.
+  const state = { now: Math.min(...runs.map((run) => run.shown)), playing: false, last: 0 };
   const dark = matchMedia("(prefers-color-scheme: dark)"), paper = matchMedia("print");
 
   function show() {
@@ -42,6 +42,14 @@
     state.now = start + (Number(happened.target.value) / 1000) * (end - start);
     show();
   });
+  for (const button of document.querySelectorAll("button[data-time]")) {
+    button.addEventListener("click", () => {
+      play(false);
+      state.now = Number(button.dataset.time);
+      show();
+      at("films").scrollIntoView({ block: "nearest" });
+    });
+  }
   document.addEventListener("keydown", (happened) => {
     if (happened.key !== " " || ["BUTTON", "SELECT"].includes(happened.target.tagName)) return;
     happened.preventDefault();

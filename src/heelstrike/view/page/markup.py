@@ -64,10 +64,11 @@ def document(
     body : str
         Markup.
     style, script : str
-        Style sheet and script.
+        Style sheet, behind the one that all pages share, and script.
     connect : str
         What the script may talk to, as a content security policy has it.
     """
+    style = shipped("style.css") + style
     policy = (
         f"default-src 'none'; img-src data:; connect-src {connect}; "
         f"style-src '{_digest(style)}'; script-src {_digest_or_none(script)}; "

@@ -10,6 +10,7 @@ from heelstrike.analysis.motion import run_motion
 from heelstrike.analysis.summary import lines, summarize
 from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
+from heelstrike.arguments import takes
 from heelstrike.errors import GaitError, ViewError
 from heelstrike.sim.run import Event, Run
 from heelstrike.view.page.columns import TOLERANCE, packed
@@ -33,6 +34,7 @@ MOST_PHASES = 2000
 """Phases of support that a page shows below its timeline."""
 
 
+@takes(ViewError)
 def save_html(
     run: Run,
     path: str | os.PathLike[str],
@@ -130,20 +132,22 @@ def check_gait(gait: object) -> None:
 def certificates(run: Run) -> dict[str, str]:
     """Return the worst values of a run's certificates, label by label."""
     worst = run.certificates
+    made = {"energy made by restitution": f"{worst.energy_gain:.3g} J"}
     return {
         "deepest penetration": f"{worst.penetration:.3g} m",
         "residual of complementarity": f"{worst.complementarity:.3g} of the data",
         "residual of the friction cone": f"{worst.cone:.3g} of the data",
         "residual of non-penetration": f"{worst.non_penetration:.3g} of the data",
         "contact problems": str(run.solver),
+        **(made if worst.energy_gain > 0.0 else {}),
     }
 
 
-def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
-    """Return what the script of a page shows, as JSON has it.
+def contents(run: Run, gait: Gait | None = None, *, shown: float | None = None) -> dict[str, Any]:
+    """Return what the script of a page shows, as JSON has it; `shown` is when it begins (s).
 
-    Numbers of the rows shown are those of the run to a float32's rounding, times are exact. Forces
-    are means from each row shown to the next.
+    Numbers of the rows shown are those of the run to `TOLERANCE` of their range, times are exact.
+    Forces are means from each row shown to the next.
     """
     rows = shown_rows(run)
     motion = run_motion(run)
@@ -164,7 +168,7 @@ def contents(run: Run, gait: Gait | None = None) -> dict[str, Any]:
         "left_out": len(run.events) - len(events),
         "recorded": len(run.time),
         "tolerance": TOLERANCE,
-    }
+    } | ({} if shown is None else {"shown": shown})
 
 
 def _described(event: Event, run: Run) -> dict[str, Any]:

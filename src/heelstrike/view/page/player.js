@@ -68,34 +68,13 @@
 
   const INSET = 8; // pixels, half a thumb of the slider: instants stand over their places on it
   const KINDS = { "touchdown": "▼", "liftoff": "▲", "slip": "~", "stick": "·", "impact": "✳" };
+  const marked = events.map(({ time, kind, impact }) =>
+    ({ time, level: impact ? 2 : 0, mark: impact ? KINDS[kind] || "•" : "" }));
   function drawEvents() {
     const { context, width, height } = fit(at("events"));
     if (!width) return;
-    const dark = isDark(), colors = HeelstrikeDrawing.palette(dark);
-    const toX = (t) => INSET + ((t - start) / (end - start || 1)) * (width - 2 * INSET);
-    context.clearRect(0, 0, width, height);
-    const feet = scene.feet.length, tall = feet ? 12 / feet : 0;
-    for (const [from, to, ...pushing] of phases)
-      for (const foot of pushing) {
-        context.fillStyle = HeelstrikeDrawing.footColor(colors, foot);
-        context.fillRect(toX(from), height - 13 + foot * tall, toX(to) - toX(from), tall - 1);
-      }
-    context.font = "11px system-ui, sans-serif";
-    context.textAlign = "center";
-    context.textBaseline = "top";
-    let last = -20;
-    for (const event of events) {
-      const x = toX(event.time);
-      context.strokeStyle = context.fillStyle = event.impact ? colors.warn : colors.grey;
-      context.beginPath();
-      context.moveTo(x, event.impact ? 10 : 15);
-      context.lineTo(x, height - 14);
-      context.stroke();
-      if (x - last > 9 && event.impact) {
-        context.fillText(KINDS[event.kind] || "•", x, 0);
-        last = x;
-      }
-    }
+    HeelstrikeDrawing.strip(context, { width, height, inset: INSET, from: start, to: end,
+      dark: isDark(), phases, feet: scene.feet.length, events: marked });
   }
 
   const inWords = ({ kind, where, impulse, unit }) => [kind, where,
@@ -271,9 +250,9 @@
     }));
   }
   at("rows").textContent = `This page holds ${count} of ${run.recorded} rows of the record, those `
-    + "beside events and about impacts among them; its numbers are those of the record to "
-    + `${run.tolerance.toExponential(0)} of their size. Between rows places are drawn on straight `
-    + "lines; forces are means from each row to the next.";
+    + "beside events and about impacts among them; times are exact, other numbers are those of the "
+    + `record to ${run.tolerance.toExponential(1)} of the range of their curve. Between rows places `
+    + "are drawn on straight lines; forces are means from each row to the next.";
 
   function all() {
     kept.clear();

@@ -4,6 +4,7 @@
 "use strict";
 
 var HeelstrikeRecording = (() => {
+  const { fit } = HeelstrikeDrawing;
   const MEMBERS = ["pose", "point", "normal", "force", "friction", "center", "capture", "pressure",
     "support", "push"];
   const MOVING = ["pose", "point", "center", "capture", "push"];
@@ -11,6 +12,43 @@ var HeelstrikeRecording = (() => {
   const FLASHES = 4;
 
   const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+
+  /** Numbers of the columns by their names, as `packed` of columns.py has them. */
+  function unpacked({ columns, numbers }) {
+    const coded = new Uint8Array(bytes(numbers)), plain = new DataView(coded.buffer);
+    const found = new Map();
+    let next = 0;
+    function code() {
+      let value = 0, unit = 1, byte = 128;
+      for (; byte > 127; unit *= 128) {
+        byte = coded[next++];
+        value += (byte & 127) * unit;
+      }
+      return value;
+    }
+    for (const { name, width, rows, least, step } of columns) {
+      const values = new Float32Array(width * rows);
+      for (let n = 0; n < width; n++) {
+        let change = 0, slope = 0, steps = 0;
+        for (let k = n; k < values.length; k += width) {
+          if (!step[n]) {
+            values[k] = plain.getFloat32(next, true);
+            next += 4;
+            continue;
+          }
+          const sign = code() - 1;
+          if (sign >= 0) {
+            change += sign % 2 ? -(sign + 1) / 2 : sign / 2;
+            slope += change;
+            steps += slope;
+          }
+          values[k] = sign < 0 ? NaN : least[n] + step[n] * steps;
+        }
+      }
+      found.set(name, { width, rows, values });
+    }
+    return found;
+  }
 
   /** Index of the last of sorted values that is not beyond t, or -1. */
   function before(values, t) {
@@ -27,12 +65,7 @@ var HeelstrikeRecording = (() => {
     const { scene, data, events } = run;
     /* Time (n), and columns of n rows or, where all are the same, of one. */
     const time = new Float64Array(bytes(data.time)), count = data.rows;
-    const numbers = new Float32Array(bytes(data.numbers)), columns = new Map();
-    let next = 0;
-    for (const { name, width, rows } of data.columns) {
-      columns.set(name, { width, rows, values: numbers.subarray(next, next + width * rows) });
-      next += width * rows;
-    }
+    const columns = unpacked(data);
     const row = (name, k) => {
       const { width, rows, values } = columns.get(name);
       const first = rows === 1 ? 0 : k * width;
@@ -142,17 +175,6 @@ var HeelstrikeRecording = (() => {
     const size = Math.max(high - low, scene.size);
     return { low: Math.min(low, 0) - 0.14 * size, high: high + 0.2 * size,
       reach: Math.max(1.05 * reach, 1e-3) };
-  }
-
-  /** Give a canvas the pixels of its screen. */
-  function fit(canvas) {
-    const width = canvas.clientWidth, height = canvas.clientHeight;
-    const ratio = window.devicePixelRatio || 1;
-    const [wide, high] = [Math.round(width * ratio), Math.round(height * ratio)];
-    if (canvas.width !== wide || canvas.height !== high) [canvas.width, canvas.height] = [wide, high];
-    const context = canvas.getContext("2d");
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    return { context, width, height };
   }
 
   return { read, before, fit };

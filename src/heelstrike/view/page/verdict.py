@@ -1,63 +1,27 @@
-"""What a run comes to: does it walk, how close to each limit, what to change."""
+"""What a run comes to: does it walk, why did it fall, how close to each limit, what to change."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from heelstrike.analysis.actuation import distance_travelled
-from heelstrike.analysis.friction import friction_use
-from heelstrike.analysis.slip import max_slip
+from heelstrike.analysis.diagnosis.changes import Change, Lever, Tried, changes
+from heelstrike.analysis.diagnosis.falls import Fall, first_cause
+from heelstrike.analysis.diagnosis.limits import Limit, limits
+from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom
 from heelstrike.analysis.support import walking_steps
-from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.gait.gait import Gait
-from heelstrike.robot.sole import soles
+from heelstrike.robot.robot import Robot
+from heelstrike.robot.sole import has_length, soles
 from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
-from heelstrike.view.drawing import are_around
 from heelstrike.view.style import in_words
 
-Floats = NDArray[np.float64]
-
-REACHED = 1.0 - 1e-6
-"""Share of a limit from which it is reached, but for rounding."""
-RECENT = 0.5
-"""Seconds within which a push before the first limit is named as what may have led to it."""
-SLID = 1e-3
-"""Metres that a pressed foot may slide before a verdict speaks of it."""
-
-
-@dataclass(frozen=True)
-class Limit:
-    """How close a run came to something that it cannot go beyond.
-
-    Attributes
-    ----------
-    name : str
-        What is limited: friction of a foot, its zero moment point, a torque, a joint.
-    kind : str
-        ``"friction"``, ``"zero moment point"``, ``"torque"`` or ``"joint"``.
-    used : float
-        Largest share of the limit, 1 at the limit; zero moment point: 0 in the middle of the sole,
-        1 at its ends, in single support.
-    time : float
-        When that was, in s.
-    reached : float
-        When the limit was first reached (s); infinite if it never was.
-    detail : str
-        The same in units.
-    """
-
-    name: str
-    kind: str
-    used: float
-    time: float
-    reached: float
-    detail: str
+SHOWN = 4
+"""Links of the chain of a fall that its sentence has."""
 
 
 @dataclass(frozen=True)
@@ -67,22 +31,33 @@ class Verdict:
     Attributes
     ----------
     good : bool
-        Whether it lasted as long as it was asked to and every contact problem was certified.
+        Whether it lasted as long as it was asked to, stayed up, every contact problem was certified
+        and nothing puts its numbers in doubt.
     headline : str
-        Does it walk, how close to its limits, what to change: in one line.
+        Does it walk, how close to its limits or why it fell, what to change: in one line.
     limits : tuple of Limit
-        Those that were reached in the order of time, then the others, the closest first.
+        Those that were reached in the order of time, then the others, the closest first; of a fall
+        up to its first cause.
     advice : tuple of str
-        What to change; nothing if nothing has to.
+        What to change, what helps most first; nothing if nothing has to.
+    fall : Fall or None
+        Why it fell, what came first in time first.
+    changes : tuple of Change
+        The advice as data that a program can follow.
+    tried : tuple of Tried
+        What was tried beside the run.
     """
 
     good: bool
     headline: str
     limits: tuple[Limit, ...]
     advice: tuple[str, ...]
+    fall: Fall | None = None
+    changes: tuple[Change, ...] = ()
+    tried: tuple[Tried, ...] = ()
 
 
-def judge(run: Run, gait: Gait | None = None) -> Verdict:
+def judge(run: Run, gait: Gait | None = None, *, tried: Sequence[Tried] = ()) -> Verdict:
     """Say what a run comes to.
 
     Parameters
@@ -91,28 +66,39 @@ def judge(run: Run, gait: Gait | None = None) -> Verdict:
         The run.
     gait : Gait, optional
         The gait that it followed.
+    tried : sequence of Tried
+        What was tried beside it: changes, pushes, slopes.
 
     Returns
     -------
     Verdict
         In words and numbers.
     """
-    limits = tuple(sorted(_limits(run), key=lambda limit: (limit.reached, -limit.used)))
-    advice = tuple(_advice(run, gait, limits))
-    good = run.completed and not run.solver.failures
-    parts = [_does(run)]
-    if limits:
-        first = limits[0]
-        if math.isfinite(first.reached):
-            parts.append(f"First limit reached: {first.name} at {first.reached:.3g} s.")
-        else:
-            closest = f"{first.name}, {first.detail} ({_percent(first.used)} used)"
-            parts.append(f"No limit is reached; closest comes {closest}.")
-    parts.append(f"To change: {advice[0]}" if advice else "Nothing has to change.")
-    return Verdict(good, " ".join(parts), limits, advice)
+    fall = first_cause(run, gait)
+    found = limits(run, until=math.inf if fall is None else fall.time)
+    asked = () if fall is None else changes(run, fall, gait)
+    advice = tuple(_advice(run, fall, asked, gait, tried))
+    if fall is None and found and math.isfinite(found[0].reached):
+        advice += (_no_reserve(found[0]),)
+    good = run.completed and fall is None and not run.solver.failures and not run.doubt
+    parts = [_does(run, fall)]
+    if fall is not None:
+        parts.append(_why(run, fall))
+    elif found and math.isfinite(found[0].reached):
+        parts.append(f"First limit reached: {found[0].name} at {found[0].reached:.3g} s.")
+    elif found:
+        closest = f"{found[0].name}, {found[0].detail} ({_percent(found[0].used)} used)"
+        parts.append(f"No limit is reached; closest comes {closest}.")
+    if advice:
+        parts.append(f"To change: {advice[0]}")
+    elif good:
+        parts.append("Nothing has to change for this walk.")
+    if good:
+        parts.append(f"{_what_was_tried(tried)}.")
+    return Verdict(good, " ".join(parts), found, advice, fall, asked, tuple(tried))
 
 
-def _does(run: Run) -> str:
+def _does(run: Run, fall: Fall | None) -> str:
     """Whether the robot walks, in a sentence."""
     name = run.robot.name
     if not len(run.time):
@@ -120,6 +106,8 @@ def _does(run: Run) -> str:
     steps, last = len(walking_steps(run)), float(run.time[-1])
     went = f"{steps} step{'' if steps == 1 else 's'}, {distance_travelled(run):.3g} m"
     if run.completed:
+        if fall is not None:
+            return f"{name} is falling when its time is up at {last:.3g} s, after {went}."
         if steps:
             return f"{name} walks: {went} in {last:.3g} s."
         return f"{name} takes no step in {last:.3g} s."
@@ -128,136 +116,187 @@ def _does(run: Run) -> str:
     return f"{name} does not get to the end ({run.message}), after {went}."
 
 
-def _limits(run: Run) -> Iterator[Limit]:
-    if not len(run.time):
-        return
-    yield from _of_feet(run)
-    yield from _of_motors(run)
-    yield from _of_joints(run)
+def _why(run: Run, fall: Fall) -> str:
+    """First cause, what pushed before it, and what followed, in sentences."""
+    first = fall.chain[0]
+    sentence = f"First cause: {told(first, run.robot)}"
+    sentence += "".join(f", {_after(push, first.time)}" for push in fall.pushes[-1:])
+    after = [FOLLOWS[each.cause] for each in fall.chain[1:SHOWN]]
+    return sentence + (f"; then {', '.join(after)}." if after else ".")
 
 
-def _of_feet(run: Run) -> Iterator[Limit]:
-    use = friction_use(run).foot
-    zmp = zero_moment_point(run)
-    alone = np.where(zmp.single_support[:, None], zmp.foot_margin, np.nan)
-    for i, (foot, sole) in enumerate(zip(run.robot.feet, soles(run.robot), strict=True)):
-        if (found := _largest(run, use[:, i])) is not None:
-            k, used, reached = found
-            time = float(run.time[k])
-            detail = f"at {time:.3g} s"
-            yield Limit(f"friction of the {in_words(foot.name)}", "friction", used, time, reached,
-                        detail)  # fmt: skip
-        half = 0.5 * (sole.toe - sole.heel)
-        if are_around(run.robot.model.contact_position[list(foot.contacts)]):
-            continue  # a wheel has no sole
-        if half > 0.0 and (found := _largest(run, 1.0 - alone[:, i] / half)) is not None:
-            k, used, reached = found
-            time = float(run.time[k])
-            margin = max(float(alone[k, i]), 0.0)
-            detail = f"{1e3 * margin:.3g} mm from the end of the sole at {time:.3g} s"
-            name = f"zero moment point of the {in_words(foot.name)}"
-            yield Limit(name, "zero moment point", used, time, reached, detail)
+def _after(push: Push, time: float) -> str:
+    newtons = math.hypot(*push.force)
+    return f"{1e3 * (time - push.start):.0f} ms after a push of {newtons:.3g} N began"
 
 
-def _of_motors(run: Run) -> Iterator[Limit]:
-    model = run.robot.model
-    for i, name in enumerate(run.robot.actuator_names):
-        torque = run.torque[:, i]
-        ends = np.where(torque < 0.0, model.torque_lower[i], model.torque_upper[i])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            share = np.where(torque == 0.0, 0.0, torque / ends)
-        if np.isfinite(ends).any() and (found := _largest(run, share)) is not None:
-            k, used, reached = found
-            unit = "N m" if model.axis[model.actuator_joint[i], 0] != 0.0 else "N"
-            time = float(run.time[k])
-            detail = f"{torque[k]:.3g} of {ends[k]:.3g} {unit} at {time:.3g} s".replace("-", "−")
-            yield Limit(f"torque of {in_words(name)}", "torque", used, time, reached, detail)
+FOLLOWS = {
+    Cause.SLIPPED: "a foot slides",
+    Cause.TIPPED_FORWARD: "it tips forward",
+    Cause.TIPPED_BACK: "it tips back",
+    Cause.SCUFFED: "a foot hits the ground in mid-swing",
+    Cause.LATE_TOUCHDOWN: "the next foot is late",
+    Cause.TORQUE_LIMIT: "torques reach their limits",
+    Cause.SPEED_LIMIT: "motors reach their speed",
+    Cause.JOINT_STOP: "a joint reaches its stop",
+    Cause.LEG_GAVE_WAY: "a leg gives way",
+    Cause.CONTROLLER: "a joint leaves the gait",
+    Cause.NUMERICAL: "the simulation ends",
+    Cause.UNKNOWN: "nothing else is seen",
+}
+"""What follows from a first cause, in short."""
 
 
-def _of_joints(run: Run) -> Iterator[Limit]:
-    model = run.robot.model
-    for joint, name in enumerate(run.robot.joint_names):
-        low, high = float(model.lower[joint]), float(model.upper[joint])
-        if not (np.isfinite(low) and np.isfinite(high) and high > low):
-            continue
-        angle = run.position[:, joint]
-        found = _largest(run, np.abs(angle - 0.5 * (low + high)) / (0.5 * (high - low)))
-        if found is None:
-            continue
-        k, used, reached = found
-        unit = "rad" if model.axis[joint, 0] != 0.0 else "m"
-        time = float(run.time[k])
-        away = max(min(float(angle[k]) - low, high - float(angle[k])), 0.0)
-        detail = f"{away:.3g} {unit} from its stop at {time:.3g} s"
-        yield Limit(f"range of {in_words(name)}", "joint", used, time, reached, detail)
+def told(symptom: Symptom, robot: Robot, *, when: bool = True) -> str:
+    """Say what went wrong, where and, unless that is told already, when, with its numbers."""
+    given: dict[str, str] = {name: f"{value:.3g}" for name, value in symptom.evidence.items()}
+    where = in_words(symptom.where)
+    at = f" at {symptom.time:.3f} s" if when else ""
 
+    def number(name: str, scale: float) -> float:
+        return scale * symptom.evidence.get(name, 0.0)
 
-def _largest(run: Run, share: Floats) -> tuple[int, float, float] | None:
-    """Row of the largest share (nt,), the share, and when it first reached 1 (s)."""
-    if not np.isfinite(share).any():
-        return None
-    k = int(np.nanargmax(np.where(np.isfinite(share), share, np.nan)))
-    there = np.flatnonzero(share >= REACHED)
-    return k, float(share[k]), float(run.time[there[0]]) if len(there) else math.inf
+    on_soles = any(has_length(robot, sole) for sole in soles(robot))
+    match symptom.cause:
+        case Cause.SLIPPED:
+            return (
+                f"the {where} slides{at} by "
+                f"{number('distance_m', 1e3):.3g} mm, on a ground of friction {given['friction']}"
+            )
+        case Cause.TIPPED_FORWARD:
+            over = f"the {where} tips over its toe" if on_soles else "it tips forward too fast"
+            return f"{over}{at}"
+        case Cause.TIPPED_BACK:
+            over = f"the {where} tips over its heel" if on_soles else "it tips too slowly, or back,"
+            return f"{over}{at}"
+        case Cause.SCUFFED:
+            rise = number("rise_m", 1e3)
+            higher = f", where the ground is {rise:.3g} mm higher" if rise > 0.5 else ""
+            return (
+                f"the {where} hits the ground in mid-swing{at}, at {given['speed_m_s']} m/s and "
+                f"{number('step_phase', 100.0):.0f} % of its step{higher}"
+            )
+        case Cause.LATE_TOUCHDOWN:
+            return f"the {where} was due{at} and is {number('gap_m', 1e3):.3g} mm above the ground"
+        case Cause.TORQUE_LIMIT | Cause.SPEED_LIMIT:
+            by = " at its speed" if symptom.cause is Cause.SPEED_LIMIT else ""
+            missed = symptom.evidence["missed_rad"]
+            misses = f", and the joint misses the gait by {missed:.2g} rad" if missed > 0.0 else ""
+            limit = abs(symptom.evidence["limit_Nm"])
+            return f"the motor of the {where} gives all of its {limit:.3g} N m{by}{at}{misses}"
+        case Cause.JOINT_STOP:
+            return f"the {where} is pressed against its stop{at}"
+        case Cause.LEG_GAVE_WAY:
+            return f"the leg on the {where} folds{at}, to {given['length_share']} of its length"
+        case Cause.CONTROLLER if where:
+            return f"the controller lets the {where} run away{at}, or drives it"
+        case Cause.CONTROLLER:
+            return f"the controller fails{at}"
+        case Cause.NUMERICAL:
+            return (
+                f"the numbers fail{at}: they grow beyond all bounds, or no contact forces can be "
+                "certified"
+            )
+    return "nothing that is known to make walkers fall was seen before the end"
 
 
 def _percent(share: float) -> str:
     return f"{100.0 * share:.3g} %"
 
 
-WHAT_TO_DO = {
-    "friction": (
-        "the foot slides, which only more friction or a smaller tangential force prevents",
-        "optimize_gait(robot, friction=...) designs a gait for the friction that there is",
-    ),
-    "zero moment point": (
-        "the foot tips about that end of its sole, or rolls over it",
-        "optimize_gait(robot, zmp_margin=...) designs a gait that keeps a distance from it",
-    ),
-    "torque": (
-        "the motor gives no more",
-        "a gait of smaller step_length, or another step_duration, may ask for less",
-    ),
-    "joint": (
-        "the joint is at its stop",
-        "optimize_gait(robot, joint_ranges=...) designs a gait that keeps off it",
-    ),
-}
-"""What it means that a limit is reached, and what to do where a gait was designed, by its kind."""
+def _what_was_tried(tried: Sequence[Tried]) -> str:
+    if not tried:
+        return "No push and no slope was tried"
+    return "Tried beside it: " + "; ".join(f"{each.what}: {each.outcome}" for each in tried)
 
 
-def _advice(run: Run, gait: Gait | None, limits: tuple[Limit, ...]) -> Iterator[str]:
-    """What to change, what came first in time first."""
+def _advice(
+    run: Run, fall: Fall | None, asked: Sequence[Change], gait: Gait | None, tried: Sequence[Tried]
+) -> Iterator[str]:
+    """What to change, the change that was seen to work first."""
     if run.solver.failures:
         yield (
             f"{run.solver.failures} contact problems have no certified solution: try another "
             "solver or a smaller step before believing this run."
         )
-    if run.status is RunStatus.DIVERGED:
-        yield "Numbers grew beyond all bounds: a smaller time step, or smaller gains."
-    first = limits[0] if limits else None
-    reached = math.inf if first is None else first.reached
-    fell = run.status is RunStatus.FELL
-    for push in run.pushes if fell else ():
-        if 0.0 <= min(reached, float(run.time[-1])) - push.start <= RECENT:
-            newtons = math.hypot(*push.force)
-            yield (
-                f"the push of {newtons:.3g} N from {push.start:.3g} s on came before the first "
-                "limit: a weaker or shorter one, or a controller that steps to catch it."
-            )
-    if first is not None and reached < math.inf:  # what is reached later may follow from it
-        meaning, design = WHAT_TO_DO[first.kind]
-        yield f"{first.name} is at its limit at {reached:.3g} s: {meaning}." + (
-            f" For the next gait: {design}." if gait is not None else ""
-        )
-    slid = max_slip(run) if run.robot.nc and len(run.time) else 0.0
-    if slid > SLID and (first is None or first.kind != "friction"):
-        yield f"a foot slides by {1e3 * slid:.3g} mm while it is pressed: more friction is needed."
-    if fell and gait is not None and gait.point_feet:
+    if run.doubt:
+        yield f"{run.doubt}."
+    if run.certificates.energy_gain > 0.0:
         yield (
-            "the robot stands on points, and no motor acts on its tipping about them: a gait that "
-            "is followed in time is lost from step to step; its feet need length, or another "
-            "controller is needed."
+            f"restitution with friction made {run.certificates.energy_gain:.3g} J in impacts "
+            "(Kane's paradox; events ENERGY_GAIN): less restitution or friction, or "
+            "TimeStepping(bounded_restitution=True), which scales restitution back there."
         )
-    if fell and not reached < math.inf:
-        yield "no limit was reached before the fall: look at what the controller wanted."
+    outcome = {each.change: each for each in tried if each.change is not None}
+    ranked = sorted(asked, key=lambda each: each in outcome and outcome[each].lasted is not True)
+    for each in ranked:
+        seen = _seen(outcome.get(each))
+        reason = f": {each.reason}" if each.reason else ""
+        yield f"{_in_words(each)}{reason}.{seen}"
+    if fall is not None and not asked:
+        yield _without_a_change(fall, gait)
+
+
+RESERVE = {
+    "friction": "optimize_gait(robot, friction=...) for less than there is keeps some",
+    "zero moment point": "optimize_gait(robot, zmp_margin=...) keeps some",
+    "torque": "a gait of smaller step_length, or another step_duration, may ask for less",
+    "speed": "a slower gait, or another reduction of the motor, keeps some",
+    "joint": "optimize_gait(robot, joint_ranges=...) keeps some",
+}
+"""What gives a walk that lasts a reserve, by the kind of limit that it reaches."""
+
+
+def _no_reserve(limit: Limit) -> str:
+    return (
+        f"the walk lasts, but {limit.name} has no reserve at {limit.reached:.3g} s: "
+        f"{RESERVE[limit.kind]}."
+    )
+
+
+def _seen(tried: Tried | None) -> str:
+    if tried is None:
+        return ""
+    if tried.lasted is None:
+        return f" Not tried: {tried.outcome}."
+    return f" Tried: it {'walks' if tried.lasted else 'does not help'}, {tried.outcome}."
+
+
+def _in_words(change: Change) -> str:
+    value, where = change.value, in_words(change.where)
+    number = f"{value:.3g}" if isinstance(value, float) else value
+    match change.lever:
+        case Lever.CONTROLLER:
+            return f"walk it by hs.{value}(robot, gait)"
+        case Lever.FRICTION:
+            return f"a friction of at least {number} under the feet"
+        case Lever.TORQUE_LIMIT:
+            return f"motors of at least {number} N m"
+        case Lever.GAIT_JOINT_RANGES:
+            return (
+                f"optimize_gait(robot, joint_ranges=...) that stays {number} rad off the stops of "
+                f"the {where}"
+            )
+        case Lever.GAIT_SPEED:
+            return f"a gait at {number} of this speed: optimize_gait(robot, step_duration=...)"
+        case Lever.TIME_STEP:
+            return f"a time step of {number} s"
+    return f"optimize_gait(robot, {change.lever.value.removeprefix('gait: ')}={number})"
+
+
+def _without_a_change(fall: Fall, gait: Gait | None) -> str:
+    if fall.cause is Cause.CONTROLLER:
+        at = f" of the {in_words(fall.where)}" if fall.where else ""
+        return f"mend the sign, the gain or the number{at} in the controller."
+    if gait is None:
+        return (
+            "its gait is not known here: with it (gait=, or gait.json beside the run) a report "
+            "says more."
+        )
+    if gait.point_feet:
+        return (
+            "the robot stands on points, and no motor acts on its tipping about them: walk it by "
+            "hs.VirtualConstraints, or by hs.SteppingConstraints, which steps where balance needs "
+            "it."
+        )
+    return "a controller that steps to catch it; the one it had was at its end."

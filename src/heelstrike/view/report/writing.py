@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -11,16 +12,23 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
+from heelstrike.analysis.diagnosis.changes import Tried
+from heelstrike.analysis.diagnosis.limits import REACHED, Limit
+from heelstrike.analysis.diagnosis.measures import measures, motor_loads
 from heelstrike.analysis.summary import lines, summarize
+from heelstrike.analysis.support import walking_steps
+from heelstrike.arguments import takes
 from heelstrike.errors import ViewError
+from heelstrike.robot.robot import Robot
+from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.view.figures import FIGURES, plot
 from heelstrike.view.page.markup import data_block, document, escaped, grid, shipped, table
 from heelstrike.view.page.page import certificates, check_gait, check_page, contents
 from heelstrike.view.page.provenance import provenance
-from heelstrike.view.page.verdict import REACHED, Limit, Verdict, judge
+from heelstrike.view.page.verdict import Verdict, judge, told
 from heelstrike.view.report.differences import differences
-from heelstrike.view.style import styled, view_errors
+from heelstrike.view.style import in_words, styled, view_errors
 from heelstrike.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -43,18 +51,22 @@ PIXELS = 110
 """Dots an inch of what a figure does not draw as lines."""
 
 
+@takes(ViewError)
 def report(
     runs: Run | Mapping[str, Run] | Sequence[Run],
     path: str | os.PathLike[str],
     *,
     gait: Gait | None = None,
     command: str = "",
+    tried: Mapping[str, Sequence[Tried]] | None = None,
 ) -> Path:
     """Write a report of a run, or of several side by side, as one HTML page.
 
-    The first line is the verdict: does it walk, how close does it come to each limit, what to
-    change. Then the film, the limits, figures, tables, certificates, versions, inputs, and the
-    command that makes it again. A browser prints the page to PDF.
+    The first line is the verdict: does it walk, why did it fall or how close does it come to its
+    limits, what to change. Then the film, which begins where it went wrong, what happened, what to
+    change and what was tried, the limits, the figures that an engineer signs, pictures,
+    certificates, versions, inputs, and the command that makes it again. A browser prints the page
+    to PDF.
 
     Parameters
     ----------
@@ -67,6 +79,9 @@ def report(
         The gait that they followed, for references and the tracking error.
     command : str
         The command that makes the report, for its provenance.
+    tried : mapping of str to sequence of Tried, optional
+        What was tried beside each run, by its name: that of the robot for a single run.
+        :mod:`heelstrike.experiments.what_if` tries, and so does ``heelstrike report``.
 
     Returns
     -------
@@ -88,14 +103,21 @@ def report(
             raise ViewError(f"a report is of runs, got {run!r}; load_run reads one from its file")
         if not len(run.time):
             raise ViewError(f"there is nothing to report of {name}: no rows ({run.message})")
-    text = report_page(named, gait, command=command)
+    text = report_page(named, gait, command=command, tried=tried)
     with view_errors():
         return write_whole(target, text)
 
 
-def report_page(named: Mapping[str, Run], gait: Gait | None = None, *, command: str = "") -> str:
+def report_page(
+    named: Mapping[str, Run],
+    gait: Gait | None = None,
+    *,
+    command: str = "",
+    tried: Mapping[str, Sequence[Tried]] | None = None,
+) -> str:
     """Write the page of a report; see :func:`report`."""
-    verdicts = {name: judge(run, gait) for name, run in named.items()}
+    beside = tried or {}
+    verdicts = {name: judge(run, gait, tried=beside.get(name, ())) for name, run in named.items()}
     robots = " and ".join(dict.fromkeys(run.robot.name for run in named.values()))
     title = f"{robots}: report" if len(named) == 1 else f"{robots}: {', '.join(named)}"
     body = [
@@ -103,8 +125,11 @@ def report_page(named: Mapping[str, Run], gait: Gait | None = None, *, command: 
         *_headlines(verdicts),
         "</header><main>",
         _films(named),
-        *(_limits(name, verdict, len(named)) for name, verdict in verdicts.items()),
+        *_happened(named, verdicts),
         *_advice(verdicts),
+        *_tried(verdicts),
+        *(_limits(name, verdict, len(named)) for name, verdict in verdicts.items()),
+        *_measures(named, gait),
         *_differences(named),
         _summaries(named, gait),
         "<h2>Figures</h2>",
@@ -114,7 +139,10 @@ def report_page(named: Mapping[str, Run], gait: Gait | None = None, *, command: 
         "<h2>Where this comes from</h2>",
         *_origins(named, gait, command),
         "</main>",
-        data_block("runs", [contents(run, gait) for run in named.values()]),
+        data_block(
+            "runs",
+            [contents(run, gait, shown=_shown(run, verdicts[name])) for name, run in named.items()],
+        ),
     ]
     style = shipped("page.css") + shipped("report.css")
     script = "".join(map(shipped, ("drawing.js", "recording.js", "films.js")))
@@ -167,11 +195,100 @@ def _films(named: Mapping[str, Run]) -> str:
     )
 
 
+BEFORE = 0.1
+"""How long before the first cause of a fall (s) a film begins."""
+
+
+def _shown(run: Run, verdict: Verdict) -> float:
+    """When the first picture of a film is: before what went wrong, or in the middle of a step."""
+    if verdict.fall is not None:
+        return max(float(run.time[0]), verdict.fall.time - BEFORE)
+    landings = [float(run.time[0]), *(stance.touchdown for stance in walking_steps(run))]
+    if len(landings) < 2:
+        return float(0.5 * (run.time[0] + run.time[-1]))
+    step = (len(landings) - 1) // 2
+    return 0.5 * (landings[step] + landings[step + 1])
+
+
+def _happened(named: Mapping[str, Run], verdicts: Mapping[str, Verdict]) -> Iterator[str]:
+    """What went wrong, one after the other; a click on a time takes the film there."""
+    for name, verdict in verdicts.items():
+        if verdict.fall is None:
+            continue
+        run = named[name]
+        rows = [(push.start, _pushed(push, run.robot)) for push in verdict.fall.pushes]
+        rows += [(each.time, told(each, run.robot, when=False)) for each in verdict.fall.chain]
+        rows.append((verdict.fall.end, run.message))
+        cells = "".join(
+            '<tr><th scope="row"><button type="button" '
+            f'data-time="{time:.6f}">{time:.3f} s</button></th><td>{escaped(what)}</td></tr>'
+            for time, what in sorted(rows, key=lambda row: row[0])
+        )
+        caption = "What happened, causes before consequences" + (
+            f": {name}" if len(verdicts) > 1 else ""
+        )
+        yield (
+            f'<table class="happened"><caption>{escaped(caption)}</caption>'
+            f"<tbody>{cells}</tbody></table>"
+        )
+
+
+def _pushed(push: Push, robot: Robot) -> str:
+    link = in_words(robot.link_names[push.place(robot)[0]])
+    newtons = math.hypot(*push.force)
+    return f"a push of {newtons:.3g} N on the {link}, for {push.duration:.3g} s"
+
+
+def _tried(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
+    for name, verdict in verdicts.items():
+        caption = "Tried beside this run" + (f": {name}" if len(verdicts) > 1 else "")
+        rows = [(each.what, each.outcome) for each in verdict.tried if each.change is None]
+        if rows:
+            yield grid(("", "withstood"), rows, caption)
+        elif not verdict.tried:
+            yield f'<p class="note">{escaped(caption)}: nothing. {escaped(NOT_TRIED)}</p>'
+
+
+NOT_TRIED = (
+    "Pushes, slopes and changes need the controller, which a run does not hold: "
+    "“heelstrike report ROBOT” tries them, and heelstrike.experiments.what_if does in Python."
+)
+"""Why a report of runs alone tries nothing."""
+
+
+def _measures(named: Mapping[str, Run], gait: Gait | None) -> Iterator[str]:
+    for name, run in named.items():
+        of = f": {name}" if len(named) > 1 else ""
+        rows = [
+            (each.name, f"{each.value:.3g}\u00a0{each.unit}".strip(), each.detail)
+            for each in measures(run, gait)
+        ]
+        if rows:
+            yield grid(("", "value", ""), rows, f"The walk in figures{of}")
+        loads = [
+            (
+                in_words(load.name), f"{load.peak_torque:.3g}", f"{load.rms_torque:.3g}",
+                f"{load.peak_speed:.3g}", f"{load.mean_power:.3g}", f"{load.peak_power:.3g}",
+            )
+            for load in motor_loads(run)
+        ]  # fmt: skip
+        if loads:
+            units = [
+                "N" if run.robot.model.axis[joint, 0] == 0.0 else "N m"
+                for joint in run.robot.model.actuator_joint
+            ]
+            slides = " (N and m/s of slides)" if "N" in units else ""
+            heading = ("", "peak torque (N m)", "rms (N m)", "peak speed (rad/s)",
+                       "mean power (W)", "peak power (W)")  # fmt: skip
+            yield f'<div class="wide">{grid(heading, loads, f"Motors{slides}{of}")}</div>'
+
+
 def _limits(name: str, verdict: Verdict, several: int) -> str:
     rows = "".join(map(_limit, verdict.limits))
     if not rows:
         return ""
-    caption = "How close to each limit" + (f": {name}" if several > 1 else "")
+    before = " before the first cause" if verdict.fall is not None else ""
+    caption = f"How close to each limit{before}" + (f": {name}" if several > 1 else "")
     return (
         f'<table class="limits"><caption>{escaped(caption)}</caption><thead><tr>'
         '<th scope="col">limit</th><th scope="col">used</th><th scope="col" aria-hidden="true">'
@@ -198,7 +315,10 @@ def _advice(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
     for name, verdict in verdicts.items():
         label = f"<p>{escaped(name)}:</p>" if len(verdicts) > 1 else ""
         items = "".join(f"<li>{escaped(each)}</li>" for each in verdict.advice)
-        yield label + (f"<ul>{items}</ul>" if items else "<p>Nothing has to change.</p>")
+        nothing = (
+            "<p>Nothing has to change for this walk. What it withstands beyond it is below.</p>"
+        )
+        yield label + (f"<ol>{items}</ol>" if items else nothing)
 
 
 def _differences(named: Mapping[str, Run]) -> Iterator[str]:

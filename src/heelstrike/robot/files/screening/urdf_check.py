@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from heelstrike.errors import RobotError
+from heelstrike.robot.files.ros.drives import drives_of
 from heelstrike.robot.warning import warn
 
 # Attributes of each element, with how many numbers they hold (0: a word), and its children.
@@ -82,20 +83,13 @@ def check_urdf(root: Element, label: str) -> None:
     Raises
     ------
     RobotError
-        For numbers that are none, negative masses and the like, names given twice, and macros that
-        nobody expanded.
+        For numbers that are none, negative masses and the like, and names given twice.
 
     Warns
     -----
     RobotWarning
         Of unknown elements and attributes, and joints without the limits that URDF wants.
     """
-    for element in root.iter():
-        if element.tag.startswith("xacro:"):
-            raise RobotError(
-                f"{label}: <{element.tag}> is a macro of xacro, so this is not a URDF file yet. "
-                "Load it with xacro=True, if you trust it: expanding a macro runs what it says."
-            )
     for kind in ("link", "joint"):
         counts = Counter(element.get("name", "") for element in root.iterfind(kind))
         twice = [name for name, count in counts.items() if count > 1]
@@ -106,17 +100,34 @@ def check_urdf(root: Element, label: str) -> None:
     massive = {
         link.get("name", "") for link in root.iterfind("link") if link.find("inertial") is not None
     } - {"world"}
+    driven = drives_of(root, label)
     for joint in root.iterfind("joint"):
         parent = joint.find("parent")
         # The joints of a floating base, on links without mass, have no limits.
         if parent is not None and (
             parent.get("link") in massive or joint.find("limit") is not None
         ):
-            strange += _missing_limits(joint)
+            strange += _missing_limits(joint, joint.get("name", "") in driven)
     if strange:
         shown = "; ".join(strange[:SHOWN])
         more = f"; and {len(strange) - SHOWN} more" if len(strange) > SHOWN else ""
         warn(f"{label}: this URDF may not say what is meant: {shown}{more}.")
+
+
+def refuse_macros(root: Element, label: str) -> None:
+    """Refuse a file whose macros nobody expanded.
+
+    Raises
+    ------
+    RobotError
+        With the macro, and how it is expanded.
+    """
+    for element in root.iter():
+        if element.tag.startswith("xacro:"):
+            raise RobotError(
+                f"{label}: <{element.tag}> is a macro of xacro, so this is not a URDF file yet. "
+                "Load it with xacro=True, if you trust it: expanding a macro runs what it says."
+            )
 
 
 def check_urdf_tree(root: Element, label: str) -> None:
@@ -233,19 +244,22 @@ def _check_numbers(
         raise RobotError(f"{what} is zero, which is no direction.")
 
 
-def _missing_limits(joint: Element) -> Iterator[str]:
+def _missing_limits(joint: Element, driven: bool) -> Iterator[str]:
+    """What a joint lacks of its limits; `driven` is one to which the file gives a motor."""
     name = joint.get("name", "")
     limit = joint.find("limit")
     if joint.get("type") not in _BOUNDED:
         return
     if limit is None:
-        yield f"joint {name!r} has no <limit>: it moves freely and has no motor"
+        motor = "so is the torque of its motor" if driven else "it has no motor"
+        yield f"joint {name!r} has no <limit>: its range is unlimited, and {motor}"
         return
     ends = [end for end in ("lower", "upper") if end not in limit.attrib]
     if ends:
         yield f"<limit> of joint {name!r} has no {' and no '.join(repr(end) for end in ends)}"
     if "effort" not in limit.attrib:
-        yield f"<limit> of joint {name!r} has no 'effort', so that no motor moves it"
+        meant = "so that its motor's torque is unlimited" if driven else "so that no motor moves it"
+        yield f"<limit> of joint {name!r} has no 'effort', {meant}"
     lower, upper = (float(limit.get(end, "0")) for end in ("lower", "upper"))
     if not ends and lower >= upper:
         yield (

@@ -1,11 +1,13 @@
-"""The controllers of the zoo: what robots each can drive, and how it is made for one.
+"""The laws that a robot walks under, by name: what robots each can drive, how it is made for one.
 
-A new controller is one line of `CONTROLLERS`. Gains are those of bravo7, which go with weight and
+A new controller is one line of `CONTROLLERS`, which the zoo measures; commands and the live view
+know all of `LAWS`, by these names alone. Gains are those of bravo7, which go with weight and
 height; nothing is tuned for a robot.
 """
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,6 +20,8 @@ from heelstrike.analysis.stability.zero_dynamics import zero_dynamics
 from heelstrike.contact.ground import Ground
 from heelstrike.control import (
     ComputedTorque,
+    Encoder,
+    FlatGaitLQR,
     FootstepFeedback,
     GaitLQR,
     JointPD,
@@ -27,16 +31,17 @@ from heelstrike.control import (
     WholeBody,
     ZeroMomentPointRegulation,
 )
+from heelstrike.control.balance.controllers import feet_to_balance_on
 from heelstrike.control.joint_feedback import JointFeedback
 from heelstrike.dynamics import leg_joints, mass_matrix
-from heelstrike.errors import GaitError, HeelstrikeError
+from heelstrike.errors import ControllerError, GaitError, HeelstrikeError
+from heelstrike.experiments.own_law import own_law
 from heelstrike.experiments.walk import StepSize, design, typical_step
 from heelstrike.gait import Gait, PhasedGait, StepFamily, optimize_gait
 from heelstrike.gait.sole import sole
 from heelstrike.robot import Robot
+from heelstrike.sim import Controller
 from heelstrike.sim.controller.law import Law
-from heelstrike.sim.method import Method
-from heelstrike.sim.time_stepping.method import TimeStepping
 
 SAMPLE = 1e-3
 """Time between two calls of every controller, in s; a longer step of the method goes before."""
@@ -57,7 +62,7 @@ sample, makes a joint that moves little inertia chatter."""
 
 @dataclass(frozen=True)
 class Entry:
-    """A controller of the zoo.
+    """A controller by its name.
 
     Attributes
     ----------
@@ -69,21 +74,30 @@ class Entry:
         Takes a robot, returns what it lacks, in a word; nothing if the controller can drive it.
     stands : bool
         Whether it makes the robot stand, and needs no gait: None is what it is given.
+    bent_knees : bool
+        Whether it walks on points, by a gait with bent knees: the one of :func:`gait_for`.
+    source : str
+        File of a user whose code was run for it.
     """
 
     name: str
     trial: Callable[[Robot, Gait | None], Trial]
     needs: Callable[[Robot], str]
     stands: bool = False
+    bent_knees: bool = False
+    source: str = ""
+
+
+def driven(robot: Robot) -> str:
+    """Say what a robot lacks that shall be moved at all."""
+    if not robot.nu:
+        return "no motors"
+    return "" if robot.floating else "trunk is fixed"
 
 
 def two_feet(robot: Robot) -> str:
     """Say what a robot lacks that shall walk on two feet of whatever kind."""
-    if not robot.nu:
-        return "no motors"
-    if not robot.floating:
-        return "trunk is fixed"
-    return "" if len(robot.feet) == 2 else "not on two feet"
+    return driven(robot) or ("" if len(robot.feet) == 2 else "not on two feet")
 
 
 def flat_feet(robot: Robot) -> str:
@@ -96,8 +110,22 @@ def point_feet(robot: Robot) -> str:
     return two_feet(robot) or ("needs point feet" if _flat(robot) else "")
 
 
+def balancing(robot: Robot) -> str:
+    """Say what a robot lacks whose whole body shall keep its balance."""
+    missing = flat_feet(robot)
+    if missing:
+        return missing
+    try:
+        feet_to_balance_on(robot)
+    except HeelstrikeError:
+        return "needs legs of hip, knee and ankle, all driven"
+    return ""
+
+
 def walking(
-    name: str, law: Callable[[Robot, Gait], Law], needs: Callable[[Robot], str] = flat_feet
+    name: str,
+    law: Callable[[Robot, Gait], Law | Controller],
+    needs: Callable[[Robot], str] = flat_feet,
 ) -> Entry:
     """Enter a controller that walks a gait from its beginning.
 
@@ -155,7 +183,7 @@ def on_points(
             step_length=zero.step_length, step_duration=zero.period,
         )  # fmt: skip
 
-    return Entry(name, trial, needs)
+    return Entry(name, trial, needs, bent_knees=True)
 
 
 def standing(
@@ -208,8 +236,8 @@ CONTROLLERS: tuple[Entry, ...] = (
     walking("ComputedTorque", ComputedTorque, needs=two_feet),
     walking("JointPD", _joint_pd),
     walking("ZeroMomentPointRegulation", ZeroMomentPointRegulation),
-    walking("WholeBody", WholeBody),
-    walking("FootstepFeedback", FootstepFeedback),
+    walking("WholeBody", WholeBody, needs=balancing),
+    walking("FootstepFeedback", FootstepFeedback, needs=balancing),
     on_points("VirtualConstraints", partial(VirtualConstraints, kp=100.0, kd=40.0)),
     on_points("SteppingConstraints", lambda gait: SteppingConstraints(StepFamily.around(gait))),
     on_points("GaitLQR", GaitLQR),
@@ -217,6 +245,93 @@ CONTROLLERS: tuple[Entry, ...] = (
     standing("StandingLQR", StandingLQR),
 )
 """Controllers, in the order of the table; a new one is a line here."""
+
+BY_ENCODERS = walking(
+    "ComputedTorqueByEncoders",
+    lambda robot, gait: ComputedTorque(robot, gait, encoder=Encoder()),
+    needs=two_feet,
+)
+"""The paper's law on velocities that it estimates from encoders."""
+
+LAWS: tuple[Entry, ...] = (*CONTROLLERS, walking("FlatGaitLQR", FlatGaitLQR), BY_ENCODERS)
+"""All laws that have a name: those of the zoo, and others."""
+
+
+def law_called(words: str) -> Entry:
+    """Return a law by its name, or one of a user by ``module:name`` or ``file.py:name``.
+
+    Capitals and hyphens do not matter. The code of a module or a file is run.
+
+    Parameters
+    ----------
+    words : str
+        What it is called.
+
+    Returns
+    -------
+    Entry
+        Its line of `LAWS`, or one of its own.
+
+    Raises
+    ------
+    ControllerError
+        If there is none; the message has the nearest and all names.
+    """
+    if ":" in words:
+        law, source = own_law(words)
+        return replace(walking(words, law, needs=driven), source=source)
+    known = {entry.name.lower(): entry for entry in LAWS}
+    name = words.replace("-", "").replace("_", "").lower()
+    if name in known:
+        return known[name]
+    if words.endswith(".py"):
+        raise ControllerError(
+            f"{words} is a file: say which law of it is meant, as in {words}:NAME"
+        )
+    near = difflib.get_close_matches(name, known, n=1)
+    guess = f" Did you mean {known[near[0]].name!r}?" if near else ""
+    raise ControllerError(
+        f"there is no controller {words!r}.{guess} There are "
+        f"{', '.join(entry.name for entry in LAWS)}. One of your own is MODULE:NAME or "
+        "FILE.py:NAME."
+    )
+
+
+def laws_of(robot: Robot) -> tuple[Entry, ...]:
+    """Laws of `LAWS` that can drive a robot, as far as its build tells."""
+    return tuple(entry for entry in LAWS if not entry.needs(robot))
+
+
+def check_law(law: Entry, robot: Robot) -> None:
+    """Refuse a law that cannot drive a robot.
+
+    Raises
+    ------
+    ControllerError
+        That names the laws that can.
+    """
+    lacks = law.needs(robot)
+    if not lacks:
+        return
+    others = ", ".join(each.name for each in laws_of(robot))
+    raise ControllerError(
+        f"{law.name} cannot drive robot {robot.name!r} ({lacks}). "
+        + (f"It can have {others}." if others else "No law by name can.")
+    )
+
+
+def law_that_steps(robot: Robot) -> Entry | None:
+    """Return the law that steps where balance needs it; None if the robot cannot have it."""
+    return _first_of(robot, "FootstepFeedback")
+
+
+def law_that_balances(robot: Robot) -> Entry | None:
+    """Return a law that looks after the balance of a robot on whatever feet; None if none does."""
+    return _first_of(robot, "FootstepFeedback", "VirtualConstraints")
+
+
+def _first_of(robot: Robot, *names: str) -> Entry | None:
+    return next((law for law in map(law_called, names) if not law.needs(robot)), None)
 
 
 def gait_for(robot: Robot) -> Gait:
@@ -255,13 +370,6 @@ def _bent_knees(robot: Robot, gait: Gait) -> dict[str, tuple[float, float]]:
         robot.joint_names[knee]: BENT if either[actuators.index(knee)] > 0.0 else OTHER_WAY
         for knee in knees
     }
-
-
-def sampled(trial: Trial, method: Method) -> Trial:
-    """Return a trial by another method, its controller called once a sample, or once a step."""
-    slow = isinstance(method, TimeStepping) and method.step >= SAMPLE
-    period = None if slow else SAMPLE
-    return replace(trial, method=method, control_period=period)
 
 
 def _flat(robot: Robot) -> bool:

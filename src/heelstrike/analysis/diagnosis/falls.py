@@ -1,0 +1,141 @@
+"""Why a robot fell: what went wrong first, and what followed from it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from heelstrike.analysis.diagnosis.symptoms import Cause, Symptom, Walk, find_symptoms
+from heelstrike.sim.closed_sets import RunStatus
+from heelstrike.sim.push import Push
+from heelstrike.sim.run import Run
+
+if TYPE_CHECKING:
+    from heelstrike.gait.gait import Gait
+
+RECOVERED = 1.5
+"""Steps without a symptom after which a robot has recovered from what was before."""
+ANSWERS = {Cause.TORQUE_LIMIT: 0.02, Cause.SPEED_LIMIT: 0.02, Cause.CONTROLLER: 0.005}
+"""What a controller shows that answers something else, such as a foot that slips or tips, and how
+long before (s) that is seen: a foot that begins to tip turns slowly at first."""
+SUNK = 0.8
+"""Height of the centre of mass above the ground, in that at the start, of a robot that is falling
+when its run ends."""
+
+
+@dataclass(frozen=True)
+class Fall:
+    """Why a run did not go well.
+
+    Attributes
+    ----------
+    cause : Cause
+        What went wrong first.
+    time : float
+        When that began, in s.
+    where : str
+        Name of the foot or joint at which it did; nothing if it was at none.
+    evidence : mapping of str to float
+        Numbers that show it, by names that end in their units.
+    chain : tuple of Symptom
+        The first cause and what followed, the first of each kind, in the order of time.
+    pushes : tuple of Push
+        Pushes that acted then or up to a step before.
+    end : float
+        When the run ended, in s.
+    """
+
+    cause: Cause
+    time: float
+    where: str
+    evidence: Mapping[str, float]
+    chain: tuple[Symptom, ...]
+    pushes: tuple[Push, ...]
+    end: float
+
+    def __str__(self) -> str:
+        at = f" ({self.where.replace('_', ' ')})" if self.where else ""
+        then = ", ".join(each.cause.value for each in self.chain[1:])
+        return f"{self.cause.value} at {self.time:.3f} s{at}" + (f"; then {then}" if then else "")
+
+
+def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
+    """Say why a robot fell.
+
+    Symptoms are found one by one (:class:`~heelstrike.analysis.diagnosis.symptoms.Cause` lists
+    them). Those from which the robot recovered, as a step and a half without any shows, are left
+    out; the first of the others is the cause. What is known of walking is that of flat and point
+    feet; a gait that means to roll over its toes shows symptoms when nothing is wrong.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    gait : Gait, optional
+        The gait that it followed. Without it, torques at their limits count when they last, late
+        steps by the steps of the run itself, and joints at their stops where nothing else is seen:
+        the gait may go there.
+
+    Returns
+    -------
+    Fall or None
+        Nothing if the run lasted as long as it was asked to and the robot is still up.
+
+    Raises
+    ------
+    GaitError
+        If the gait does not fit the robot of the run.
+    """
+    if not len(run.time) or run.status is RunStatus.INTERRUPTED:
+        return None
+    walk = Walk(run, gait)
+    if run.completed and not _sinks(walk):
+        return None
+    end = float(run.time[-1])
+    found = find_symptoms(walk)
+    if gait is None and any(each.cause is not Cause.JOINT_STOP for each in found):
+        found = tuple(each for each in found if each.cause is not Cause.JOINT_STOP)
+    chain = _unrecovered(found, end, RECOVERED * walk.step_duration)
+    if not chain and run.completed:  # it squats
+        return None
+    if not chain:
+        chain = [Symptom(Cause.UNKNOWN, end, end)]
+    first = chain[0]
+    kinds: dict[Cause, Symptom] = {}
+    for each in chain:
+        if each is first or each.cause is not Cause.CONTROLLER:  # in a fall motors do what they can
+            kinds.setdefault(each.cause, each)
+    since = first.time - walk.step_duration
+    pushes = tuple(p for p in run.pushes if p.start <= first.time and p.end >= since)
+    return Fall(
+        first.cause, first.time, first.where, first.evidence, tuple(kinds.values()), pushes, end
+    )
+
+
+def _sinks(walk: Walk) -> bool:
+    """Whether a robot on feet is on its way down when its run ends."""
+    if not (walk.run.robot.floating and walk.run.robot.feet):
+        return False
+    center = walk.motion.center_of_mass[[0, -1]]
+    height = center[:, 1] - walk.run.ground.height(center[:, 0])
+    return bool(height[1] < SUNK * height[0])
+
+
+def _unrecovered(found: tuple[Symptom, ...], end: float, calm: float) -> list[Symptom]:
+    """Symptoms since the last calm before the end; what a controller answers after its cause."""
+    first, latest = 0, -math.inf
+    for i, each in enumerate(found):
+        if i and each.time - latest > calm:
+            first = i
+        latest = max(latest, each.end)
+    if not found or end - latest > calm:
+        return []
+    chain = list(found[first:])
+    soon = chain[0].time + ANSWERS.get(chain[0].cause, 0.0)
+    cause = next(
+        (each for each in chain if each.cause not in ANSWERS and each.time <= soon), chain[0]
+    )
+    chain.remove(cause)
+    return [cause, *chain]

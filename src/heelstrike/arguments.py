@@ -1,0 +1,197 @@
+"""What public functions are called with, looked at before anything is computed from it.
+
+A function says in its annotations what it takes. What is clearly another thing (a name for a robot,
+a text for a number, nothing for a state) is refused here by those same annotations, in words;
+whether a number is one that can be meant is for the function to say. Of annotations that name
+protocols, or what is not listed here, anything passes.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import os
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import fields
+from numbers import Integral, Real
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+
+from heelstrike.errors import HeelstrikeError
+
+_Parameters = ParamSpec("_Parameters")
+_Result = TypeVar("_Result")
+
+NUMBERS = "iuf"
+"""Kinds of arrays that are numbers."""
+
+INSTEAD = {
+    "Robot": "hs.load_robot(...) makes one",
+    "Gait": "hs.optimize_gait(robot, ...) or hs.load_gait(file, robot=robot) makes one",
+    "PhasedGait": "hs.PhasedGait.from_gait(robot, gait) makes one",
+    "StepFamily": "hs.StepFamily.around(phased_gait) makes one",
+    "Encoder": "hs.Encoder() makes one",
+    "State": "hs.State(q, v), robot.state({...}) or gait.initial_state makes one",
+    "Ground": "hs.Ground(friction=0.75) makes one",
+    "Push": "hs.Push(link, force=(fx, fz), start=..., duration=...) makes one",
+    "Trial": "hs.Trial(robot=..., controller=..., state=...) makes one",
+    "Run": "hs.simulate(...) or hs.load_run(file) makes one",
+}
+"""How to come by what is wanted, by the name of its class."""
+
+OURS = {*INSTEAD, "Snapshot", "Simulation", "ActiveContacts", "Encoders", "InertialUnit"} | {
+    "FootSensors", "Solver", "ForceDistribution", "Bundle"
+}  # fmt: skip
+"""Classes of ours that an annotation may name."""
+
+
+def _is_number(value: object) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.size == 1 and value.dtype.kind in NUMBERS
+    return isinstance(value, Real) and not isinstance(value, (bool, np.bool_))
+
+
+def _is_whole(value: object) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def are_numbers(value: object) -> bool:
+    """Whether numpy makes an array of real numbers of a value."""
+    try:
+        return np.asarray(value).dtype.kind in NUMBERS + "b"
+    except (ValueError, TypeError):  # rows of different lengths
+        return False
+
+
+def _is_several(value: object) -> bool:
+    return isinstance(value, (Sequence, np.ndarray)) and not isinstance(value, (str, bytes))
+
+
+def _are_items(value: object) -> bool:
+    return isinstance(value, Iterable) and not isinstance(value, bytes)  # one name, too
+
+
+_KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
+    "float": ("a number", _is_number),
+    "int": ("a whole number", _is_whole),
+    "bool": ("True or False", lambda value: isinstance(value, (bool, np.bool_))),
+    "str": ("a text", lambda value: isinstance(value, str)),
+    "None": ("None", lambda value: value is None),
+    "ArrayLike": ("numbers", are_numbers),
+    "NDArray": ("numbers", are_numbers),
+    "Path": ("a path", lambda value: isinstance(value, os.PathLike)),
+    "PathLike": ("a path", lambda value: isinstance(value, os.PathLike)),
+    "Mapping": ("a mapping", lambda value: isinstance(value, Mapping)),
+    "Sequence": ("a sequence", _is_several),
+    "Iterable": ("a sequence", _are_items),
+    "Callable": ("a function", callable),
+}
+"""What an annotation means in words, and whether a value is that."""
+
+
+def takes(
+    error: type[HeelstrikeError],
+) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
+    """Make a function refuse arguments that are not what its annotations say.
+
+    Parameters
+    ----------
+    error : type
+        What it raises then.
+    """
+
+    def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
+        signature = inspect.signature(function)
+        wanted = {
+            name: kinds
+            for name, each in signature.parameters.items()
+            if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)
+            and (kinds := _kinds(each.annotation))
+        }
+
+        @functools.wraps(function)
+        def checked(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Result:
+            try:
+                given = signature.bind(*args, **kwargs).arguments
+            except TypeError:  # too many, too few, unknown: Python's own words come with the call
+                return function(*args, **kwargs)
+            for name, kinds in wanted.items():
+                if name in given and not _is_any(given[name], kinds):
+                    raise error(refusal(name, given[name], kinds))
+            return function(*args, **kwargs)
+
+        return checked
+
+    return decorate
+
+
+def check_fields(instance: Any, error: type[HeelstrikeError]) -> None:
+    """Refuse members of a dataclass that are not what its annotations say.
+
+    Parameters
+    ----------
+    instance : object
+        The dataclass, as it is made.
+    error : type
+        What is raised then.
+    """
+    kind: Any = type(instance)
+    for name, kinds in _wanted(kind).items():
+        if not _is_any(value := getattr(instance, name), kinds):
+            raise error(refusal(name, value, kinds))
+
+
+@functools.cache
+def _wanted(dataclass: Any) -> dict[str, tuple[str, ...]]:
+    return {
+        each.name: kinds for each in fields(dataclass) if each.init and (kinds := _kinds(each.type))
+    }
+
+
+def _kinds(annotation: Any) -> tuple[str, ...]:
+    """Alternatives of an annotation, by names in `_KINDS` and `OURS`; none if one is unknown."""
+    if not isinstance(annotation, str):
+        return ()
+    plain = annotation
+    while "[" in plain:  # from within, what is in brackets goes
+        inner = re.sub(r"\[[^\[\]]*\]", "", plain)
+        if inner == plain:
+            return ()
+        plain = inner
+    names = tuple(each.strip().rpartition(".")[2] for each in plain.split("|"))
+    if not all(name in _KINDS or name in OURS for name in names):
+        return ()
+    return names
+
+
+def refusal(name: str, value: object, kinds: Sequence[str]) -> str:
+    """Say that an argument is none of what is wanted, what was given, and what makes one."""
+    makes = next((INSTEAD[kind] for kind in kinds if kind in INSTEAD), "")
+    advice = f"; {makes}" if makes else ""
+    return f"{name} must be {_words(kinds)}, got {shown(value)}{advice}"
+
+
+def _is_any(value: object, kinds: Sequence[str]) -> bool:
+    names = {each.__name__ for each in type(value).__mro__}
+    return any(_KINDS[kind][1](value) if kind in _KINDS else kind in names for kind in kinds)
+
+
+def _words(kinds: Sequence[str]) -> str:
+    """What is wanted: ``a Robot``, ``a number or None``."""
+
+    def words(kind: str) -> str:
+        if kind in _KINDS:
+            return _KINDS[kind][0]
+        return f"{'an' if kind[0] in 'AEIOU' else 'a'} {kind}"
+
+    several = list(dict.fromkeys(words(kind) for kind in kinds))
+    return " or ".join(filter(None, (", ".join(several[:-1]), several[-1])))
+
+
+def shown(value: object) -> str:
+    """Write what was given, with its kind, in a line."""
+    text = " ".join(repr(value).split())
+    short = text if len(text) <= 60 else f"{text[:57]}..."
+    return f"{short} ({type(value).__name__})"

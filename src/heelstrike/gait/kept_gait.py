@@ -1,0 +1,119 @@
+"""Gaits that were designed before, on disk: the same request has the same gait.
+
+A gait is kept under a fingerprint of all that it follows from: the robot, what is asked, and the
+program that designs it. Its file is that of any saved gait, and is believed only with its checksum.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from contextlib import suppress
+from dataclasses import fields
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from heelstrike.cache_folder import cache_folder
+from heelstrike.errors import GaitError
+from heelstrike.gait.file import load_gait, save_gait
+from heelstrike.gait.gait import Gait
+from heelstrike.gait.request import Request
+from heelstrike.robot.robot import Robot
+
+SWITCH = "HEELSTRIKE_KEEP_GAITS"
+"""Environment variable: 0 keeps none, a folder keeps them there."""
+MOST = 1000
+"""Files that are kept, of some 10 kB each; the older half goes when there are more."""
+
+_ROOMS = ("gait", "contact", "dynamics", "robot")
+"""Packages whose text decides what gait is found."""
+
+
+class KeptGait:
+    """Where the gait of a request is kept, if anywhere.
+
+    Parameters
+    ----------
+    request : Request
+        What is asked of the gait.
+    """
+
+    def __init__(self, request: Request) -> None:
+        self._robot = request.robot
+        folder = _folder()
+        self._file = None if folder is None else folder / f"{_fingerprint(request)}.json"
+
+    def load(self) -> Gait | None:
+        """Return the gait, or None if it is not there or its file is damaged."""
+        if self._file is None or not self._file.is_file():
+            return None
+        with suppress(GaitError):
+            return load_gait(self._file, self._robot)
+        return None
+
+    def save(self, gait: Gait) -> Gait:
+        """Keep a gait if its folder can be written to, and return it."""
+        if self._file is not None:
+            with suppress(GaitError, OSError):
+                self._file.parent.mkdir(parents=True, exist_ok=True)
+                _make_room(self._file.parent)
+                save_gait(gait, self._file)
+        return gait
+
+
+def _folder() -> Path | None:
+    named = os.environ.get(SWITCH, "")
+    if named == "0":
+        return None
+    return Path(named) if named else cache_folder() / "gaits"
+
+
+def _make_room(folder: Path) -> None:
+    files = sorted(folder.glob("*.json"), key=lambda file: file.stat().st_mtime)
+    if len(files) >= MOST:
+        for file in files[: MOST // 2]:
+            file.unlink(missing_ok=True)
+
+
+def _fingerprint(request: Request) -> str:
+    digest = hashlib.sha256(_program())
+    _add_robot(digest, request.robot)
+    for field in fields(request):
+        if field.name != "robot":
+            value = getattr(request, field.name)
+            digest.update(f"{field.name} {_plain(value)!r};".encode())
+    return digest.hexdigest()[:32]
+
+
+def _add_robot(digest: hashlib._Hash, robot: Robot) -> None:
+    """Add every digit of a robot's numbers, and its names; pictures of it decide nothing."""
+    for name, value in robot.model.members().items():
+        numbers = np.ascontiguousarray(value)
+        digest.update(f"{name} {numbers.dtype} {numbers.shape}".encode() + numbers.tobytes())
+    names = (robot.name, robot.joint_names, robot.actuator_names, robot.contact_names)
+    mirror = robot.mirror
+    sides = mirror and [
+        part.tolist() for part in (mirror.joint, mirror.sign, mirror.contact, mirror.foot)
+    ]
+    digest.update(repr((names, robot.feet, sides, robot.floating)).encode())
+
+
+def _plain(value: object) -> object:
+    """Return a value whose ``repr`` tells all of it, the same for equal values."""
+    if hasattr(value, "items"):
+        return sorted((name, tuple(map(float, ends))) for name, ends in value.items())
+    return value
+
+
+@cache
+def _program() -> bytes:
+    """Digest of the program that designs gaits: its text, and what solves for it."""
+    digest = hashlib.sha256(f"{version('casadi')} {version('numpy')}".encode())
+    package = Path(__file__).parent.parent
+    for room in _ROOMS:
+        for file in sorted((package / room).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.digest()
