@@ -24,7 +24,7 @@ from heelstrike.gait.request import Request
 from heelstrike.robot.robot import Robot
 
 SWITCH = "HEELSTRIKE_KEEP_GAITS"
-"""Environment variable: 0 keeps none, a folder keeps them there."""
+"""Environment variable: 0 keeps none, a folder keeps them there, 1 is as usual."""
 MOST = 1000
 """Files that are kept, of some 10 kB each; the older half goes when there are more."""
 
@@ -68,7 +68,7 @@ def _folder() -> Path | None:
     named = os.environ.get(SWITCH, "")
     if named == "0":
         return None
-    return Path(named) if named else cache_folder() / "gaits"
+    return cache_folder() / "gaits" if named in ("", "1") else Path(named)
 
 
 def _make_room(folder: Path) -> None:

@@ -22,7 +22,7 @@ from heelstrike.robot.state import State
 from heelstrike.whole_file import write_whole
 
 _IDENTITY = "identity"
-_FORMAT = 3
+_FORMAT = 4
 # What reading an archive raises when its bytes are others.
 _DAMAGED = (ValueError, KeyError, AttributeError, TypeError, EOFError, RuntimeError, OverflowError)
 
