@@ -113,6 +113,8 @@ def _does(run: Run, fall: Fall | None) -> str:
         return f"{name} takes no step in {last:.3g} s."
     if run.status is RunStatus.FELL:
         return f"{name} falls at {last:.3g} s, after {went}."
+    if run.status is RunStatus.STOPPED:
+        return f"{name} does not go on after {went}: {run.message}."
     return f"{name} does not get to the end ({run.message}), after {went}."
 
 
@@ -290,8 +292,8 @@ def _without_a_change(fall: Fall, gait: Gait | None) -> str:
         return f"mend the sign, the gain or the number{at} in the controller."
     if gait is None:
         return (
-            "its gait is not known here: with it (gait=, or gait.json beside the run) a report "
-            "says more."
+            "no gait is known here: if it follows one, a report that has it (gait=, or gait.json "
+            "beside the run) says more."
         )
     if gait.point_feet:
         return (
