@@ -162,3 +162,18 @@ def test_runs_without_rows_or_numbers_are_judged_too() -> None:
     assert "did not begin" in judge(make_run(pendulum(), [])).headline
     run = make_run(pendulum(), [0.0, 0.1], torque=[[np.nan], [np.nan]], status=RunStatus.DIVERGED)
     assert "a time step of 0.01 s" in judge(run).headline
+
+
+def test_what_no_step_mends_is_told_so() -> None:
+    def ended(status: RunStatus) -> hs.Run:
+        return make_run(
+            walking.bravo7(), [0.0, 1e-3], position=walking.gait().initial_state.q, status=status,
+            method=hs.EventDriven(),
+        )  # fmt: skip
+
+    failed = ended(RunStatus.SOLVER_FAILED)
+    assert judge(failed).advice == judge(failed, walking.gait()).advice
+    assert judge(failed).advice[0].startswith("another method, as hs.TimeStepping(step=1e-4)")
+    assert judge(ended(RunStatus.FELL), walking.gait()).advice == (
+        "nothing is known that would help.",
+    )
