@@ -6,7 +6,7 @@
 #   make check   formatting, lint, types, layers
 #   make peers   install the other engines, beside which `make test` then runs its tests, too
 #   make check-all   all checks and tests, on every kind of machine that this one can play; long
-#   make docs    the documentation site, in site/
+#   make docs    the documentation site, in site/, and a look at each page of it
 #   make clean   forget everything that was built or installed
 
 PYTHON ?= python3
@@ -78,8 +78,10 @@ check: $(VENV)/installed-dev
 
 check-all: check peers test test-plain test-blas test-perturbed
 
-docs: $(VENV)/installed-docs
+docs: export HEELSTRIKE_SITE = site
+docs: $(VENV)/installed-docs $(VENV)/installed-dev
 	$(BIN)/mkdocs build --strict
+	$(BIN)/pytest -q tests/test_site.py
 
 clean:
 	rm -rf $(VENV) $(VENV)-numba .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

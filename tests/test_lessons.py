@@ -1,4 +1,4 @@
-"""The lessons and the gallery run from top to bottom, and what they say comes out.
+"""The lessons and the gallery run from top to bottom, and what they say and show comes out.
 
 Cells that carry the tag `check` hold what is asserted of the figures in the text; pages leave them
 out.
@@ -6,11 +6,14 @@ out.
 
 from __future__ import annotations
 
+import ast
 import json
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import pytest
+from IPython.core.formatters import DisplayFormatter
 
 ROOT = Path(__file__).resolve().parent.parent
 LESSONS = sorted((ROOT / "docs" / "lessons").glob("*.ipynb"))
@@ -25,8 +28,21 @@ def test_a_lesson_runs(lesson: Path, tmp_path: Path, monkeypatch: pytest.MonkeyP
     names: dict[str, object] = {"__name__": "__main__"}
     for cell in json.loads(lesson.read_text(encoding="utf-8"))["cells"]:
         if cell["cell_type"] == "code":
-            exec(compile("".join(cell["source"]), f"{lesson.name} {cell['id']}", "exec"), names)
+            shown = outcome("".join(cell["source"]), f"{lesson.name} {cell['id']}", names)
+            if shown is not None:
+                kinds = DisplayFormatter().format(shown)[0]
+                assert "image/png" in kinds, f"{cell['id']} shows no picture but {shown}"
     plt.close("all")
+
+
+def outcome(source: str, place: str, names: dict[str, Any]) -> Any:
+    """Value of the expression in which a cell ends, which a notebook shows."""
+    lines = ast.parse(source)
+    last = lines.body.pop() if isinstance(lines.body[-1], ast.Expr) else None
+    exec(compile(lines, place, "exec"), names)
+    if last is None:
+        return None
+    return eval(compile(ast.Expression(last.value), place, "eval"), names)  # type: ignore[attr-defined]
 
 
 def test_there_are_lessons_in_the_navigation_without_results() -> None:

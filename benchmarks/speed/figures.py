@@ -16,6 +16,7 @@ from heelstrike.view.style import (
     PURPLE,
     SKY,
     VERMILION,
+    label_powers,
     new_figure,
     styled,
 )
@@ -61,6 +62,7 @@ def _steps(part: dict[str, Any]) -> Figure:
                 text, where, xytext=(4, 0), textcoords="offset points", va="center", color=INK
             )
     axes.set_xscale("log")
+    label_powers(axes.xaxis)
     axes.set_xlim(0.5)
     axes.margins(x=0.15)
     axes.set_yticks(place, [row["scenario"] for row in rows])
@@ -102,6 +104,8 @@ def _precision(part: dict[str, Any]) -> Figure:
             color, mark, line = _MARKS[own % 5]
             own += 1
         axes.loglog(seconds, error, color=color, marker=mark, linestyle=line, ms=5, label=name)
+    for axis in (axes.xaxis, axes.yaxis):
+        label_powers(axis)
     axes.axhline(part["goal_rad"], **BOUND)
     axes.annotate(
         f"{part['goal_rad']:g} rad",
@@ -156,6 +160,7 @@ def _scaling(part: dict[str, Any]) -> Figure:
         else:
             axes.set_xscale("symlog", linthresh=1.0)
         axes.set_yscale("log")
+        label_powers(axes.yaxis)
         axes.set_xticks(size, [str(n) for n in size])
         axes.minorticks_off()
         axes.set_xlabel(label)

@@ -7,6 +7,7 @@ import io
 import numpy as np
 import pytest
 import walking
+from figure_text import check_text
 from rich.console import Console
 
 import heelstrike as hs
@@ -120,3 +121,8 @@ def test_methods_that_cannot_are_left_out_and_say_why() -> None:
     assert "soft left out: on compliant ground" in console.file.getvalue()
     with pytest.raises(hs.SimulationError, match="restitution"):
         hs.compare(walking.bravo7(), None, reference="soft", **options)  # type: ignore[arg-type]
+
+
+def test_the_figure_can_be_read(comparison: Comparison) -> None:
+    words = check_text(comparison.plot())
+    assert any(word.startswith("10⁻") for word in words)

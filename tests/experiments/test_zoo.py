@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import walking as walks
+from figure_text import check_text
 
 import heelstrike as hs
 from heelstrike.experiments.laws import flat_feet, point_feet, two_feet
@@ -429,6 +430,7 @@ def test_names_of_files_stand_in_the_page_as_they_are(tmp_path: Path) -> None:
 
 def test_the_figure_has_a_panel_a_disturbance_and_a_mark_a_cell(tmp_path: Path) -> None:
     figure = draw_zoo(some(tmp_path))
+    check_text(figure)
     panels = figure.axes
     assert [axes.get_title(loc="left") for axes in panels][:2] == [
         "push forwards (N s)", "push backwards (N s)"

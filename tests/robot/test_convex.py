@@ -8,6 +8,7 @@ import pytest
 from heelstrike.robot.shapes.convex import (
     convex_hull,
     lowest_chain,
+    nearest_points,
     touches_first,
     with_fewer_corners,
 )
@@ -102,3 +103,34 @@ def test_what_is_hidden_is_left_out() -> None:
     elsewhere = Outline(1, small.corners, 0.0)
     point = Outline(2, np.zeros((1, 2)), 0.0)
     assert without_hidden([small, square, elsewhere, point]) == (square, elsewhere)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_nearest_points_of_polygons(seed: int) -> None:
+    """Beside all pairs of points along both rims: none is nearer, by more than their spacing."""
+    draw = np.random.default_rng(seed)
+    a, b = (
+        convex_hull(draw.normal(size=(int(count), 2)) + draw.normal(scale=4.0, size=2))
+        for count in draw.integers(1, 8, size=2)
+    )
+    share = np.linspace(0.0, 1.0, 200)[:, None, None]
+    rims = [(each + share * (np.roll(each, -1, axis=0) - each)).reshape(-1, 2) for each in (a, b)]
+    least = np.hypot(*np.moveaxis(rims[0][:, None] - rims[1], -1, 0)).min()
+    start, end = nearest_points(a, b)
+    found = np.hypot(*(end - start))
+    if found == 0.0:
+        assert least < 0.1
+    else:
+        assert least - 0.05 < found <= least + 1e-12
+
+
+def test_polygons_that_touch_or_cross_are_not_apart() -> None:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    bar = np.array([[-1.0, 0.4], [2.0, 0.4], [2.0, 0.6], [-1.0, 0.6]])  # no corner in the other
+    line = np.array([[0.5, -1.0], [0.5, 2.0]])
+    beside = square + np.array([1.0, 0.0])
+    for other in (bar, line, beside, 0.2 * square + 0.3, np.array([[0.5, 0.5]])):
+        for start, end in (nearest_points(square, other), nearest_points(other, square)):
+            np.testing.assert_array_equal(start, end)
+    start, end = nearest_points(np.array([[0.0, 0.0]]), np.array([[3.0, 4.0]]))
+    assert (*start, *end) == (0.0, 0.0, 3.0, 4.0)

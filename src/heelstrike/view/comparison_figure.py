@@ -13,6 +13,7 @@ from heelstrike.view.style import (
     FOOT_COLORS,
     INK,
     figure_title,
+    label_powers,
     legend_above,
     new_figure,
     styled,
@@ -65,6 +66,7 @@ def draw_comparison(
                     label=name,
                 )
             axes.set_ylabel(label)
+            label_powers(axes.yaxis)
         panels[-1].set_xlabel("time (s)")
         figure_title(figure, robot, f"differences from {reference}")
         legend_above(panels[0])

@@ -28,6 +28,7 @@ from heelstrike.dynamics import LinkPoses, link_poses
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.sim.push import Push
+from heelstrike.view.bars import bars
 from heelstrike.view.style import (
     FORCE_COLOR,
     INK,
@@ -154,21 +155,23 @@ class Skeleton:
 def body(robot: Robot) -> Skeleton:
     """Make what a robot is drawn by: outlines, and bones of the links that have none.
 
-    A foot whose outlines do not reach up to its ankle has both, so that it does not hang in the
-    air.
+    A foot whose outlines do not reach up to its ankle has both; other outlines that stand apart
+    from each other or from the joints are connected by bars.
     """
     bones = skeleton(robot)
     if not robot.outlines:
         return bones
     shaped = {outline.link for outline in robot.outlines}
-    shaped -= {foot.link for foot in robot.feet if not _reaches_joint(robot, foot.link)}
+    hanging = {foot.link for foot in robot.feet if not _reaches_joint(robot, foot.link)}
+    shaped -= hanging
     side = _sides(robot)
     parts = [
         (bones.link[i : i + 1], bones.local[i : i + 1], float(bones.width[i]))
         for i, link in enumerate(bones.link[:, 0])
         if int(link) not in shaped
     ]
-    for outline in robot.outlines:
+    joining = [bar for bar in bars(robot) if bar.link not in hanging]
+    for outline in (*joining, *robot.outlines):
         rim = outline.rim()
         edges = np.stack((rim, np.roll(rim, -1, axis=0)), axis=1)
         parts.append((np.full((len(rim), 2), outline.link), edges, RIM_WIDTH))

@@ -68,7 +68,8 @@ def plot(
     Returns
     -------
     matplotlib.figure.Figure
-        The figure. It belongs to no window; ``figure.savefig`` writes it.
+        The figure. It belongs to no window: ``figure.savefig`` writes it, and a notebook shows it
+        where a cell ends in it.
 
     Raises
     ------

@@ -16,8 +16,11 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 from numpy.typing import NDArray
 
 from heelstrike.errors import ViewError, WriteError
@@ -77,6 +80,11 @@ _STYLE: dict[str, Any] = {
 LEGEND_COLUMNS = 6
 """Entries of a legend side by side."""
 
+SHARPER = 2
+"""Pixels of a picture in a notebook for each pixel of its place, for screens that have them."""
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
 
 @contextlib.contextmanager
 def styled() -> Iterator[None]:
@@ -86,6 +94,48 @@ def styled() -> Iterator[None]:
         settings: Any = matplotlib.rcParams
         settings.update(_STYLE)
         yield
+
+
+class Picture(Figure):
+    """A figure that notebooks show by themselves, and that looks alike wherever it is drawn."""
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw it in heelstrike's look: what matplotlib makes late, as ticks, takes it too."""
+        with styled():
+            super().draw(renderer)
+
+    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
+        """Return what a notebook shows: a PNG, and its size in the pixels of a page.
+
+        A notebook that shows all figures by itself, after ``%matplotlib inline``, does not ask for
+        this.
+        """
+        picture = io.BytesIO()
+        with styled():
+            self.savefig(picture, format="png", dpi=SHARPER * self.dpi)
+        width, height = (round(self.dpi * inches) for inches in self.get_size_inches())
+        return picture.getvalue(), {"width": width, "height": height}
+
+
+class PowersOfTen(LogFormatter):
+    """Ticks of a logarithmic axis as plain text: 10⁻³, 2×10⁻³, 1, 10."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        """Word of the tick at x; none of one between powers, unless there are few of these."""
+        if not super().__call__(x, pos):
+            return ""
+        exponent = int(np.floor(np.log10(x) + 1e-9))
+        if exponent in (0, 1):
+            return f"{x:.3g}"
+        times = f"{x / 10.0**exponent:.3g}"
+        power = "10" + str(exponent).translate(_RAISED)
+        return power if times == "1" else f"{times}×{power}"
+
+
+def label_powers(axis: Axis) -> None:
+    """Let the ticks of a logarithmic axis be plain text."""
+    axis.set_major_formatter(PowersOfTen())
+    axis.set_minor_formatter(PowersOfTen())
 
 
 def foot_color(foot: int) -> str:
@@ -98,9 +148,9 @@ def in_words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Picture:
     """Make a figure (inches) that belongs to no window and to no global list."""
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Picture(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 

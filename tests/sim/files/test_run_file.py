@@ -186,7 +186,7 @@ def test_no_damage_goes_unseen(sealed: Path, tmp_path: Path) -> None:
     path = tmp_path / "damaged.nc"
     draw = random.Random(0)
     refused = 0
-    for _ in range(300):
+    for _ in range(80):
         damaged = damaged_bytes(content, draw)
         path.write_bytes(damaged)
         if damaged[:-LENGTH] == content[:-LENGTH]:
@@ -194,7 +194,7 @@ def test_no_damage_goes_unseen(sealed: Path, tmp_path: Path) -> None:
         with pytest.raises(hs.RunFileError, match=r"damaged\.nc: "):
             load_run(path)
         refused += 1
-    assert refused > 250
+    assert refused > 65
     assert not same_arrays(whole, load_run(sealed))
 
 
@@ -221,7 +221,7 @@ def test_damage_where_there_is_no_checksum(unsealed: Path, tmp_path: Path) -> No
     path = tmp_path / "damaged.nc"
     draw = random.Random(1)
     refused = 0
-    for _ in range(25):
+    for _ in range(12):
         path.write_bytes(damaged_bytes(content, draw))
         with contextlib.suppress(hs.RunFileError):
             load_run(path)

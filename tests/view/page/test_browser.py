@@ -115,13 +115,27 @@ def test_keys(chromium: Any, files: dict[str, Path]) -> None:
 
 def test_a_page_in_a_frame_may_play_at_once(chromium: Any, files: dict[str, Path]) -> None:
     """Not for people who asked their system for stillness."""
-    opened = Opened(chromium, files["walk"], "#play").ready()
+    opened = Opened(chromium, files["walk"], "#autoplay").ready()
     browsers.wait_until(lambda: opened.time > 0.1, "the robot to move")
     opened.check()
-    still = Opened(chromium, files["walk"], "#play", reduced_motion="reduce").ready()
+    still = Opened(chromium, files["walk"], "#autoplay", reduced_motion="reduce").ready()
     still.page.wait_for_timeout(150)
     assert still.time == 0.0
     still.check()
+
+
+def test_a_page_in_a_frame_leaves_the_page_around_it_at_its_top(
+    chromium: Any, files: dict[str, Path]
+) -> None:
+    """What stands behind # in an address must be no element's name: browsers scroll to those."""
+    around = files["walk"].with_name("around.html")
+    frame = '<iframe src="walk.html#autoplay" style="width:80%;height:700px"></iframe>'
+    around.write_text(f'<p style="height:600px">Above.</p>{frame}', encoding="utf-8")
+    opened = Opened(chromium, around)
+    inside = opened.page.frame_locator("iframe")
+    inside.locator("#play[aria-pressed=true]").wait_for()
+    assert opened.page.evaluate("scrollY") == 0
+    opened.check()
 
 
 def test_mouse(chromium: Any, files: dict[str, Path]) -> None:

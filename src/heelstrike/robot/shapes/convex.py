@@ -78,6 +78,43 @@ def touches_first(points: Floats, radius: Floats) -> NDArray[np.bool_]:
     return np.any(depth >= depth.max(axis=0) - LEVEL, axis=1)
 
 
+def nearest_points(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Points of two convex polygons (m, 2) and (n, 2) that are nearest each other.
+
+    One point twice where they touch. A polygon may be a line or a point.
+    """
+    if not _apart(a, b):
+        return a[0], a[0]
+    on_b, far_b = _nearest_on(b, a)
+    on_a, far_a = _nearest_on(a, b)
+    if far_b.min() <= far_a.min():
+        return a[far_b.argmin()], on_b[far_b.argmin()]
+    return on_a[far_a.argmin()], b[far_a.argmin()]
+
+
+def _apart(a: Floats, b: Floats) -> bool:
+    """Whether a line separates two convex polygons: along an edge of one, or across from it."""
+    edges = np.concatenate([np.roll(each, -1, axis=0) - each for each in (a, b)])
+    across = np.column_stack((-edges[:, 1], edges[:, 0]))
+    axes = np.concatenate((across, edges, [b.mean(axis=0) - a.mean(axis=0)]))
+    ours, theirs = a @ axes.T, b @ axes.T
+    gap = np.maximum(ours.min(axis=0) - theirs.max(axis=0), theirs.min(axis=0) - ours.max(axis=0))
+    return bool(np.any(gap > FLAT * np.hypot(*axes.T)))
+
+
+def _nearest_on(polygon: Floats, points: Floats) -> tuple[Floats, Floats]:
+    """Points (m, 2) of a polygon's rim nearest to points (m, 2) outside, and how far they are."""
+    edge = np.roll(polygon, -1, axis=0) - polygon
+    away = points[:, None] - polygon
+    length = np.einsum("ni,ni->n", edge, edge)
+    share = np.einsum("mni,ni->mn", away, edge) / np.where(length > 0.0, length, 1.0)
+    places = polygon + np.clip(share, 0.0, 1.0)[..., None] * edge
+    far = np.hypot(*np.moveaxis(points[:, None] - places, -1, 0))
+    rows = np.arange(len(points))
+    best = far.argmin(axis=1)
+    return places[rows, best], far[rows, best]
+
+
 def _outwards(chain: Floats, least: float) -> Floats:
     """Corners of a chain that rises from its first, up to the steepest, the outstanding ones."""
     steps = np.diff(chain, axis=0)

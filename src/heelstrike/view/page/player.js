@@ -265,7 +265,7 @@
   addEventListener("scroll", () => { if (!state.playing) drawPlots(); }, { passive: true });
   all();
   // For pages that show this one in a frame; not for people who asked their system for stillness.
-  if (location.hash === "#play" && !matchMedia("(prefers-reduced-motion: reduce)").matches)
+  if (location.hash === "#autoplay" && !matchMedia("(prefers-reduced-motion: reduce)").matches)
     play(true);
   document.documentElement.dataset.ready = "yes"; // for those who wait for the first picture
 })();

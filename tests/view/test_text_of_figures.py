@@ -1,0 +1,56 @@
+"""All that is written on the figures can be read."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import walking
+from figure_text import check_text
+from matplotlib.figure import Figure
+from synthetic_runs import make_run, pushes
+
+import heelstrike as hs
+from heelstrike.robot import builtin_robots
+from heelstrike.sim.run import QUANTITIES
+from heelstrike.view import FIGURES, drawing, plot, robot_picture
+
+
+@pytest.mark.parametrize("what", FIGURES)
+def test_figures_of_a_walk(what: str) -> None:
+    words = check_text(plot(walking.walk(steps=4), what, gait=walking.gait()))
+    assert any(word.startswith("bravo7: ") for word in words)
+
+
+@pytest.mark.parametrize("what", FIGURES)
+def test_figures_of_a_fall(what: str) -> None:
+    robot = walking.bravo7()
+    state = hs.State(robot.model.reference, np.full(robot.nv, 0.4))
+    check_text(plot(hs.simulate(robot, state=state, duration=3.0), what))
+
+
+@pytest.mark.parametrize("what", ["zmp", "friction", "forces", "gaps", "energy", "snapshots"])
+def test_figures_of_a_walker_on_points(what: str) -> None:
+    robot = hs.load_robot("compass_gait")
+    run = make_run(robot, [0.0, 0.1], force=pushes(robot, [[0], [0]]))
+    check_text(plot(run, what), names=True)
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_recorded_quantities(name: str) -> None:
+    run = walking.walk(steps=1)
+    if getattr(run, name).size:
+        check_text(plot(run, name))
+
+
+@pytest.mark.parametrize("name", builtin_robots())
+def test_portraits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Figure] = []
+    monkeypatch.setattr(drawing, "save_figure", lambda figure, path: drawn.append(figure))
+    options: dict[str, Any] = {}
+    robot = hs.load_robot(name)
+    if name == "bravo7":
+        options["pushes"] = [hs.Push("trunk", force=(120.0, 0.0), start=0.3, duration=0.1)]
+    robot_picture(robot, "portrait.png", **options)
+    check_text(drawn[0], names=True)
