@@ -84,6 +84,7 @@ def note_events(
     do not touch down, and joints that rest at a stop do not reach it. Joints with dry friction come
     to rest, or begin to move.
     """
+    first = record.events
     for contact in range(model.contact_link.shape[0]):
         note_events_of_contact(model, time, end, step, contact, memory, record)
     for joint in range(model.parent.shape[0]):
@@ -99,6 +100,8 @@ def note_events(
         if rests != (memory.reported.resting[dry] == 1):
             log_event(end, JOINT_STICK if rests else JOINT_SLIP, joint, 0.0, 0.0, record)
             memory.reported.resting[dry] = 1 if rests else 0
+    if record.events > first + 1:
+        order_events(first, record)
 
 
 @kernel

@@ -421,14 +421,14 @@ def solve_restitution(
 
 @kernel
 def note_gain(
-    model: Model, end: float, step: float, impact: Impact, memory: Memory, record: Record
+    model: Model, time: float, step: float, impact: Impact, memory: Memory, record: Record
 ) -> None:
     """Tell of energy that restitution made, by the contact point with the largest impulse."""
     force = memory.contacts.force
     hardest = 0
     for contact in range(model.nc):
         hardest = contact if force[contact, 0] > force[hardest, 0] else hardest
-    note_event(end, ENERGY_GAIN, hardest, step, force, record)
+    note_event(time + step, ENERGY_GAIN, hardest, step, force, record)
     memory.tally.energy_gain += impact.gain
 
 

@@ -82,12 +82,7 @@ from heelstrike.sim.memory import Assembly, Equations, Memory, UsualPoints
 from heelstrike.sim.method import Method, solver_order
 from heelstrike.sim.push import add_pushes, share_over_step
 from heelstrike.sim.record.record import Record
-from heelstrike.sim.record.recording import (
-    note_events,
-    note_extremes,
-    note_row_when_due,
-    order_events,
-)
+from heelstrike.sim.record.recording import note_events, note_extremes, note_row_when_due
 from heelstrike.sim.setting import Setting
 from heelstrike.sim.time_stepping.corners import Corner, join_forces, locate_corners
 from heelstrike.sim.time_stepping.doubts import SimulationWarning, too_light, too_stiff
@@ -971,9 +966,7 @@ def decide(
     )
     note_brakes(model, clock.time, work.step, record, memory.loops)
     if work.impact.gains == 1:
-        note_gain(model, end, work.step, work.impact, memory, record)
-    if record.events > first + 1:
-        order_events(first, record)
+        note_gain(model, clock.time, work.step, work.impact, memory, record)
     return DONE if solved else SOLVER_FAILED
 
 

@@ -290,6 +290,8 @@ def _without_a_change(fall: Fall, gait: Gait | None) -> str:
     if fall.cause is Cause.CONTROLLER:
         at = f" of the {in_words(fall.where)}" if fall.where else ""
         return f"mend the sign, the gain or the number{at} in the controller."
+    if fall.cause is Cause.NUMERICAL:
+        return "another method, as hs.TimeStepping(step=1e-4): this one found no way on."
     if gait is None:
         return (
             "no gait is known here: if it follows one, a report that has it (gait=, or gait.json "
@@ -301,4 +303,6 @@ def _without_a_change(fall: Fall, gait: Gait | None) -> str:
             "hs.VirtualConstraints, or by hs.SteppingConstraints, which steps where balance needs "
             "it."
         )
+    if fall.cause is Cause.UNKNOWN:
+        return "nothing is known that would help."
     return "a controller that steps to catch it; the one it had was at its end."
