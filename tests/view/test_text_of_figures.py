@@ -15,6 +15,7 @@ import heelstrike as hs
 from heelstrike.robot import builtin_robots
 from heelstrike.sim.run import QUANTITIES
 from heelstrike.view import FIGURES, drawing, plot, robot_picture
+from heelstrike.view.style import label_powers, new_figure
 
 
 @pytest.mark.parametrize("what", FIGURES)
@@ -54,3 +55,16 @@ def test_portraits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         options["pushes"] = [hs.Push("trunk", force=(120.0, 0.0), start=0.3, duration=0.1)]
     robot_picture(robot, "portrait.png", **options)
     check_text(drawn[0], names=True)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "expected"),
+    [(1e-7, 1e3, "10⁻³"), (1e-2, 1e3, "1"), (1.5e-4, 6e-4, "2×10⁻⁴"), (1e5, 1e6, "10⁵")],
+)
+def test_ticks_of_logarithmic_axes(low: float, high: float, expected: str) -> None:
+    figure = new_figure(4.0, 3.0)
+    axes = figure.add_subplot()
+    axes.semilogy([0.0, 1.0], [low, high])
+    axes.set(xlabel="time (s)", ylabel="energy (J)")
+    label_powers(axes.yaxis)
+    assert expected in check_text(figure)

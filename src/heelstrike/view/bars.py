@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 THICKNESS = 0.25
 """Radius of a bar as a share of the narrow side of the slimmest shape that it leads to."""
 THINNEST = 0.01
-"""The same, of the size of the larger of the two."""
+"""The least radius, as a share of the length of the longest."""
 
 
 def bars(robot: Robot) -> tuple[Outline, ...]:
@@ -33,10 +33,10 @@ def bars(robot: Robot) -> tuple[Outline, ...]:
         rims = [outline.rim() for outline in robot.outlines if outline.link == link]
         nodes = rims + [place[None] for place in _joints(robot, link, reference)]
         for a, b, start, end in shortest(nodes):
-            sides = np.array([_sides(nodes[i]) for i in (a, b) if len(nodes[i]) > 1])
-            if len(sides):
-                radius = max(THICKNESS * sides[:, 0].min(), THINNEST * sides[:, 1].max())
-                found.append(Outline(link, np.array([start, end]), float(radius)))
+            shapes = [nodes[i] for i in (a, b) if i < len(rims)] or rims
+            narrow, wide = np.transpose([_sides(shape) for shape in shapes])
+            radius = max(THICKNESS * narrow.min(), THINNEST * wide.max())
+            found.append(Outline(link, np.array([start, end]), float(radius)))
     return tuple(found)
 
 

@@ -122,8 +122,9 @@ class PowersOfTen(LogFormatter):
 
     def __call__(self, x: float, pos: int | None = None) -> str:
         """Word of the tick at x; none of one between powers, unless there are few of these."""
-        if not super().__call__(x, pos):
-            return ""
+        word = super().__call__(x, pos)
+        if not word or x <= 0.0:
+            return word
         exponent = int(np.floor(np.log10(x) + 1e-9))
         if exponent in (0, 1):
             return f"{x:.3g}"
