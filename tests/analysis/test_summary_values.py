@@ -126,6 +126,7 @@ def test_every_figure_by_hand() -> None:
         "wall_s": 0.2,
         "real_time_factor": 2.0,
         "energy_gain_J": 0.75,
+        "doubt": "",
     }
     found = summarize(carried(), gait=standing_still()).to_dict()
     assert found.keys() == expected.keys()

@@ -260,6 +260,7 @@ def test_wrong_input(options: list[str], said: str, tmp_path: Path) -> None:
     assert said in " ".join(result.stderr.replace("│", " ").split())
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
+    assert "still in memory" not in result.stderr  # there is no run yet
     assert not (tmp_path / "out" / "run.nc").exists()
 
 

@@ -84,6 +84,8 @@ class Summary:
         Worst values over all steps, from the certificates; the latter is relative.
     energy_gain_J : float
         Kinetic energy that restitution with friction made in impacts.
+    doubt : str
+        Why the run may mean little though it was completed; nothing if nothing is known.
     solver : SolverCount
         How the contact problems were solved.
     torque_cost_N2m2s : float
@@ -128,6 +130,7 @@ class Summary:
     wall_s: float
     real_time_factor: float
     energy_gain_J: float = 0.0  # noqa: N815 - units keep their capitals
+    doubt: str = ""
 
     @property
     def speed(self) -> float:
@@ -230,6 +233,7 @@ def summarize(run: Run, *, gait: Gait | None = None) -> Summary:
         penetration_max_m=run.certificates.penetration,
         complementarity_max=run.certificates.complementarity,
         energy_gain_J=run.certificates.energy_gain,
+        doubt=run.doubt,
         solver=run.solver,
         torque_cost_N2m2s=torque_cost(run),
         cost_of_transport=transport.absolute,
@@ -266,6 +270,7 @@ class _Words(string.Formatter):
 LINES = {
     "status": "{s.status}",
     "first cause": "{s.first_cause}",
+    "doubt": "{s.doubt}",
     "steps": "{s.steps}",
     "distance": "{s.distance_m:.4} m in {s.duration_s:.4} s ({s.speed:.3} m/s)",
     "gait": "{s.gait.step_length_m:.3} m in {s.gait.step_duration_s:.3} s a step, "
@@ -297,4 +302,5 @@ def lines(s: Summary) -> list[tuple[str, str]]:
         if (s.gait is not None or label not in OF_A_GAIT)
         and (s.energy_gain_J > 0.0 or label != OF_A_GAIN)
         and (s.first_cause or label != "first cause")
+        and (s.doubt or label != "doubt")
     ]

@@ -14,6 +14,7 @@ from synthetic_runs import box, make_run, pendulum
 import heelstrike as hs
 from heelstrike.analysis import first_cause
 from heelstrike.analysis.diagnosis.symptoms import Cause, Walk, find_symptoms
+from heelstrike.experiments.laws import law_called
 from heelstrike.sim import RunStatus
 
 
@@ -57,7 +58,9 @@ def test_walks_that_go_well_have_none() -> None:
     gait = walking.gait()
     assert first_cause(walking.walk(steps=10), gait) is None
     assert find_symptoms(Walk(walking.walk(steps=10), gait)) == ()
-    climbing = falls.walk(ground=falls.profile((101.0, 10.0)), law=hs.FootstepFeedback).run()
+    climbing = falls.walk(
+        ground=falls.profile((101.0, 10.0)), law=law_called("FootstepFeedback")
+    ).run()
     assert climbing.completed
     assert first_cause(climbing, gait) is None
     assert climbing.summary(gait=gait).first_cause == ""
@@ -73,7 +76,9 @@ def test_walks_that_go_well_have_none() -> None:
 
 def test_what_a_robot_recovers_from_is_no_cause() -> None:
     """It stumbles over a bar, walks on, and is stopped by its controller four steps later."""
-    caught = dataclasses.replace(falls.KNOWN["bar"].case(), law=hs.FootstepFeedback).run()
+    caught = dataclasses.replace(
+        falls.KNOWN["bar"].case(), law=law_called("FootstepFeedback")
+    ).run()
     assert caught.completed
     symptoms = find_symptoms(Walk(caught, walking.gait()))
     assert Cause.SCUFFED in {each.cause for each in symptoms}

@@ -103,6 +103,7 @@ def test_a_step_that_ends_deep_in_the_ground_is_no_good_run() -> None:
     assert run.completed
     assert run.certificates.penetration > 1e-2
     assert "m in the ground" in run.doubt
+    assert run.doubt in " ".join(str(run.summary()).split())
     assert not judge(run).good
     sunk = dataclasses.replace(run, gap=np.full_like(run.gap, -run.certificates.penetration))
     assert not sunk.doubt

@@ -108,6 +108,12 @@ def test_the_simulation_goes_on_as_by_itself() -> None:
     assert np.diff(kept).max() < 1.5 / 60.0 + 2e-3
     assert {event[1] for event in shown._events} == {EventKind.TOUCHDOWN, EventKind.LIFTOFF}
     assert shown.told["light"]["level"] == "good"
+    ask(session, "play", on=False)
+    for _ in range(2):  # what is halted is told as it is, and so is what begins anew
+        newest = session.history.newest
+        assert newest is not None
+        assert shown.told["light"]["text"].startswith(f"{newest.solver.solves} contact problems")
+        ask(session, "reset")
 
 
 @pytest.mark.parametrize("rate", [0.1, 8.0])

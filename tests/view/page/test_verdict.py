@@ -93,7 +93,21 @@ def test_a_fall_names_what_came_first() -> None:
     assert all(limit.time <= verdict.fall.time for limit in verdict.limits)
     assert "torque of right hip" not in {v.name for v in verdict.limits if v.reached < math.inf}
     without = judge(falls.run_of("pushed forwards"))
-    assert "its gait is not known here" in without.headline
+    assert "no gait is known here" in without.headline
+
+
+def test_a_controller_that_ends_its_run_in_order_made_nothing_fall() -> None:
+    message = "the controller ended the run at t = 0.1 s: seen enough"
+    run = make_run(walking.bravo7(), [0.0, 0.1], status=RunStatus.STOPPED, message=message)
+    verdict = judge(run)
+    assert verdict.fall is None
+    assert verdict.advice == ()
+    assert not verdict.good  # it did not last as long as it was asked to
+    assert verdict.headline.startswith(f"bravo7 does not go on after 0 steps, 0 m: {message}.")
+    assert "First cause" not in verdict.headline
+    assert run.summary().first_cause == ""
+    fell = dataclasses.replace(falls.run_of("pushed forwards"), status=RunStatus.STOPPED)
+    assert judge(fell, walking.gait()).fall is not None
 
 
 def test_a_walk_without_reserve_is_told_so() -> None:
@@ -148,3 +162,18 @@ def test_runs_without_rows_or_numbers_are_judged_too() -> None:
     assert "did not begin" in judge(make_run(pendulum(), [])).headline
     run = make_run(pendulum(), [0.0, 0.1], torque=[[np.nan], [np.nan]], status=RunStatus.DIVERGED)
     assert "a time step of 0.01 s" in judge(run).headline
+
+
+def test_what_no_step_mends_is_told_so() -> None:
+    def ended(status: RunStatus) -> hs.Run:
+        return make_run(
+            walking.bravo7(), [0.0, 1e-3], position=walking.gait().initial_state.q, status=status,
+            method=hs.EventDriven(),
+        )  # fmt: skip
+
+    failed = ended(RunStatus.SOLVER_FAILED)
+    assert judge(failed).advice == judge(failed, walking.gait()).advice
+    assert judge(failed).advice[0].startswith("another method, as hs.TimeStepping(step=1e-4)")
+    assert judge(ended(RunStatus.FELL), walking.gait()).advice == (
+        "nothing is known that would help.",
+    )

@@ -81,7 +81,8 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     Returns
     -------
     Fall or None
-        Nothing if the run lasted as long as it was asked to and the robot is still up.
+        Nothing if the run lasted as long as it was asked to and the robot is still up, or its
+        controller ended it while nothing went wrong.
 
     Raises
     ------
@@ -98,7 +99,7 @@ def first_cause(run: Run, gait: Gait | None = None) -> Fall | None:
     if gait is None and any(each.cause is not Cause.JOINT_STOP for each in found):
         found = tuple(each for each in found if each.cause is not Cause.JOINT_STOP)
     chain = _unrecovered(found, end, RECOVERED * walk.step_duration)
-    if not chain and run.completed:  # it squats
+    if not chain and run.status in (RunStatus.COMPLETED, RunStatus.STOPPED):  # squats; is done
         return None
     if not chain:
         chain = [Symptom(Cause.UNKNOWN, end, end)]

@@ -61,7 +61,11 @@ def save(run: Run, path: str | os.PathLike[str]) -> Path:
         the method is one that could not be read again. The run is as it was, and so is an older
         file.
     """
-    if check_run_file(path) == TABLE:
+    try:
+        ending = check_run_file(path)
+    except RunFileError as error:
+        raise RunFileError(f"{error}; {KEPT}") from error
+    if ending == TABLE:
         return _written(path, to_csv(run))
     if reason := unreadable(run.method):
         raise RunFileError(
@@ -102,7 +106,7 @@ def check_run_file(path: str | os.PathLike[str], *endings: str) -> str:
     try:
         check_target(path)
     except WriteError as error:
-        raise RunFileError(f"{error}; {KEPT}") from error
+        raise RunFileError(str(error)) from error
     ending = Path(path).suffix.lower()
     if ending not in (endings or ENDINGS):
         known = " or ".join(f"{each} ({ENDINGS[each]})" for each in endings or ENDINGS)

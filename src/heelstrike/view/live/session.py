@@ -529,9 +529,10 @@ class Session:
         )
 
     def _lit(self) -> dict[str, str]:
-        """Return the light, whose words change twice a second at most."""
+        """Return the light, whose words change twice a second at most while time goes on."""
         light, now = light_of(self.history.newest), clock_time.perf_counter()
-        if light["level"] != self._light["level"] or now > self._light_until:
+        waits = self.playing and light["level"] == self._light["level"]
+        if not waits or now > self._light_until:
             self._light, self._light_until = light, now + WORDS_LAST
         return self._light
 

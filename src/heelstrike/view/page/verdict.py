@@ -113,6 +113,8 @@ def _does(run: Run, fall: Fall | None) -> str:
         return f"{name} takes no step in {last:.3g} s."
     if run.status is RunStatus.FELL:
         return f"{name} falls at {last:.3g} s, after {went}."
+    if run.status is RunStatus.STOPPED:
+        return f"{name} does not go on after {went}: {run.message}."
     return f"{name} does not get to the end ({run.message}), after {went}."
 
 
@@ -288,10 +290,12 @@ def _without_a_change(fall: Fall, gait: Gait | None) -> str:
     if fall.cause is Cause.CONTROLLER:
         at = f" of the {in_words(fall.where)}" if fall.where else ""
         return f"mend the sign, the gain or the number{at} in the controller."
+    if fall.cause is Cause.NUMERICAL:
+        return "another method, as hs.TimeStepping(step=1e-4): this one found no way on."
     if gait is None:
         return (
-            "its gait is not known here: with it (gait=, or gait.json beside the run) a report "
-            "says more."
+            "no gait is known here: if it follows one, a report that has it (gait=, or gait.json "
+            "beside the run) says more."
         )
     if gait.point_feet:
         return (
@@ -299,4 +303,6 @@ def _without_a_change(fall: Fall, gait: Gait | None) -> str:
             "hs.VirtualConstraints, or by hs.SteppingConstraints, which steps where balance needs "
             "it."
         )
+    if fall.cause is Cause.UNKNOWN:
+        return "nothing is known that would help."
     return "a controller that steps to catch it; the one it had was at its end."

@@ -317,6 +317,8 @@ def _advice(verdicts: Mapping[str, Verdict]) -> Iterator[str]:
         items = "".join(f"<li>{escaped(each)}</li>" for each in verdict.advice)
         nothing = (
             "<p>Nothing has to change for this walk. What it withstands beyond it is below.</p>"
+            if verdict.good
+            else "<p>Nothing is known that would have to change.</p>"
         )
         yield label + (f"<ol>{items}</ol>" if items else nothing)
 
