@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import tempfile
 
 # Matplotlib reads this when it is imported; processes that tests start inherit it.
@@ -33,6 +34,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as of what a shell starts behind it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     size = config.getoption("perturb_gaits")
     if size:
         from perturbed_gaits import perturb_gaits

@@ -70,7 +70,8 @@ def _is_several(value: object) -> bool:
 
 
 def _are_items(value: object) -> bool:
-    return isinstance(value, Iterable) and not isinstance(value, bytes)  # one name, too
+    one = isinstance(value, str) or _is_whole(value)  # one name or index, too
+    return one or (isinstance(value, Iterable) and not isinstance(value, bytes))
 
 
 _KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {

@@ -197,7 +197,7 @@ HELPED = """
 import sys
 from heelstrike.control.computed_torque import computed_torque
 computed_torque.begin()
-print(computed_torque._separate._helper.pid, flush=True)
+print(computed_torque.separate._helper.pid, flush=True)
 raise KeyboardInterrupt
 """
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-import falls
+import built_falls as falls
 import pytest
 import walking
 from synthetic_runs import make_run, pendulum

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import walking
 from mechanisms import four_bar, geared, parallel_ankles
 
 import heelstrike as hs
 from heelstrike import dynamics
-from heelstrike.gait.gait import fingerprint
+from heelstrike.gait.gait import actuated_joints, fingerprint
 from heelstrike.robot import Robot, RobotBuilder, inspect_robot
 from heelstrike.robot.inspection import facts
 
@@ -149,5 +151,7 @@ def test_an_inspection_tells_of_them() -> None:
 
 def test_what_knows_trees_only_says_so() -> None:
     words = "has loop right_rod-right_ankle, loop left_rod-left_ankle"
+    robot = parallel_ankles()
+    gait = replace(walking.gait(), robot=robot.name, joint_names=actuated_joints(robot))
     with pytest.raises(hs.ControllerError, match=f"whole-body control knows robots .* {words}"):
-        hs.WholeBody(parallel_ankles(), None)  # type: ignore[arg-type]
+        hs.WholeBody(robot, gait)

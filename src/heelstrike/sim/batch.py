@@ -168,7 +168,7 @@ def simulate_batch(
     robot: Robot | Sequence[Robot],
     controller: Controller | Sequence[Controller] | None = None,
     *,
-    state: State | Sequence[State],
+    state: State | Snapshot | Sequence[State],
     duration: ArrayLike,
     parameters: Bundle | Sequence[Bundle] | Mapping[str, ArrayLike] | None = None,
     pushes: Push | Sequence[Push] | Sequence[Sequence[Push]] = (),
@@ -355,7 +355,7 @@ def _listed(value: Any) -> Sequence[Any]:
     return value if isinstance(value, Sequence) else [value]
 
 
-def _states(state: State | Sequence[State]) -> Sequence[State]:
+def _states(state: State | Snapshot | Sequence[State]) -> Sequence[State]:
     if any(isinstance(each, Snapshot) for each in _listed(state)):
         raise SimulationError(
             "a batch begins anew, from states: simulate(state=snapshot) goes on where a snapshot "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-import falls
+import built_falls as falls
 import numpy as np
 import pytest
 import walking

@@ -214,7 +214,9 @@ def test_many_spatial_joints_are_counted_not_listed() -> None:
 
 
 def test_a_robot_in_another_plane_is_told_to_turn() -> None:
-    with pytest.raises(RobotError, match="parallel: turn the robot"):
+    with pytest.raises(RobotError, match=r"parallel: turn the robot .* by -30 degrees about z"):
+        read_mjcf(one_body('<joint name="a" axis="-0.5 0.866025403784 0"/>'))
+    with pytest.raises(RobotError, match="None of its joints turns about a level axis"):
         read_mjcf(one_body('<joint name="a" axis="0 0 1"/>'))
 
 

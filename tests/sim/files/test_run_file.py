@@ -391,7 +391,7 @@ HOSTILE = {
     "half a step": (_attribute("steps", 2.5), "'steps' is 2.5, not a count"),
     "NaN time step": (_attribute("method_step", np.nan), "'method_step' is NaN"),
     "no law": (_attribute("method_law", "none"), "must be HuntCrossley"),
-    "no step": (_attribute("method_step", "none"), "settings of method do not fit"),
+    "no step": (_attribute("method_step", "none"), "damaged: step must be a number, got None"),
     "a method for a law": (_attribute("method_law", "EventDriven"), "must be HuntCrossley"),
     "no name of a method": (_attribute("method", "x " * 9999), "the method is called 'x x"),
     "layout as text": (_attribute("heelstrike_format", "one"), "is not a number"),

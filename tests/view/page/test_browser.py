@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import falls
+import built_falls as falls
 import numpy as np
 import pytest
 import walking

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import re
 
-import falls
+import built_falls as falls
 import numpy as np
 import pytest
 import walking

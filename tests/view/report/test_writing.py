@@ -7,7 +7,7 @@ import json
 import re
 from pathlib import Path
 
-import falls
+import built_falls as falls
 import pytest
 import walking
 from synthetic_runs import box, make_run, pendulum

@@ -34,7 +34,8 @@ def stiffest(robot: Robot, q: Floats, step: float) -> tuple[float, str]:
     """
     model = robot.model
     pull = 0.25 * step**2 * model.stiffness + 0.5 * step * model.damping
-    if not np.any(pull > model.armature):  # A is more than what motors and reductions add to it
+    # A is more than what motors and reductions add to it.
+    if not np.any(pull > model.armature) or not np.all(np.isfinite(q)):
         return 0.0, ""
     value, mode = np.linalg.eig(np.linalg.solve(mass_matrix(robot, q), np.diag(pull)))
     worst = int(np.argmax(value.real))
@@ -60,7 +61,7 @@ def too_stiff(robot: Robot, q: Floats, step: float) -> str:
 def too_light(robot: Robot, q: Floats) -> str:
     """Say which link turns too easily under contact forces, and what to do about it."""
     model = robot.model
-    if not robot.nc:
+    if not robot.nc or not np.all(np.isfinite(q)):
         return ""
     jacobian = contact_jacobian(robot, q).reshape(-1, robot.nv)
     moved = np.linalg.lstsq(mass_matrix(robot, q), jacobian.T, rcond=None)[0]
@@ -71,8 +72,9 @@ def too_light(robot: Robot, q: Floats) -> str:
     link = model.contact_link[worst // 2]
     name, inertia = robot.link_names[link], model.inertia[link]
     enough = inertia * ease[worst] / (0.1 * EASIEST)
+    cure = f"an inertia of {enough:.2g} kg m²" if enough > 0.0 else "some inertia"
     return (
         f"link {name!r} has so little inertia ({inertia:.3g} kg m²) that a contact point on it is "
         f"{ease[worst]:.1g} times easier to move than the robot: contact impulses lose as many "
-        f"digits, and may not be certified. Use EventDriven(), or an inertia of {enough:.2g} kg m²"
+        f"digits, and may not be certified. Use EventDriven(), or {cure}"
     )
