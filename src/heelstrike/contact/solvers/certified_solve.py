@@ -193,10 +193,12 @@ def seek(
         worst = evaluate(problem, work)
         if solver == COMBINATIONS:
             note_residual(problem.count, worst, work.trial.mode, work.combinations)
-        if worst < best:
+        # What a guess came to and was not believed for gives way, even if its residual is less.
+        certified = solver != WARM_START and settings.patient == 0 and worst <= settings.tolerance
+        if worst < best or certified:
             best = worst
             keep(problem.count, work.trial, answer)
-        if solver != WARM_START and settings.patient == 0 and best <= settings.tolerance:
+        if certified:
             return SOLVED, best
         if is_clean(problem.count, worst, settings, work.yardstick):
             return SOLVED, best
