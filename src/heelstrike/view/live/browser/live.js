@@ -197,7 +197,7 @@
     at("time").setAttribute("aria-valuetext", told);
   }
 
-  let turn = 0, looked = 0, was = null;
+  let turn = 0, looked = 0, was = null, due = true;
   function show(now) {
     requestAnimationFrame(show);
     if (wanted !== null && now - asked > ASKED_EVERY) {
@@ -214,6 +214,7 @@
     showTime(vector[0]);
     const thorough = now - looked > READ_FOR || !playing || was !== playing;
     if (thorough) {
+      due = true; // until a turn of the strip comes
       looked = now;
       was = playing;
       curves.scale();
@@ -221,7 +222,8 @@
     }
     if (turn++ % 4 === 0 || !playing) { // curves need not be as smooth as the robot
       curves.draw(vector);
-      strip.draw(vector, { thorough });
+      strip.draw(vector, { thorough: due });
+      due = false;
     } else dirty = true;
     sharing.paint();
   }
