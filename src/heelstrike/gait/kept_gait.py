@@ -11,7 +11,7 @@ import os
 from contextlib import suppress
 from dataclasses import fields
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +111,11 @@ def _plain(value: object) -> object:
 @cache
 def _program() -> bytes:
     """Digest of the program that designs gaits: its text, and what solves for it."""
-    digest = hashlib.sha256(f"{version('casadi')} {version('numpy')}".encode())
+    try:
+        solver = version("casadi")  # which is not imported for it: that takes longer than the rest
+    except PackageNotFoundError:  # installed without a word about itself
+        solver = "of unknown version"
+    digest = hashlib.sha256(f"{solver} {np.__version__}".encode())
     package = Path(__file__).parent.parent
     for room in _ROOMS:
         for file in sorted((package / room).rglob("*.py")):

@@ -11,7 +11,7 @@ from heelstrike.analysis.summary import lines, summarize
 from heelstrike.analysis.support import support_phases
 from heelstrike.analysis.zero_moment_point import zero_moment_point
 from heelstrike.arguments import takes
-from heelstrike.errors import GaitError, ViewError
+from heelstrike.errors import ViewError
 from heelstrike.sim.run import Event, Run
 from heelstrike.view.page.columns import TOLERANCE, packed
 from heelstrike.view.page.curves import plots
@@ -97,7 +97,6 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     """Write the page of a run; see :func:`save_html`."""
     if not len(run.time):
         raise ViewError(f"there is nothing to show: the run has no rows ({run.message})")
-    check_gait(gait)
     summary = summarize(run, gait=gait)
     title = f"{run.robot.name}: {run.message}"
     body = shipped("player.html")
@@ -113,20 +112,6 @@ def page(run: Run, gait: Gait | None = None, *, command: str = "") -> str:
     body += data_block("run", contents(run, gait))
     script = "".join(map(shipped, ("drawing.js", "recording.js", "player.js")))
     return document(title, body, style=shipped("page.css"), script=script)
-
-
-def check_gait(gait: object) -> None:
-    """Refuse what is no gait, such as the name of its file.
-
-    Raises
-    ------
-    GaitError
-        That says what it is.
-    """
-    from heelstrike.gait.gait import Gait
-
-    if gait is not None and not isinstance(gait, Gait):
-        raise GaitError(f"gait must be a Gait, got {gait!r}; load_gait reads one from its file")
 
 
 def certificates(run: Run) -> dict[str, str]:

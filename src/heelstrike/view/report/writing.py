@@ -24,7 +24,7 @@ from heelstrike.sim.push import Push
 from heelstrike.sim.run import Run
 from heelstrike.view.figures import FIGURES, plot
 from heelstrike.view.page.markup import data_block, document, escaped, grid, shipped, table
-from heelstrike.view.page.page import certificates, check_gait, check_page, contents
+from heelstrike.view.page.page import certificates, check_page, contents
 from heelstrike.view.page.provenance import provenance
 from heelstrike.view.page.verdict import Verdict, judge, told
 from heelstrike.view.report.differences import differences
@@ -97,7 +97,6 @@ def report(
     """
     target = check_page(path)
     named = _named(runs)
-    check_gait(gait)
     for name, run in named.items():
         if not isinstance(run, Run):
             raise ViewError(f"a report is of runs, got {run!r}; load_run reads one from its file")
