@@ -262,7 +262,9 @@ WRITERS = {
 }
 # All once without a limit, which compiles what it needs.
 run.animate(folder / "film.gif", size=(64, 64), speed=0.1)
-could = {each.path.name for each in results.save_run(run, gait, animation=None) if not each.error}
+def all_of_a_run():
+    return {each.path.name: each.error for each in results.save_run(run, gait, animation=None)}
+could = {name for name, error in all_of_a_run().items() if not error}
 for name in WRITERS:
     (folder / name).write_text("old")
 answers = []
@@ -275,10 +277,9 @@ for limit in (100, 0):
             told[name] = ["written", ""]
         except Exception as error:
             told[name] = [type(error).__name__, str(error)]
-    walk = {
-        each.path.name: type(each.error).__name__
-        for each in results.save_run(run, gait, animation=None)
-        if each.path.name in could
+    # What a figure is drawn for comes to the same end at either limit.
+    walk = {} if limit else {
+        name: type(error).__name__ for name, error in all_of_a_run().items() if name in could
     }
     same = all(getattr(run, name).tobytes() == value for name, value in before.items())
     answers.append({"told": told, "walk": walk, "same": same})
@@ -321,11 +322,11 @@ def test_every_writer_beyond_a_quota(tmp_path: Path) -> None:
             assert (folder / name).read_text() == "old", name
             assert name == "film.mp4" or "File too large" in words
         assert "still in memory" in told["run.nc"][1]
-        walk = answer["walk"]
-        assert len(walk) > 5
-        assert walk.pop("run.nc") == "RunFileError"
-        assert walk.pop("summary.json") == "WriteError"
-        assert set(walk.values()) == {"ViewError"}
+    walk = json.loads(done.stdout)[-1]["walk"]
+    assert len(walk) > 5
+    assert walk.pop("run.nc") == "RunFileError"
+    assert walk.pop("summary.json") == "WriteError"
+    assert set(walk.values()) == {"ViewError"}
     assert not [name for name in names(folder) if ".part-" in name]
 
 

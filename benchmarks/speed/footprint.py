@@ -83,10 +83,10 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:  # noqa: AR
         walk_gait()[1].save(file)
         names = {"GAIT": repr(str(file))}
         result: dict[str, Any] = {
-            "import_s": _best(IMPORT, {}, 3 if quick else 7)["seconds"],
-            "warm_first_step_s": _best(FIRST_STEP, names, 2 if quick else 5)["seconds"],
+            "import_s": _best(IMPORT, {}, 1 if quick else 7)["seconds"],
+            "warm_first_step_s": _best(FIRST_STEP, names, 1 if quick else 5)["seconds"],
         }
-        short, long = (14.0, 70.0) if quick else (60.0, 600.0)
+        short, long = (7.0, 35.0) if quick else (60.0, 600.0)
         memory = _run(MEMORY, names | {"SHORT": repr(short), "LONG": repr(long)})
         memory |= {"short_s": short, "long_s": long}
         result["memory"] = memory

@@ -14,7 +14,7 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     """Time steps of 1 ms; returns one row a scenario."""
     engines = simulators(peers)
     part = "pinocchio" in peers
-    seconds = 0.5 if quick else 5.0 + len(engines) + part
+    seconds = 0.1 if quick else 5.0 + len(engines) + part
     rows = []
     for scenario, controller in contests():
         control = "none" if scenario.feedback is None else "springs, dampers"

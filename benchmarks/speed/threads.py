@@ -21,7 +21,7 @@ DURATION = 7.0
 
 def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
     """Time a batch of walks from slightly different states, by number of threads."""
-    count, duration = (64, 1.0) if quick else (1000, DURATION)
+    count, duration = (16, 1.0) if quick else (1000, DURATION)
     scenario, law = scenarios.walking(), scenarios.walking_law()
     rng = np.random.default_rng(0)
     v = scenario.state.v + 1e-3 * rng.standard_normal((count, scenario.robot.nv))
@@ -44,7 +44,7 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
             raise KeyboardInterrupt
         return seconds
 
-    rows = _rows(lambda threads: partial(walk, threads), seconds=0.5 if quick else 15.0)
+    rows = _rows(lambda threads: partial(walk, threads), seconds=0.1 if quick else 15.0)
     batch = last[1]
     steps = int(batch.steps.sum())
     result: dict[str, Any] = {
@@ -64,7 +64,7 @@ def measure(*, quick: bool, peers: Sequence[str]) -> dict[str, Any]:
             peer = MuJoCoPeer(scenario, STEP)
             number = 16 if quick else 200  # its states of every step would fill the memory
             starts = [State(state.q[i], state.v[i]) for i in range(number)]
-            rows = _rows(partial(peer.batch_work, starts), seconds=0.5 if quick else 10.0)
+            rows = _rows(partial(peer.batch_work, starts), seconds=0.1 if quick else 10.0)
             result["mujoco"] = _with_rates(rows, number * peer.steps)
         except Exception as error:  # of the peer must not lose what was measured
             result["mujoco_invalid"] = reason(error)

@@ -53,7 +53,8 @@ GAITS: dict[str, dict[str, Any]] = {
 def designed(robot: str, **request: Any) -> tuple[hs.Gait, tuple[float, ...]]:
     """Gait of a built-in robot, and the progress that was told meanwhile."""
     told: list[float] = []
-    gait = hs.optimize_gait(hs.load_robot(robot), **request, progress=told.append)
+    asked = {"starts": 1} | request  # what is asked here holds for any optimum
+    gait = hs.optimize_gait(hs.load_robot(robot), **asked, progress=told.append)
     return gait, tuple(told)
 
 
@@ -83,7 +84,7 @@ def walked(request: pytest.FixtureRequest) -> Walked:
 def test_no_worse_than_the_reference(
     bravo7: hs.Robot, length: float, duration: float, cost: float
 ) -> None:
-    gait, _ = designed("bravo7", step_length=length, step_duration=duration)
+    gait, _ = designed("bravo7", step_length=length, step_duration=duration, starts=3)
     assert gait.cost <= cost
     assert gait.clearance_profile is ClearanceProfile.PARABOLA
     # The reference's own clearance holds at its nodes: the profile is rounded off before them.
@@ -341,7 +342,7 @@ def test_infeasible_requests_name_the_constraints_in_conflict(
     bravo7: hs.Robot, request_: dict[str, Any], named: list[str]
 ) -> None:
     with pytest.raises(InfeasibleGaitError, match="violates") as caught:
-        hs.optimize_gait(bravo7, **request_)
+        hs.optimize_gait(bravo7, **request_, starts=1)
     message = str(caught.value)
     assert "bravo7" in message
     for name, value in request_.items():
