@@ -158,7 +158,11 @@ class _Account:
         if isinstance(value, types.ModuleType) and _root(value.__name__) not in _BY_VERSION:
             for name in names:
                 member = vars(value).get(name)
-                if name in vars(value) and name not in _WHERE and self._is_new((value.__name__, name), member):
+                if (
+                    name in vars(value)
+                    and name not in _WHERE
+                    and self._is_new((value.__name__, name), member)
+                ):
                     self._write(name)
                     self._add_named(member, names)
 
