@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cProfile
 import inspect
 import json
 import os
@@ -16,11 +17,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import config, float64, njit
 
 import heelstrike
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.compiler.fingerprint import fingerprint
+from heelstrike.compiler.private_numba import PrivateNumba
 
 PRINT = """
 import json
@@ -183,6 +185,14 @@ def test_an_edit_changes_what_it_must(copied: tuple[Path, dict[str, str]], case:
     assert {name for name in before if after[name] != before[name]} == expected
 
 
+def test_a_copy_of_the_package_elsewhere_finds_all_of_it(
+    copied: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    home, before = copied
+    shutil.copytree(home / "heelstrike", tmp_path / "heelstrike")
+    assert fingerprints(tmp_path) == before
+
+
 class Gait(Enum):
     WALK = 1.0
 
@@ -210,6 +220,27 @@ def with_default(x: float, y: float = 1.0) -> float:
 @kernel
 def outer(x: float) -> float:
     return inner(x) + TABLE[0] + PAIR[1] + KIND.WALK.value + with_default(x) + jitted(x)
+
+
+def test_a_profiler_that_sees_a_kernel_run_changes_nothing() -> None:
+    def three(x: float) -> float:
+        return x + 3.0
+
+    called = kernel(three)
+    before = fingerprint(called)
+    with cProfile.Profile():
+        called(1.0)
+    assert fingerprint(called) == before
+
+
+def test_what_is_computed_with_other_settings_lies_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+    def name() -> str:
+        cache = PrivateNumba().kept(with_default)._cache
+        return str(cache._name_and_key(float64(float64, float64))[0])
+
+    usual = name()
+    monkeypatch.setattr(config, "DEBUGINFO_DEFAULT", 1)
+    assert name() != usual
 
 
 class Other(Enum):

@@ -50,10 +50,11 @@ class DocumentedNumba:
 
     def made_of(self, function: Callable[..., Any]) -> str:
         """Return the fingerprint of a kernel and of what compiles it."""
-        settings = (str(getattr(config, name, None)) for name in _SETTINGS)
-        return fingerprint(
-            function, str(self._level()), *settings, *map(import_module, self.shaping)
-        )
+        return fingerprint(function, *self.settings(), *map(import_module, self.shaping))
+
+    def settings(self) -> list[str]:
+        """Return what Numba is set to: code for a profiler is beside that for others."""
+        return [str(self._level()), *(str(getattr(config, name, None)) for name in _SETTINGS)]
 
     def declare(self, kind: Any) -> None:
         """Have compiled code find the members and methods of a type of bundles.

@@ -11,6 +11,7 @@ from __future__ import annotations
 import enum
 import functools
 import hashlib
+import inspect
 import sys
 import types
 from collections.abc import Mapping
@@ -27,6 +28,9 @@ _BY_VERSION = {"numpy", "numba", "llvmlite"} | sys.stdlib_module_names
 _VERSIONS = (sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__)
 _PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 _METHOD = (types.FunctionType, classmethod, staticmethod)
+_WHERE = {"__file__", "__path__", "__cached__"}  # a package may lie anywhere
+# The other flags say nothing that bytecode does not; Numba clears some of what a profiler sees run.
+_CALLED_WITH = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR
 _HAS_DOCSTRING = 0x4000000  # since Python 3.13
 
 
@@ -136,7 +140,7 @@ class _Account:
         self._write(
             code.co_name, code.co_code, code.co_names, code.co_varnames, code.co_freevars,
             code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount,
-            code.co_flags & ~_HAS_DOCSTRING, code.co_exceptiontable,
+            code.co_flags & _CALLED_WITH, code.co_exceptiontable,
         )  # fmt: skip
         for constant in code.co_consts[_begins_with_docstring(code) :]:
             if isinstance(constant, types.CodeType):
@@ -144,7 +148,7 @@ class _Account:
             else:
                 self.add(constant)
         for name in code.co_names:
-            if name in scope:
+            if name in scope and name not in _WHERE:
                 self._write(name)
                 self._add_named(scope[name], code.co_names)
 
@@ -154,7 +158,11 @@ class _Account:
         if isinstance(value, types.ModuleType) and _root(value.__name__) not in _BY_VERSION:
             for name in names:
                 member = vars(value).get(name)
-                if name in vars(value) and self._is_new((value.__name__, name), member):
+                if (
+                    name in vars(value)
+                    and name not in _WHERE
+                    and self._is_new((value.__name__, name), member)
+                ):
                     self._write(name)
                     self._add_named(member, names)
 

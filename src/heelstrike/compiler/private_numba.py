@@ -71,7 +71,7 @@ class PrivateNumba(DocumentedNumba):
         """Return a function that is compiled when it is called, and kept on disk."""
         options = OPTIONS | {"no_cfunc_wrapper": not separate}
         compiled: Any = njit(**options, boundscheck=boundscheck or None)(function)
-        compiled._cache = _Cache(compiled, self.made_of(function))
+        compiled._cache = _Cache(compiled, self.made_of(function), self.settings())
         return compiled
 
     def compile(self, call: Callable[[], Result]) -> Result:
@@ -220,7 +220,7 @@ class _Cache(NullCache):
     comment, and take damaged files for good.
     """
 
-    def __init__(self, compiled: Any, made_of: str) -> None:
+    def __init__(self, compiled: Any, made_of: str, settings: list[str]) -> None:
         function = compiled.py_func
         source = Path(function.__code__.co_filename)
         # To load machine code Numba imports the module by its name.
@@ -230,7 +230,8 @@ class _Cache(NullCache):
         self._is_ours = is_ours(function)
         self._made_of = made_of
         twin = "" if self._is_ours else _twin_of(function)
-        self._kind = repr((sorted(compiled.targetoptions.items()), processor(), twin))
+        options = sorted(compiled.targetoptions.items())
+        self._kind = repr((options, settings, processor(), twin))
         self._name = re.sub("[<>]", "", f"{function.__module__}.{function.__qualname__}")
 
     @property
