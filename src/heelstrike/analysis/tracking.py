@@ -8,7 +8,6 @@ duration and then holds still. All of it follows from the touchdowns of the run.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from heelstrike.analysis.support import stances
+from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
 
 if TYPE_CHECKING:
@@ -32,25 +32,18 @@ SAME_TIME = 1e-9  # seconds; times of rows and events agree but for rounding
 
 @dataclass(frozen=True, eq=False)
 class ReferenceMotion:
-    """What a controller that follows a gait wanted the joints to do, row by row.
-
-    Attributes
-    ----------
-    position, velocity : (nt, nu) float
-        Reference of the actuated joints, in the order of the actuators (rad, rad/s).
-    stance : (nt,) int
-        Index of the foot taken for the stance foot.
-    phase : (nt,) float
-        Time since the step began, in s.
-    starts : tuple of float
-        Times at which steps began, in s.
-    """
+    """What a controller that follows a gait wanted the joints to do, row by row."""
 
     position: Floats
     velocity: Floats
+    """position, velocity: (nt, nu) Reference of the actuated joints, in the order of the actuators
+    (rad, rad/s)."""
     stance: NDArray[np.int64]
+    """(nt,) Index of the foot taken for the stance foot."""
     phase: Floats
+    """(nt,) Time since the step began, in s."""
     starts: tuple[float, ...]
+    """Times at which steps began, in s."""
 
 
 def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
@@ -111,19 +104,13 @@ def _step_starts(run: Run, gait: Gait) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class TrackingError:
-    """Measured minus reference motion of the actuated joints.
-
-    Attributes
-    ----------
-    reference : ReferenceMotion
-        The reference.
-    position, velocity : (nt, nu) float
-        Errors in rad and rad/s.
-    """
+    """Measured minus reference motion of the actuated joints."""
 
     reference: ReferenceMotion
+    """The reference."""
     position: Floats
     velocity: Floats
+    """position, velocity: (nt, nu) Errors in rad and rad/s."""
 
     @cached_property
     def joint_rms(self) -> Floats:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from heelstrike.arguments import check_fields, takes
 from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 
@@ -24,44 +25,23 @@ FLAT = 1e-9
 
 
 class GroundModel(Bundle):
-    """The ground as the kernels see it.
-
-    Attributes
-    ----------
-    vertices : (ns + 1, 2) float
-        Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
-        ever.
-    normal : (ns, 2) float
-        Upward unit normal of each segment.
-    friction, restitution : (ns,) float
-        Coefficients of each segment.
-    concave : int
-        Whether there is a corner in which a point can touch two faces.
-    """
+    """The ground as the kernels see it."""
 
     vertices: Floats = array("ns + 1", "axes")
+    """Corners of the profile (x, z) in metres, x never decreasing; the end segments go on for
+    ever."""
     normal: Floats = array("ns", "axes")
+    """Upward unit normal of each segment."""
     friction: Floats = array("ns")
     restitution: Floats = array("ns")
+    """friction, restitution: Coefficients of each segment."""
     concave: int = number(int)
+    """Whether there is a corner in which a point can touch two faces."""
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
     """Rigid ground.
-
-    Parameters
-    ----------
-    friction : float or (ns,) array
-        Coulomb friction coefficient μ ≥ 0, one for all or one a segment.
-    restitution : float or (ns,) array
-        Newton's coefficient of restitution, 0 (plastic, the paper's choice) to 1.
-    slope : float
-        Inclination in rad of ground without a profile; positive climbs along +x.
-    profile : (ns + 1, 2) array, optional
-        Corners (x, z) of the ground in metres, from left to right; two corners with the same x
-        make a vertical step. The first and last segments go on for ever. See also
-        :meth:`stairs` and :meth:`rough`.
 
     Raises
     ------
@@ -75,9 +55,16 @@ class Ground:
     """
 
     friction: ArrayLike = 0.75
+    """Float or (ns,) array. Coulomb friction coefficient μ ≥ 0, one for all or one a segment."""
     restitution: ArrayLike = 0.0
+    """Float or (ns,) array. Newton's coefficient of restitution, 0 (plastic, the paper's choice) to
+    1."""
     slope: float = 0.0
+    """Inclination in rad of ground without a profile; positive climbs along +x."""
     profile: ArrayLike | None = None
+    """(ns + 1, 2) Corners (x, z) of the ground in metres, from left to right; two corners with the
+    same x make a vertical step. The first and last segments go on for ever. See also :meth:`stairs`
+    and :meth:`rough`."""
     _model: GroundModel = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

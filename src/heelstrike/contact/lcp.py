@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -13,25 +11,20 @@ from heelstrike.contact.modes import OPEN, Solver
 from heelstrike.contact.problem import check_accuracy, check_finite, run_solvers, solver_order
 from heelstrike.contact.workspace import Floats
 from heelstrike.errors import ContactProblemError
+from heelstrike.field_texts import dataclass
 
 
 @dataclass(frozen=True)
 class LcpSolution:
-    """The solution of a linear complementarity problem.
-
-    Attributes
-    ----------
-    z, w : (n,) float
-        The solution and ``w = M @ z + q``.
-    certificate : Certificate
-        Status and residuals; ``complementarity`` is the largest of min(w_i, z_i),
-        ``non_penetration`` the largest negative w_i and ``cone`` the largest negative z_i, all
-        relative.
-    """
+    """The solution of a linear complementarity problem."""
 
     z: Floats
     w: Floats
+    """z, w: (n,) The solution and ``w = M @ z + q``."""
     certificate: Certificate
+    """Status and residuals; ``complementarity`` is the largest of min(w_i, z_i),
+    ``non_penetration`` the largest negative w_i and ``cone`` the largest negative z_i, all
+    relative."""
 
 
 @takes(ContactProblemError)

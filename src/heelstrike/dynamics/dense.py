@@ -164,15 +164,6 @@ def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) 
 class LinearEquations(Bundle):
     """Equations A x = b in a few unknowns, for the memory of a law.
 
-    Attributes
-    ----------
-    system : (unknowns, unknowns + 1) float
-        A, and b in the last column. Solving uses them up.
-    x : (unknowns,) float
-        The answer.
-    order : (unknowns,) int
-        Scratch.
-
     Examples
     --------
     >>> from heelstrike.control import LinearEquations
@@ -183,8 +174,11 @@ class LinearEquations(Bundle):
     """
 
     system: Floats = array("unknowns", "unknowns + 1")
+    """A, and b in the last column. Solving uses them up."""
     x: Floats = array("unknowns")
+    """The answer."""
     order: Integers = array("unknowns", of=int)
+    """Scratch."""
 
     @kernel
     def solve(self) -> int:

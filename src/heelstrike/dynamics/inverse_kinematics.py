@@ -35,32 +35,23 @@ BEND = 0.5
 
 
 class Reaching(Bundle):
-    """What the search works on.
-
-    Attributes
-    ----------
-    tree : Workspace
-        Kinematics of the pose that was tried last.
-    position : (2,) float
-        The point in that pose.
-    begin, trial, tried : (nq,) float
-        Where the search begins, a step further, and where another beginning led to.
-    columns : (nv, 3) float
-        Jacobian of the point and its link, one row a coordinate.
-    step : (nv,) float
-        Step of each coordinate.
-    free : (nv,) int
-        Whether a coordinate takes part in it.
-    """
+    """What the search works on."""
 
     tree: Workspace = part(Workspace)
+    """Kinematics of the pose that was tried last."""
     position: Floats = array("axes")
+    """The point in that pose."""
     begin: Floats = array("nq")
     trial: Floats = array("nq")
     tried: Floats = array("nq")
+    """begin, trial, tried: Where the search begins, a step further, and where another beginning led
+    to."""
     columns: Floats = array("nv", 3)
+    """Jacobian of the point and its link, one row a coordinate."""
     step: Floats = array("nv")
+    """Step of each coordinate."""
     free: Integers = array("nv", of=int)
+    """Whether a coordinate takes part in it."""
 
 
 def leg_joints(robot: Robot) -> tuple[tuple[int, ...], ...]:

@@ -10,7 +10,6 @@ of a robot, whose dynamics need mass; it is a force between the mass and its foo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from scipy.optimize import root
 
 from heelstrike.arguments import check_fields
 from heelstrike.errors import LimitCycleError, SimulationError
+from heelstrike.field_texts import dataclass
 
 Floats = NDArray[np.float64]
 Phases = list[tuple[Floats, Floats]]
@@ -30,42 +30,23 @@ DISTURBANCE = 3e-5  # m, rad; of the differences of fourth order that make multi
 
 @dataclass(frozen=True, kw_only=True)
 class Cycle:
-    """A gait that repeats.
-
-    Attributes
-    ----------
-    state : (n,) float
-        Walking: height (m) and direction of the velocity (rad, up) where the foot is below the
-        mass. Running: height of the apex (m).
-    multipliers : (n,) complex
-        Floquet multipliers of a step.
-    period, length : float
-        Of a step, in s and m.
-    contact : float
-        Running: how long a foot is on the ground. Walking: how long both are (s).
-    """
+    """A gait that repeats."""
 
     state: Floats
+    """(n,) Walking: height (m) and direction of the velocity (rad, up) where the foot is below the
+    mass. Running: height of the apex (m)."""
     multipliers: NDArray[np.complex128]
+    """(n,) Floquet multipliers of a step."""
     period: float
     length: float
+    """period, length: Of a step, in s and m."""
     contact: float
+    """Running: how long a foot is on the ground. Walking: how long both are (s)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringMass:
     """A point mass on massless springs.
-
-    Parameters
-    ----------
-    stiffness : float
-        Of a leg, in N/m.
-    angle : float
-        Angle of attack: of a leg to the ground at touchdown, in rad.
-    energy : float
-        In J; nothing is lost.
-    mass, leg, gravity : float
-        In kg, m and m/s².
 
     Raises
     ------
@@ -86,11 +67,15 @@ class SpringMass:
     """
 
     stiffness: float
+    """Of a leg, in N/m."""
     angle: float
+    """Angle of attack: of a leg to the ground at touchdown, in rad."""
     energy: float
+    """In J; nothing is lost."""
     mass: float = 80.0
     leg: float = 1.0
     gravity: float = 9.81
+    """mass, leg, gravity: In kg, m and m/s²."""
 
     def __post_init__(self) -> None:
         check_fields(self, SimulationError)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import casadi
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 
 from heelstrike.dynamics.loops import count_rows
 from heelstrike.dynamics.queries.symbolic import TracedDynamics, symbols
+from heelstrike.field_texts import dataclass
 from heelstrike.gait.request import Request
 from heelstrike.gait.sole import leg
 
@@ -33,22 +33,16 @@ DAMPING = 1e-4
 
 @dataclass(frozen=True)
 class Start:
-    """A step to start from: the parabola through three postures.
-
-    Attributes
-    ----------
-    begin, middle, end : (n,) float
-        Positions of the coordinates that the stance foot leaves free, at the beginning, in the
-        middle and at the end of the step.
-    duration, length : float
-        Duration (s) and length (m) of the step.
-    """
+    """A step to start from: the parabola through three postures."""
 
     begin: Floats
     middle: Floats
     end: Floats
+    """begin, middle, end: (n,) Positions of the coordinates that the stance foot leaves free, at
+    the beginning, in the middle and at the end of the step."""
     duration: float
     length: float
+    """duration, length: Duration (s) and length (m) of the step."""
 
     def motion(self, phases: Floats) -> tuple[Floats, Floats, Floats]:
         """Positions, velocities and accelerations at phases of the step, (n, N) each."""

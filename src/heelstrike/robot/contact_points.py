@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.links import Links
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.shapes import mesh_corners
@@ -29,30 +30,22 @@ PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH = range(8)  # MuJ
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """A disc (or a point, of radius zero) fixed to a link.
-
-    Attributes
-    ----------
-    link : int
-        Link that carries it.
-    x, z : float
-        Its centre in the link frame (m).
-    radius : float
-        Radius (m).
-    friction : float
-        Sliding friction that the file gives its geom. The simulation takes friction from the
-        ground; this number only serves to compare left and right.
-    friction_scale, restitution_scale : float
-        What friction and restitution of the ground are multiplied by under it.
-    """
+    """A disc (or a point, of radius zero) fixed to a link."""
 
     link: int
+    """Link that carries it."""
     x: float
     z: float
+    """x, z: Its centre in the link frame (m)."""
     radius: float
+    """Radius (m)."""
     friction: float
+    """Sliding friction that the file gives its geom. The simulation takes friction from the ground;
+    this number only serves to compare left and right."""
     friction_scale: float = 1.0
     restitution_scale: float = 1.0
+    """friction_scale, restitution_scale: What friction and restitution of the ground are multiplied
+    by under it."""
 
 
 def of_model(points: list[ContactPoint]) -> dict[str, Any]:

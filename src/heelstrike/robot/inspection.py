@@ -6,7 +6,7 @@ import math
 import os
 import warnings
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.assembly import DIFFERENT, UNLIKELY, link_origins
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mjcf import read_mjcf
@@ -42,25 +43,17 @@ ROUND_OFF = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Inspection:
-    """A look at a robot.
-
-    Attributes
-    ----------
-    source : str
-        What was looked at.
-    robot : Robot or None
-        The robot, None if the file gives none. If the file holds impossible inertias, it is the
-        robot with the nearest possible ones: to look at, not to simulate.
-    findings : tuple of Finding
-        What looks wrong, nothing for a sound robot.
-    loadable : bool
-        Whether :func:`load_robot` takes the file as it is.
-    """
+    """A look at a robot."""
 
     source: str
+    """What was looked at."""
     robot: Robot | None
+    """The robot, None if the file gives none. If the file holds impossible inertias, it is the
+    robot with the nearest possible ones: to look at, not to simulate."""
     findings: tuple[Finding, ...]
+    """What looks wrong, nothing for a sound robot."""
     loadable: bool = True
+    """Whether :func:`load_robot` takes the file as it is."""
 
     @property
     def sound(self) -> bool:

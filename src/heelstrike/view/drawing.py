@@ -12,7 +12,6 @@ from __future__ import annotations
 import enum
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.motion import in_world
 from heelstrike.contact.ground import Ground
 from heelstrike.dynamics import LinkPoses, link_poses
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.sim.push import Push
@@ -66,31 +66,21 @@ class Side(enum.IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Line segments fixed to the links of a robot.
-
-    Attributes
-    ----------
-    link : (ns, 2) int
-        Link of each end of each segment.
-    local : (ns, 2, 2) float
-        Place (x, z) of each end in the frame of its link, in m.
-    width : (ns,) float
-        Line width in points.
-    side : (ns,) int
-        `Side` of each segment.
-    foot : (ns,) int
-        Index of the foot at the end of the segment's leg, -1 for the trunk.
-    pieces : tuple of slice
-        Segments that go round an outline, or are a bone, in the order of drawing; empty where all
-        are bones.
-    """
+    """Line segments fixed to the links of a robot."""
 
     link: NDArray[np.int64]
+    """(ns, 2) Link of each end of each segment."""
     local: Floats
+    """(ns, 2, 2) Place (x, z) of each end in the frame of its link, in m."""
     width: Floats
+    """(ns,) Line width in points."""
     side: NDArray[np.int64]
+    """(ns,) `Side` of each segment."""
     foot: NDArray[np.int64]
+    """(ns,) Index of the foot at the end of the segment's leg, -1 for the trunk."""
     pieces: tuple[slice, ...] = ()
+    """Segments that go round an outline, or are a bone, in the order of drawing; empty where all
+    are bones."""
 
     @property
     def colors(self) -> list[str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -23,6 +21,7 @@ from heelstrike.dynamics import (
     mass_matrix,
 )
 from heelstrike.errors import ContactProblemError
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 
 TOUCHING = 1e-6
@@ -33,32 +32,23 @@ MOVING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class ContactForwardDynamics:
-    """Accelerations and contact forces of one state.
-
-    Attributes
-    ----------
-    acceleration : (nv,) float
-        Acceleration of the coordinates.
-    contact_force : (nc, 2) float
-        Force (normal, tangent) of the ground on the robot at each contact point, in N; zero where
-        it does not touch. On a flat foot the split of least norm.
-    contact_acceleration : (nc, 2) float
-        Acceleration of the gap and of the sliding velocity of each contact point, in m/s².
-    mode : tuple of nc ContactMode
-        What every contact point does.
-    certificate : Certificate
-        Whether, and how well, the contact problem is solved.
-    loop_force : (2 loops + couplings,) float
-        Forces of closed loops and coupled joints along the rows of
-        :func:`heelstrike.dynamics.loop_jacobian`, in N and N m.
-    """
+    """Accelerations and contact forces of one state."""
 
     acceleration: Floats
+    """(nv,) Acceleration of the coordinates."""
     contact_force: Floats
+    """(nc, 2) Force (normal, tangent) of the ground on the robot at each contact point, in N; zero
+    where it does not touch. On a flat foot the split of least norm."""
     contact_acceleration: Floats
+    """(nc, 2) Acceleration of the gap and of the sliding velocity of each contact point, in
+    m/s²."""
     mode: tuple[ContactMode, ...]
+    """What each of the nc contact points does."""
     certificate: Certificate
+    """Whether, and how well, the contact problem is solved."""
     loop_force: Floats
+    """(2 loops + couplings,) Forces of closed loops and coupled joints along the rows of
+    :func:`heelstrike.dynamics.loop_jacobian`, in N and N m."""
 
 
 @takes(ContactProblemError)

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import followers
@@ -28,24 +28,16 @@ SAME_PLACE = 1e-9
 
 @dataclass(frozen=True)
 class Links:
-    """The kinematic tree and inertia of a robot.
-
-    Attributes
-    ----------
-    numbers : dict of str to array
-        Numbers of `Model`: the tree and the inertia of its links.
-    origin : (nl, 2) float
-        World position of the link frames in the reference configuration.
-    of_body : (nbody,) int
-        Link that each body of the file belongs to; -1 for what is fixed to the world.
-    names : tuple of str
-        Body that each link moves.
-    """
+    """The kinematic tree and inertia of a robot."""
 
     numbers: dict[str, Any]
+    """Numbers of `Model`: the tree and the inertia of its links."""
     origin: Floats
+    """(nl, 2) World position of the link frames in the reference configuration."""
     of_body: Integers
+    """(nbody,) Link that each body of the file belongs to; -1 for what is fixed to the world."""
     names: tuple[str, ...]
+    """Body that each link moves."""
 
     @property
     def axis(self) -> Floats:

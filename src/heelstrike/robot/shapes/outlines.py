@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.robot.shapes.convex import FLAT, Floats, convex_hull
 
 ROUND = 16
@@ -14,22 +13,15 @@ ROUND = 16
 
 @dataclass(frozen=True, eq=False)
 class Outline:
-    """A convex shape on a link, seen in the plane: a polygon, or what a disc covers within one.
-
-    Attributes
-    ----------
-    link : int
-        The link that it is fixed to.
-    corners : (k, 2) float
-        Corners (x, z) of the polygon in the frame of the link, in m; one for a disc, two for a
-        capsule.
-    radius : float
-        Radius of the disc, in m; 0 for the polygon itself.
-    """
+    """A convex shape on a link, seen in the plane: a polygon, or what a disc covers within one."""
 
     link: int
+    """The link that it is fixed to."""
     corners: Floats
+    """(k, 2) Corners (x, z) of the polygon in the frame of the link, in m; one for a disc, two for
+    a capsule."""
     radius: float
+    """Radius of the disc, in m; 0 for the polygon itself."""
 
     def rim(self) -> Floats:
         """Corners (m, 2) of a polygon around all of it, in the frame of the link (m)."""

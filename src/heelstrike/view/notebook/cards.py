@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from heelstrike.field_texts import dataclass
 from heelstrike.view.notebook.pictures import (
     curves_picture,
     ground_picture,
@@ -115,18 +116,12 @@ def limit_cycle_card(cycle: LimitCycle) -> str:
 
 @dataclass(frozen=True)
 class Film:
-    """A run as a page that a notebook shows in place.
-
-    Attributes
-    ----------
-    text : str
-        The page.
-    height : int
-        Of its frame, in pixels.
-    """
+    """A run as a page that a notebook shows in place."""
 
     text: str = field(repr=False)
+    """The page."""
     height: int
+    """Of its frame, in pixels."""
 
     def _repr_html_(self) -> str:
         return (
