@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from heelstrike.analysis.support import stances
 from heelstrike.field_texts import dataclass
 from heelstrike.sim.run import Run
+from heelstrike.tolerances import SAME_ROW
 
 if TYPE_CHECKING:
     from heelstrike.gait.gait import Gait
@@ -27,7 +28,6 @@ EARLIEST = 0.5
 """Touchdowns before this fraction of a step do not end it."""
 LATEST = 1.1
 """The reference of a late step rests after this fraction of its duration."""
-SAME_TIME = 1e-9  # seconds; times of rows and events agree but for rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def reference_motion(run: Run, gait: Gait) -> ReferenceMotion:
     """
     gait.check_joints(run.robot)
     starts = _step_starts(run, gait)
-    step = np.searchsorted(np.array(starts) - SAME_TIME, run.time, side="right") - 1
+    step = np.searchsorted(np.array(starts) - SAME_ROW, run.time, side="right") - 1
     step = np.maximum(step, 0)
     stance = (gait.stance_foot + step) % 2
     phase = run.time - np.array(starts)[step]
@@ -96,7 +96,7 @@ def _step_starts(run: Run, gait: Gait) -> list[float]:
             for stance in on_ground
             if stance.foot == swing and stance.liftoff > earliest
         ]
-        if not landed or landed[0] > run.time[-1] + SAME_TIME:
+        if not landed or landed[0] > run.time[-1] + SAME_ROW:
             return starts
         starts.append(landed[0])
         swing = 1 - swing

@@ -26,11 +26,9 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import soles
 from heelstrike.sim.run import Run
+from heelstrike.tolerances import STANDING_GAP
 
 Floats = NDArray[np.float64]
-
-TOUCHING = 1e-6
-"""Contact points less than this above the ground (m) belong to the support polygon."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +145,7 @@ def _pressure(run: Run, contacts: list[int], reference: Floats) -> _Pressure:
     place = np.full(len(row), np.nan)
     place[loaded] = -moment[loaded] / pressing[loaded]
     along = np.einsum("tck,tk->tc", arm, tangent)
-    touching = (run.gap[:, contacts] <= TOUCHING) | pushing(run)[:, contacts]
+    touching = (run.gap[:, contacts] <= STANDING_GAP) | pushing(run)[:, contacts]
     heel = np.where(touching, along, np.inf).min(axis=1)
     toe = np.where(touching, along, -np.inf).max(axis=1)
     return _Pressure(origin, tangent, place, np.minimum(place - heel, toe - place))

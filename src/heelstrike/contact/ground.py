@@ -13,6 +13,7 @@ from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.tolerances import STRAIGHT_GROUND
 
 Floats = NDArray[np.float64]
 
@@ -20,8 +21,13 @@ Floats = NDArray[np.float64]
 # every one of them is in free flight, and the distance to the ground below it will do.
 REACH = 0.25
 
-# Two faces whose normals turn by less (rad) are as good as one.
-FLAT = 1e-9
+
+UPRIGHT = 1e-3
+"""Least rise of the normal that counts in how far the nearest segment may be: steeper faces are
+looked for within `REACH` in any case."""
+
+AT_THE_CORNER = 1e-12
+"""Distance (m) of a centre from a corner up to which there is no way from one to the other."""
 
 
 class GroundModel(Bundle):
@@ -84,7 +90,7 @@ class Ground:
         model = GroundModel(
             vertices=vertices,
             normal=normal,
-            concave=int(np.any(_turn(normal[:-1].T, normal[1:].T) > FLAT)),
+            concave=int(np.any(_turn(normal[:-1].T, normal[1:].T) > STRAIGHT_GROUND)),
             friction=friction,
             restitution=restitution,
         )
@@ -380,7 +386,7 @@ def nearest_segment(
     segments = ground.friction.shape[0]
     # Nothing nearer than the ground straight below or above can lie further away in x.
     inside = distance < 0.0
-    reach = min(abs(distance) / max(normal[1], 1e-3), REACH + radius)
+    reach = min(abs(distance) / max(normal[1], UPRIGHT), REACH + radius)
     first = below
     while first > 0 and ground.vertices[first, 0] >= x - reach:
         first -= 1
@@ -406,13 +412,13 @@ def nearest_segment(
             owner = segment
             corner = (segment if along == 0.0 else segment + 1) if on_corner else 0
             separation = np.sqrt(squared)
-            if on_corner and separation > 1e-12:
+            if on_corner and separation > AT_THE_CORNER:
                 sign = -1.0 if inside else 1.0
                 normal[0] = sign * dx / separation
                 normal[1] = sign * dz / separation
             else:
                 line_contact(ground, segment, x, z, normal)
-    if inside and corner > 0 and turn_at(ground, corner) > FLAT:
+    if inside and corner > 0 and turn_at(ground, corner) > STRAIGHT_GROUND:
         right = line_contact(ground, corner, x, z, normal)
         left = line_contact(ground, corner - 1, x, z, normal)
         if right < left:
@@ -438,7 +444,7 @@ def faces_it(ground: GroundModel, own: int, segment: int, x: float, z: float) ->
     below the own face, then. Others may from outside only, and within reach.
     """
     if abs(segment - own) == 1:
-        return turn_at(ground, max(own, segment)) > FLAT
+        return turn_at(ground, max(own, segment)) > STRAIGHT_GROUND
     begin, normal = ground.vertices[segment], ground.normal[segment]
     outside = (x - begin[0]) * normal[0] + (z - begin[1]) * normal[1] >= 0.0
     return outside and begin[0] <= x + REACH and ground.vertices[segment + 1, 0] >= x - REACH
@@ -483,7 +489,7 @@ def second_contact(
             corner = segment + 1 if behind else segment
             dx, dz = x - ground.vertices[corner, 0], z - ground.vertices[corner, 1]
             distance = np.sqrt(dx * dx + dz * dz)
-            if 1e-12 < distance < nearest and turn_at(ground, corner) < 0.0:
+            if AT_THE_CORNER < distance < nearest and turn_at(ground, corner) < 0.0:
                 nearest, owner = distance, segment
                 normal[0], normal[1] = dx / distance, dz / distance
         else:

@@ -43,6 +43,10 @@ READINGS = 4
 """Samples of an encoder that a velocity is estimated from."""
 
 
+ALMOST_DUE = 1e-6
+"""Part of an encoder's period by which rounding of times may make a reading early."""
+
+
 class Landing(Bundle):
     """When a foot that touches without coming flat counts as landed."""
 
@@ -186,7 +190,7 @@ def has_landed(
 def read_encoders(t: float, state: ControlState, parameters: Parameters, memory: Memory) -> None:
     """Take a sample of the rounded joint positions when one is due."""
     due = memory.sampled + parameters.encoder_period
-    if memory.samples > 0 and t < due - 1e-6 * parameters.encoder_period:
+    if memory.samples > 0 and t < due - ALMOST_DUE * parameters.encoder_period:
         return
     resolution = parameters.encoder_resolution
     readings = memory.readings

@@ -30,9 +30,7 @@ from heelstrike.robot.model import Floats
 from heelstrike.robot.robot import Robot
 from heelstrike.sim.controller.law import Law, controller
 from heelstrike.sim.controller.robot import ControlledRobot, ControlState
-
-TOUCHING = 1e-6
-"""Contact points less than this above level ground (m) hold."""
+from heelstrike.tolerances import STANDING_GAP
 
 HELD = 1e-9
 """Singular values of J below this part of the largest are zero."""
@@ -109,7 +107,7 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
         raise ControllerError(f"a posture is of {robot.nq} finite numbers, got {q.tolist()}")
     _refuse_what_is_open(robot, q)
     kinematics = contact_kinematics(robot, q, rest)
-    touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < TOUCHING))
+    touching = tuple(int(i) for i in np.flatnonzero(np.abs(kinematics.gap) < STANDING_GAP))
     if not touching and robot.floating:
         _refuse_what_floats(robot, kinematics.gap)
     held = contact_inverse_dynamics(robot, q, rest, rest, contacts=touching)
@@ -129,7 +127,7 @@ def linear_standing(robot: Robot, posture: ArrayLike) -> LinearStanding:
 
 def _refuse_what_is_open(robot: Robot, q: Floats) -> None:
     open_by = float(np.abs(loop_displacement(robot, q)).max(initial=0.0))
-    if open_by > TOUCHING:
+    if open_by > STANDING_GAP:
         raise ControllerError(
             f"in this posture a loop or coupling of robot {robot.name!r} is open by {open_by:.3g}: "
             "take robot.closed(state).q"

@@ -11,25 +11,27 @@ import math
 from heelstrike.compiler.bundle import Bundle, array
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.robot.model import Floats, Integers
+from heelstrike.tolerances import NO_PIVOT
 
-RANK_TOLERANCE = 1e-12
+UNIT_PIVOT = 1e-12
 """Pivots of the unit-diagonal matrix below this count as zero."""
 
 GOOD_PIVOT = 0.03
 """Diagonal pivots above this are taken as they come: elimination of a positive semidefinite
 matrix is stable in any order, and only its rank needs the large pivots first."""
 
-SINGULAR = 2e-15
+ROUNDED_PIVOT = 2e-15
 """Pivots of the unit-diagonal matrix below this are rounding."""
 
 CONSISTENT = 1e-12
 """Equations that are left with less than this, relative to the largest, are met."""
 
-SWEEPS, ROUNDING = 100, 1e-14
+SWEEPS, ROUNDED_FORCE = 100, 1e-14
 """How often forces are raised to zero at most, and part of the largest that is none."""
 
-NO_PIVOT = 1e-11
-"""Pivots of any matrix below this, relative to its largest entry, count as zero."""
+CUT_OFF = 100.0 * ROUNDED_FORCE
+"""Part of the largest force by which one may pull in the end and be cut off: rounding of so many
+sweeps."""
 
 
 @kernel
@@ -77,7 +79,7 @@ def eliminate(
         taken[i] = 0
         speeds = max(speeds, abs(tableau[i, 0]))
     nullity = size
-    smallest = RANK_TOLERANCE
+    smallest = UNIT_PIVOT
     while nullity > 0:
         largest = smallest
         row = size
@@ -109,9 +111,9 @@ def eliminate(
         for i in range(size):
             if taken[i] == 0:
                 left = max(left, abs(tableau[i, 0]))
-        if smallest == SINGULAR or left <= CONSISTENT * speeds:
+        if smallest == ROUNDED_PIVOT or left <= CONSISTENT * speeds:
             break
-        smallest = SINGULAR
+        smallest = ROUNDED_PIVOT
     return nullity
 
 
@@ -292,10 +294,10 @@ def raise_to_zero(
                 for j in range(size):
                     unknown[j] += along * system[free, j]
             moved = max(moved, abs(raised) * square)
-        if moved <= ROUNDING * largest:
+        if moved <= ROUNDED_FORCE * largest:
             break
     for i in range(first, size):
-        if presses[i - first] == 1 and 0.0 > unknown[i] > -100.0 * ROUNDING * largest:
+        if presses[i - first] == 1 and 0.0 > unknown[i] > -CUT_OFF * largest:
             unknown[i] = 0.0
 
 

@@ -34,6 +34,16 @@ MISSED = 1e-9
 BEND = 0.5
 
 
+LIGHTER, HEAVIER = 0.01, 10.0
+"""What the damping is multiplied by after a step that helps, and after one that does not."""
+
+NO_MATRIX = 1e-300
+"""Damping where no joint moves the pose, so that nothing is divided by zero."""
+
+NEARER = 0.999
+"""Part of what an answer misses, squared, below which another one is clearly nearer."""
+
+
 class Reaching(Bundle):
     """What the search works on."""
 
@@ -113,7 +123,7 @@ def seek(missing: Spatial, damping: float, joints: Integers, work: Reaching) -> 
             zz += z * z
             zr += z * turn
             rr += turn * turn
-    damped = damping * (xx + zz + rr) + 1e-300
+    damped = damping * (xx + zz + rr) + NO_MATRIX
     pull = solve_three((xx + damped, xz, xr), (xz, zz + damped, zr), (xr, zr, rr + damped), missing)
     for k in range(joints.shape[0]):
         joint = joints[k]
@@ -173,11 +183,11 @@ def approach(
         fresh = size < left
         if fresh:
             missing, left = found, size
-            damping = max(0.01 * damping, LEAST_DAMPING)
+            damping = max(LIGHTER * damping, LEAST_DAMPING)
             for j in range(model.nq):
                 q[j] = work.trial[j]
         else:
-            damping *= 10.0
+            damping *= HEAVIER
     return left
 
 
@@ -234,7 +244,7 @@ def reach(
             bend(model, joints, way, work.begin, work.tried)
             other = approach(model, joints, link, local, target, rows, work, work.tried)
             # Where no pose reaches, the first answer counts unless another is clearly nearer.
-            if other < 0.999 * left:
+            if other < NEARER * left:
                 left = other
                 for j in range(model.nq):
                     q[j] = work.tried[j]

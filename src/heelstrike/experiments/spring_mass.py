@@ -24,8 +24,8 @@ Floats = NDArray[np.float64]
 Phases = list[tuple[Floats, Floats]]
 
 RTOL, ATOL = 1e-13, 1e-14
-LONGEST = 3.0  # s; a phase that lasts longer leads to no step
-DISTURBANCE = 3e-5  # m, rad; of the differences of fourth order that make multipliers
+LONGEST_PHASE = 3.0  # s; a phase that lasts longer leads to no step
+SPRING_DISTURBANCE = 3e-5  # m, rad; of the differences of fourth order that make multipliers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,9 +176,9 @@ class SpringMass:
         columns = [
             (4.0 * (step(state + h)[0] - step(state - h)[0]))
             - 0.5 * (step(state + 2.0 * h)[0] - step(state - 2.0 * h)[0])
-            for h in DISTURBANCE * np.eye(len(state))
+            for h in SPRING_DISTURBANCE * np.eye(len(state))
         ]
-        slope = np.array(columns).T / (6.0 * DISTURBANCE)
+        slope = np.array(columns).T / (6.0 * SPRING_DISTURBANCE)
         multipliers = np.linalg.eigvals(slope).astype(np.complex128)
         return Cycle(
             state=state, multipliers=multipliers, period=period, length=length, contact=contact
@@ -243,7 +243,7 @@ class SpringMass:
 
         falling.terminal, falling.direction = True, -1.0  # type: ignore[attr-defined]
         run = solve_ivp(
-            self._rate(feet), (0.0, LONGEST), start, method="DOP853", rtol=RTOL, atol=ATOL,
+            self._rate(feet), (0.0, LONGEST_PHASE), start, method="DOP853", rtol=RTOL, atol=ATOL,
             events=falling,
         )  # fmt: skip
         if not len(run.t_events[0]):

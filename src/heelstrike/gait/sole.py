@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from heelstrike.errors import GaitError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
+from heelstrike.tolerances import CLOSED_GAP
 
 Floats = NDArray[np.float64]
-
-TOUCHING = 1e-9
-"""Contact points less than this above the ground (m) belong to the sole of a flat foot."""
 
 
 @dataclass(frozen=True)
@@ -71,8 +69,8 @@ def sole(robot: Robot, foot: int) -> Sole:
         for angle in _tangent_angles(center[i] - center[j], radius[i] - radius[j]):
             x, z = _rotated(center, angle)
             bottom = z - radius
-            touching = x[bottom < bottom[i] + TOUCHING]
-            if bottom.min() >= bottom[i] - TOUCHING and np.ptp(touching) > TOUCHING:
+            touching = x[bottom < bottom[i] + CLOSED_GAP]
+            if bottom.min() >= bottom[i] - CLOSED_GAP and np.ptp(touching) > CLOSED_GAP:
                 found.append((angle, touching.min(), touching.max(), bottom[i]))
     if not found:
         raise GaitError(

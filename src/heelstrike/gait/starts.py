@@ -28,7 +28,7 @@ TYPICAL_DURATION = 2.2
 TYPICAL_LENGTH = 0.3
 """Step length in standing heights where none is given."""
 SWEEPS = 60
-DAMPING = 1e-4
+START_DAMPING = 1e-4
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class _Kinematics:
             missing = target - value.ravel()
             if np.abs(missing).max() < 1e-9:
                 break
-            normal = jacobian.T @ jacobian + DAMPING * np.eye(q.size)
+            normal = jacobian.T @ jacobian + START_DAMPING * np.eye(q.size)
             step = np.linalg.solve(normal, jacobian.T @ missing)
             q = self._in_range(q + step / max(1.0, np.abs(step).max() / BENT))
         return q

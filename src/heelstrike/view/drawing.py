@@ -28,6 +28,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.sole import are_around
 from heelstrike.sim.push import Push
+from heelstrike.tolerances import NO_BONE
 from heelstrike.view.bars import bars
 from heelstrike.view.style import (
     FORCE_COLOR,
@@ -45,7 +46,6 @@ from heelstrike.view.style import (
 Floats = NDArray[np.float64]
 Bone = tuple[int, Floats, int, Floats, float]  # link, place, link, place, width
 
-SAME_PLACE = 1e-6  # metres
 DISC_CORNERS = 16
 THICKEST = 15.0  # points, of a bone that has the whole mass
 THINNEST = 2.5
@@ -231,7 +231,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
         lines = _outline(points)
     bones += [(link, start, link, end, thickness) for start, end in lines]
     for point, radius in zip(points, model.contact_radius[contacts], strict=True):
-        if radius > SAME_PLACE:
+        if radius > NO_BONE:
             rim = _disc(point, float(radius))
             bones += [(link, start, link, end, DISC_WIDTH) for start, end in rim]
     if not bones and _apart(center, home):
@@ -240,7 +240,7 @@ def _bones(robot: Robot, link: int, reference: Floats, width: float) -> list[Bon
 
 
 def _apart(a: Floats, b: Floats) -> bool:
-    return bool(np.hypot(*(a - b)) > SAME_PLACE)
+    return bool(np.hypot(*(a - b)) > NO_BONE)
 
 
 def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
@@ -254,7 +254,7 @@ def _is_trunk(robot: Robot, link: int, joints: Floats) -> bool:
         parent >= 0
         and model.mass[parent] == 0.0
         and len(joints) > 0
-        and np.ptp(joints, axis=0).max() <= SAME_PLACE
+        and np.ptp(joints, axis=0).max() <= NO_BONE
         and link not in model.contact_link
     )
 

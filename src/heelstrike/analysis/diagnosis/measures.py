@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 MID_SWING = (0.2, 0.8)
 """Parts of a swing between which its clearance counts: the foot is on the ground at both ends."""
-ROUNDING = 1e-9
+NO_SLIP = 1e-9
 """Slip (m) of points that stick, but for rounding."""
 STEPPED = 0.1
 """Shortest swing that counts (s): what is shorter is chatter."""
@@ -155,7 +155,7 @@ def _measures(run: Run, gait: Gait | None) -> Iterator[Measure]:
         )  # fmt: skip
     if run.robot.nc:
         slip = max_slip(run)
-        slid = 1e3 * slip if slip > ROUNDING else 0.0
+        slid = 1e3 * slip if slip > NO_SLIP else 0.0
         yield Measure("slip of a pressed contact point", slid, "mm", "in all")
     if gait is not None:
         error = tracking_error(run, gait)

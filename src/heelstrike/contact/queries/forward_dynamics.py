@@ -23,11 +23,7 @@ from heelstrike.dynamics import (
 from heelstrike.errors import ContactProblemError
 from heelstrike.field_texts import dataclass
 from heelstrike.robot.robot import Robot
-
-TOUCHING = 1e-6
-"""Contact points nearer to the ground than this (m) touch it."""
-MOVING = 1e-6
-"""Contact points faster than this (m/s) come down, separate or slide."""
+from heelstrike.tolerances import STANDING_GAP, STANDING_SPEED
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +102,9 @@ def contact_forward_dynamics(
     """
     kinematics = contact_kinematics(robot, q, v, ground)
     touching = _touching(robot, kinematics)
-    sliding = np.where(np.abs(kinematics.velocity[:, 1]) > MOVING, kinematics.velocity[:, 1], 0.0)
+    sliding = np.where(
+        np.abs(kinematics.velocity[:, 1]) > STANDING_SPEED, kinematics.velocity[:, 1], 0.0
+    )
     count = len(touching)
     loops = loop_jacobian(robot, q)
     held = len(loops)
@@ -151,13 +149,13 @@ def contact_forward_dynamics(
 
 
 def _touching(robot: Robot, kinematics: ContactKinematics) -> list[int]:
-    touches = kinematics.gap < TOUCHING
+    touches = kinematics.gap < STANDING_GAP
     speed = kinematics.velocity[:, 0]
-    coming = [robot.contact_names[i] for i in np.flatnonzero(touches & (speed < -MOVING))]
+    coming = [robot.contact_names[i] for i in np.flatnonzero(touches & (speed < -STANDING_SPEED))]
     if coming:
         raise ContactProblemError(
             f"robot {robot.name!r}: {', '.join(coming)} come down on the ground. That is an "
             "impact, and there is no acceleration at it; simulate it, or ask for a state before "
             "or after."
         )
-    return [int(i) for i in np.flatnonzero(touches & (speed <= MOVING))]
+    return [int(i) for i in np.flatnonzero(touches & (speed <= STANDING_SPEED))]

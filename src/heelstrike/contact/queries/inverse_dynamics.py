@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.contact.queries.force_distribution import ForceDistribution, distribute
-from heelstrike.contact.queries.forward_dynamics import TOUCHING
 from heelstrike.contact.queries.kinematics import contact_kinematics
 from heelstrike.contact.workspace import Floats
 from heelstrike.dynamics import inverse_dynamics, loop_jacobian, passive_force
@@ -21,6 +20,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.robot.model import Integers
 from heelstrike.robot.motors import torque_range
 from heelstrike.robot.robot import Robot
+from heelstrike.tolerances import STANDING_GAP
 
 RELATIVE = 1e-9
 """Shares of the largest generalised force below which a violation is rounding."""
@@ -121,7 +121,7 @@ def contact_inverse_dynamics(
     """
     choice = _choice(distribution)
     kinematics = contact_kinematics(robot, q, v, ground)
-    touching = np.flatnonzero(kinematics.gap < TOUCHING)
+    touching = np.flatnonzero(kinematics.gap < STANDING_GAP)
     carrying = list(contact_indices(robot, touching if contacts is None else contacts))
     a = joint_vector(robot, "acceleration", acceleration)
     force = inverse_dynamics(robot, q, v, a) - passive_force(robot, q, v)

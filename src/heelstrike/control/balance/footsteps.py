@@ -26,6 +26,13 @@ NEAR = 0.03
 """How far, in lengths of a step, a foot is placed beside the gait's foothold as it flies there."""
 
 
+NO_PLAN = 1e30
+"""Cost of a plan that is not made: more than any has."""
+
+LEAST_TIME = 1e-4
+"""Least time (s) to the landing that is reckoned with: far less than between two calls."""
+
+
 class Planning(Bundle):
     """What plans are made by."""
 
@@ -154,12 +161,12 @@ def make_plan(planning: Planning, reference: Reference, retimed: bool, plan: Pla
     capture = value_at(reference.capture, plan.phase)
     correction = reference.end - own - (capture - own) * grown
     plan.error = own + correction + (plan.capture - own) * grown - plan.length - plan.offset
-    plan.cost = 1e30
+    plan.cost = NO_PLAN
     least = COMMITTED * reference.duration
     left = plan.remaining - plan.gone
     if left < least and plan.elapsed > 0.0:
         # The foot is as good as down: what is left is too short to be worth another plan.
-        consider(planning, reference, own, correction, max(left, 1e-4), plan)
+        consider(planning, reference, own, correction, max(left, LEAST_TIME), plan)
     else:
         rest = reference.duration - plan.elapsed
         consider(planning, reference, own, correction, max(rest, least), plan)

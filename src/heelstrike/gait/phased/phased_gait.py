@@ -28,7 +28,7 @@ from heelstrike.robot.sides.mirror import Mirror
 Floats = NDArray[np.float64]
 
 # A contact point with a smaller radius (m) is a point; files of MuJoCo's format want a positive.
-POINT = 1e-9
+POINT_FOOT = 1e-9
 # Instants of a step at which a gait in time is looked at, for each coefficient that is fitted.
 INSTANTS = 8
 
@@ -377,7 +377,7 @@ def check_robot(robot: Robot) -> None:
             f"{robot.name!r} " + (f"has none at {', '.join(free)}" if free else "moves its trunk")
         )
     for foot in robot.feet:
-        if len(foot.contacts) != 1 or robot.model.contact_radius[foot.contacts[0]] > POINT:
+        if len(foot.contacts) != 1 or robot.model.contact_radius[foot.contacts[0]] > POINT_FOOT:
             raise GaitError(
                 f"virtual constraints are for point feet; foot {foot.name!r} of robot "
                 f"{robot.name!r} is none. ComputedTorque walks on flat feet."

@@ -18,12 +18,11 @@ from heelstrike.robot.files.inertias import MASSLESS
 from heelstrike.robot.files.mujoco_file import MujocoFile
 from heelstrike.robot.files.posture import followers
 from heelstrike.robot.model import POWERS, Floats, Integers
+from heelstrike.tolerances import ONE_POINT
 
 MOST_JOINTS = 1000
 LATCH, BRAKE = "latch", "brake"
 """What custom data of latches and brakes are called."""
-SAME_PLACE = 1e-9
-"""Metres up to which two hinges are one: in space an axis takes two points."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +127,7 @@ def read_loops(file: MujocoFile, links: Links) -> dict[str, Any]:
     """Return what holds beside the joints, as numbers of :class:`~heelstrike.robot.model.Model`."""
     loops: dict[tuple[Any, ...], tuple[Any, Any]] = {}
     for ends, places in _connections(file, links):
-        rounded = np.round(np.ravel(places) / SAME_PLACE).astype(np.int64)
+        rounded = np.round(np.ravel(places) / ONE_POINT).astype(np.int64)
         loops.setdefault((*ends, *rounded.tolist()), (ends, places))
     couplings = list(_couplings(file))
     latches = list(_latches(file, links))

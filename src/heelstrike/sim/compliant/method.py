@@ -92,6 +92,10 @@ SHRINK = 0.2
 GROW = 5.0
 
 
+NEARLY_OVER = 1e-9
+"""A step that leaves less than this part of what remains takes all of it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Compliant(Method):
     """Ground that gives way: contact forces from a law instead of a contact problem.
@@ -305,7 +309,7 @@ def sample(
     while elapsed < span:
         held = elapsed < held_until
         remaining = (held_until if held else span) - elapsed
-        final = h >= remaining * (1.0 - 1e-9)
+        final = h >= remaining * (1.0 - NEARLY_OVER)
         taken = remaining if final else h
         error = attempt_step(
             controller, control, model, ground, start + elapsed, taken, held, memory, work

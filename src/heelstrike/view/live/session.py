@@ -34,7 +34,7 @@ from heelstrike.view.style import in_words
 
 UPDATES = 64.0
 """Updates a second that are offered to viewers."""
-LONGEST = 0.1
+LONGEST_LAG = 0.1
 """Seconds of the clock that are made up for at most; what cannot keep up is slower."""
 RATES = (0.001, 100.0)
 """Slowest and fastest, in simulated seconds a second."""
@@ -386,7 +386,7 @@ class Session:
             self.playing = False
             self._tell()
             return
-        self._goal += self.rate * min(elapsed, LONGEST)
+        self._goal += self.rate * min(elapsed, LONGEST_LAG)
         end = float(self.history.time[-1])
         if self._goal <= end + SAME:
             self._move(self._goal)
@@ -405,7 +405,7 @@ class Session:
         self._advance(min(self._goal, before + max(self._span, step)))
         gained, took = self.live.time - before, clock_time.perf_counter() - began
         self._span = gained * SLOW / took if took > SLOW else min(2.0 * self._span, 1e3)
-        self._goal = min(self._goal, self.live.time + max(self.rate * LONGEST, step))
+        self._goal = min(self._goal, self.live.time + max(self.rate * LONGEST_LAG, step))
         self._gained, self._elapsed = self._gained + gained, self._elapsed + elapsed
         if self._elapsed >= 0.5:
             self._reached = self._gained / self._elapsed
