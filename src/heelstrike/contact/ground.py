@@ -13,6 +13,7 @@ from heelstrike.compiler.bundle import Bundle, array, number
 from heelstrike.compiler.compilation import dissolved_kernel, kernel
 from heelstrike.errors import SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.tolerances import STRAIGHT_GROUND
 
 Floats = NDArray[np.float64]
@@ -46,7 +47,7 @@ class GroundModel(Bundle):
 
 
 @dataclass(frozen=True, eq=False)
-class Ground:
+class Ground(ShownInNotebooks):
     """Rigid ground.
 
     Raises
@@ -194,11 +195,6 @@ class Ground:
         z[0] = z[-1] = 0.0
         ends = [[start - 1.0, 0.0]], np.column_stack((x, z)), [[x[-1] + 1.0, 0.0]]
         return cls(friction=friction, restitution=restitution, profile=np.concatenate(ends))
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import ground_card
-
-        return ground_card(self)
 
     def numbers(self) -> dict[str, Floats]:
         """Return the ground as arrays that :meth:`of_numbers` makes it of."""
