@@ -21,6 +21,7 @@ from heelstrike.arguments import takes
 from heelstrike.contact.ground import Ground
 from heelstrike.errors import LimitCycleError, SimulationError
 from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.controller.interface import Controller
@@ -40,7 +41,7 @@ HALVINGS = 6
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LimitCycle:
+class LimitCycle(ShownInNotebooks):
     """A walk that repeats from step to step."""
 
     state: State
@@ -74,11 +75,6 @@ class LimitCycle:
     def stable(self) -> bool:
         """Whether every small disturbance dies out."""
         return bool(np.all(np.abs(self.multipliers) < 1.0))
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import limit_cycle_card
-
-        return limit_cycle_card(self)
 
     def __repr__(self) -> str:
         largest = np.abs(self.multipliers).max(initial=0.0)

@@ -20,6 +20,7 @@ from heelstrike.analysis.support import double_support_fraction, walking_steps
 from heelstrike.analysis.tracking import tracking_error
 from heelstrike.analysis.zero_moment_point import zero_moment_point, zero_moment_point_limits
 from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.sim.closed_sets import RunStatus
 from heelstrike.sim.run import Run, SolverCount
 
@@ -43,7 +44,7 @@ class GaitFigures:
 
 
 @dataclass(frozen=True)
-class Summary:
+class Summary(ShownInNotebooks):
     """Figures of a run. Those that do not exist for it are NaN (null in JSON)."""
 
     robot: str
@@ -144,11 +145,6 @@ class Summary:
         for label, value in lines(self):
             table.add_row(label, value)
         return table
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import summary_card
-
-        return summary_card(self)
 
     def _title(self) -> str:
         return f"{self.robot}: {self.message}"

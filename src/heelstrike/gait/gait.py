@@ -17,6 +17,7 @@ from heelstrike.field_texts import dataclass
 from heelstrike.gait.clearance import ClearanceProfile
 from heelstrike.gait.margins import Margins
 from heelstrike.gait.polynomials import evaluated
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.model import NUMBERS
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
@@ -80,7 +81,7 @@ class Phase:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Gait:
+class Gait(ShownInNotebooks):
     """A walk in which every step mirrors the one before (paper eq. 13, 41-43).
 
     Joint arrays are in the order of the robot's actuators, ``robot.model.actuator_joint``.
@@ -397,11 +398,6 @@ class Gait:
         from heelstrike.gait.file import save_gait
 
         save_gait(self, path)
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import gait_card
-
-        return gait_card(self)
 
     def __repr__(self) -> str:
         return (

@@ -13,6 +13,7 @@ import numpy as np
 from heelstrike.arguments import takes
 from heelstrike.errors import RobotError
 from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.coordinates import Spread, checked, finite, index_of, spread_of
 from heelstrike.robot.model import Model
 from heelstrike.robot.shapes.outlines import Outline
@@ -53,7 +54,7 @@ class LockedJoint:
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(ShownInNotebooks):
     """A planar robot."""
 
     name: str
@@ -564,11 +565,6 @@ class Robot:
         from heelstrike.dynamics.queries.c_code import c_code
 
         return c_code(self.model, name or self.name, self.joint_names)
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import robot_card
-
-        return robot_card(self)
 
     def __repr__(self) -> str:
         return (

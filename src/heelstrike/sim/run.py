@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from heelstrike.compiler.bundle import Bundle
 from heelstrike.contact.ground import Ground
 from heelstrike.field_texts import dataclass
+from heelstrike.notebook import ShownInNotebooks
 from heelstrike.robot.robot import Robot
 from heelstrike.robot.state import State
 from heelstrike.sim.closed_sets import EventKind, RunStatus
@@ -171,7 +172,7 @@ class Timing:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Run:
+class Run(ShownInNotebooks):
     """Record of a simulation.
 
     A row holds everything about one instant: the state, the torques decided in it, and the
@@ -272,11 +273,6 @@ class Run:
             f"Run({self.robot.name}, {self.method.name}, {last:.6g} s, "
             f"{self.status.value}, {self.steps} steps)"
         )
-
-    def _repr_html_(self) -> str:
-        from heelstrike.view.notebook.cards import run_card
-
-        return run_card(self)
 
     @property
     def completed(self) -> bool:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -134,6 +135,23 @@ class Film:
 def film(run: Run, gait: Gait | None, height: int) -> Film:
     """Make the film of a run for a notebook; see :meth:`heelstrike.Run.show`."""
     return Film(page(run, gait), height)
+
+
+CARDS: dict[str, Callable[[Any], str]] = {
+    "Robot": robot_card,
+    "Gait": gait_card,
+    "Run": run_card,
+    "Summary": summary_card,
+    "Ground": ground_card,
+    "LimitCycle": limit_cycle_card,
+}
+"""What shows an object, by the name of its class: to know these by themselves would import them."""
+
+
+def card(shown: object) -> str:
+    """Return what a notebook shows of an object, as HTML."""
+    names = (kind.__name__ for kind in type(shown).__mro__)
+    return next(CARDS[name] for name in names if name in CARDS)(shown)
 
 
 def _card(title: str, content: str, drawn: str) -> str:
