@@ -118,48 +118,83 @@ def eliminate(
 
 
 @kernel
+def triangulate(size: int, width: int, complete: bool, matrix: Floats, order: Integers) -> int:
+    """Replace a matrix by its triangular factors; return its rank, if pivots are `complete`.
+
+    Parameters
+    ----------
+    size, width : int
+        Equations, and columns with those of right-hand sides, which are carried along.
+    complete : bool
+        Whether a pivot is the largest entry of all, and what is left behind the last is nothing; or
+        the largest of its column, of a matrix that is regular.
+    matrix : (size, width) float
+        Out: U, and under its diagonal L, whose own diagonal is one.
+    order : (size,) int
+        The column that has come to each place, or the row that each was exchanged with.
+    """
+    for k in range(size):
+        order[k] = k
+    smallest = 0.0  # known with the first pivot, which is the largest entry
+    for k in range(size):
+        best, row, place = smallest, -1, k
+        for i in range(k, size):
+            for j in range(k, size if complete else k + 1):
+                if abs(matrix[i, j]) > best:
+                    best, row, place = abs(matrix[i, j]), i, j
+        if complete and row < 0:
+            return k
+        if complete and k == 0:
+            smallest = NO_PIVOT * best
+        row = max(row, k)  # numbers that are none are handed on
+        if row != k:
+            for j in range(width):
+                matrix[k, j], matrix[row, j] = matrix[row, j], matrix[k, j]
+        if place != k:
+            for i in range(size):
+                matrix[i, k], matrix[i, place] = matrix[i, place], matrix[i, k]
+        if complete:
+            order[k], order[place] = order[place], order[k]
+        else:
+            order[k] = row
+        for i in range(k + 1, size):
+            ratio = matrix[i, k] / matrix[k, k]
+            matrix[i, k] = ratio
+            if ratio != 0.0:
+                for j in range(k + 1, width):
+                    matrix[i, j] -= ratio * matrix[k, j]
+    return size
+
+
+@kernel
+def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
+    """Replace x by the solution of equations whose matrix was triangulated by its columns."""
+    for k in range(size):
+        x[k], x[order[k]] = x[order[k]], x[k]
+    for i in range(size):
+        for j in range(i):
+            x[i] -= matrix[i, j] * x[j]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= matrix[i, j] * x[j]
+        x[i] /= matrix[i, i]
+
+
+@kernel
 def solve_to_rank(size: int, system: Floats, column: Integers, unknown: Floats) -> int:
     """Solve equations of any kind, their right-hand side in the last column, by complete pivoting.
 
     Returns the rank; unknowns that the equations leave free are zero.
     """
-    for i in range(size):
-        column[i] = i
-        unknown[i] = 0.0
-    smallest = 0.0  # known with the first pivot, which is the largest entry
-    rank = size
-    for k in range(size):
-        best = smallest
-        row = -1
-        place = -1
-        for i in range(k, size):
-            for j in range(k, size):
-                if abs(system[i, j]) > best:
-                    best = abs(system[i, j])
-                    row = i
-                    place = j
-        if row < 0:
-            rank = k
-            break
-        if k == 0:
-            smallest = NO_PIVOT * best
-        if row != k:
-            for j in range(size + 1):
-                system[k, j], system[row, j] = system[row, j], system[k, j]
-        if place != k:
-            column[k], column[place] = column[place], column[k]
-            for i in range(size):
-                system[i, k], system[i, place] = system[i, place], system[i, k]
-        for i in range(k + 1, size):
-            ratio = system[i, k] / system[k, k]
-            if ratio != 0.0:
-                for j in range(k + 1, size + 1):
-                    system[i, j] -= ratio * system[k, j]
-    for k in range(rank - 1, -1, -1):
-        total = system[k, size]
-        for j in range(k + 1, rank):
-            total -= system[k, j] * unknown[column[j]]
-        unknown[column[k]] = total / system[k, k]
+    rank = triangulate(size, size + 1, True, system, column)
+    for k in range(size - 1, -1, -1):
+        total = 0.0
+        if k < rank:
+            total = system[k, size]
+            for j in range(k + 1, rank):
+                total -= system[k, j] * unknown[column[j]]
+            total /= system[k, k]
+        unknown[column[k]] = total
     return rank
 
 

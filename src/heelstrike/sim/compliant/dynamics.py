@@ -31,7 +31,7 @@ from heelstrike.compiler.compilation import kernel
 from heelstrike.compiler.separate_kernel import call_at
 from heelstrike.compiler.words import copy_words
 from heelstrike.contact.ground import GroundModel
-from heelstrike.dynamics.dense import solve_to_rank
+from heelstrike.dynamics.dense import solve_to_rank, substitute, triangulate
 from heelstrike.dynamics.kernels import (
     bias_force,
     factorize,
@@ -529,50 +529,12 @@ def factorize_step(
     for i in range(nv):
         for j in range(nv):
             system[i, j] -= g * g * by_q[i, j]
-    eliminate(nv, system, work.order)
+    triangulate(nv, nv, False, system, work.order)
     for row in range(work.loop_rows.shape[0]):
         copy_words(work.loop_rows[row], work.loop_response[row])
         substitute(nv, system, work.order, work.loop_response[row])
         for other in range(work.loop_rows.shape[0]):
             work.loop_matrix[other, row] = dot(work.loop_rows[other], work.loop_response[row])
-
-
-@kernel
-def eliminate(size: int, matrix: Floats, order: Integers) -> None:
-    """Replace a matrix by its triangular factors, exchanging rows."""
-    for k in range(size):
-        best = k
-        for i in range(k + 1, size):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        order[k] = best
-        if best != k:
-            for j in range(size):
-                kept = matrix[k, j]
-                matrix[k, j] = matrix[best, j]
-                matrix[best, j] = kept
-        for i in range(k + 1, size):
-            matrix[i, k] /= matrix[k, k]
-            for j in range(k + 1, size):
-                matrix[i, j] -= matrix[i, k] * matrix[k, j]
-
-
-@kernel
-def substitute(size: int, matrix: Floats, order: Integers, x: Floats) -> None:
-    """Replace x by the solution of the system that was eliminated."""
-    for k in range(size):
-        best = order[k]
-        if best != k:
-            kept = x[k]
-            x[k] = x[best]
-            x[best] = kept
-    for i in range(size):
-        for j in range(i):
-            x[i] -= matrix[i, j] * x[j]
-    for i in range(size - 1, -1, -1):
-        for j in range(i + 1, size):
-            x[i] -= matrix[i, j] * x[j]
-        x[i] /= matrix[i, i]
 
 
 @kernel
